@@ -33,7 +33,8 @@ Result<Lines::Line> Lines::line_of(const api::MoveLine& request) const {
   return line;
 }
 
-// On one bus that has ticks, or each at a port of its own that keeps pace with the others.
+// Motors of a line are on one bus that has ticks, or each at a serial port of its own, where ports
+// keep pace with each other.
 Result<void> Lines::may_be_one_line(const std::vector<MotorId>& motors) const {
   const auto keeps_pace = [this](MotorId motor) {
     return installation_.mcu_of(motor).keeps_pace();
@@ -44,8 +45,8 @@ Result<void> Lines::may_be_one_line(const std::vector<MotorId>& motors) const {
   const auto not_at_port = std::ranges::find_if_not(motors, keeps_pace);
   if (not_at_port != motors.end()) {
     return fail(fmt::format(
-        "{} is at a serial port that makes pulses, and {} at MCU {}: their steps have no common "
-        "time. Move them without --line, or connect them alike",
+        "{} is at a serial port that makes pulses, and {} is not, but at {}: their steps have no "
+        "common time. Move them without --line, or connect both to such ports or both to one bus",
         installation_[*at_port].name(), installation_[*not_at_port].name(),
         installation_.mcu_of(*not_at_port).name()));
   }

@@ -261,7 +261,7 @@ api::Configuration MotorSettings::configuration_of(const std::vector<MotorId>& m
   for (const MotorId id : motors) {
     const config::Settings now = settings_of(id);
     for (const SettingKey key : config::kSettingKeys) {
-      if (!config::is_told(now, key) && !config::is_told(in_file_[id], key)) continue;
+      if (!config::is_reported(now, key) && !config::is_reported(in_file_[id], key)) continue;
       if (!config::applies(now, key)) continue;
       out.settings.push_back({.motor = installation_[id].name(),
                               .key = std::string(config::name_of(key)),

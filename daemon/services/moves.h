@@ -52,34 +52,34 @@ class Moves final : public Service {
   // Those that move ramp down and stay in their moves, until they are resumed or stopped.
   void pause(std::int64_t now_us, const std::vector<MotorId>& motors);
   void resume(std::int64_t now_us, const std::vector<MotorId>& motors);
-  // Motors of one line, all planned by who leads it. Precondition: their part of an open move.
-  // Runs that have just been started, at one tick, or in this pace, each at one of its own bus:
+  // Begins the runs of the motors of a line, which the caller has planned and started: at one tick,
+  // or with `pace` each at a tick of its own bus. Precondition: they are part of an open move.
   void begin_on_line(const std::vector<MotorId>& motors,
                      const std::shared_ptr<link::LinePace>& pace = nullptr);
-  // Runs with another end or speed:
+  // Gives these runs the other end or speed that the caller has planned.
   void redirect_on_line(std::int64_t now_us, const std::vector<MotorId>& motors);
-  // They are given to another move.
+  // Ends their moves without stopping the motors: a request of `by` moves them on.
   void take_over(const std::vector<MotorId>& motors, const api::Asker& by);
 
-  // From rest, as the second part of what the motor does for a request that is open already: begins
-  // a move to this position, and says which step that is.
+  // Begins a move from rest to this position, as the second part of a request that is open already.
+  // Returns the position in steps.
   Result<std::int64_t> go_on(std::int64_t now_us, MotorId motor, const api::Amount& position);
 
-  // Ramps down those that move; those that wait for the trigger wait no more.
+  // Ramps down those that move, and disarms those that wait for the trigger.
   void stop(std::int64_t now_us, const std::vector<MotorId>& motors);
-  // Lets the MCUs know what is wanted of these motors now, in place of changes that they have not
-  // taken.
+  // Sends the MCUs the present plans of these motors, and of others on their lines. They replace
+  // changes that the MCUs have not taken yet.
   void replan(std::int64_t now_us, const std::vector<MotorId>& motors);
-  // The same for motors whose MCU has not taken the change.
+  // The same for these motors alone, whose MCUs have not taken the change.
   void plan_again(std::int64_t now_us, const std::vector<MotorId>& motors);
-  // What follows from a report of a motor.
+  // Does what follows from a report of a motor.
   void take(std::int64_t now_us, MotorId motor, const std::vector<motion::Event>& events);
   void end(MotorId motor, const motion::event::Ended& ended);
 
-  // A move that has been accepted is not yet begun by all of its motors. Until then requests that
-  // are no stops should wait.
+  // Whether motors of an accepted move are still to begin. Until then requests should wait, but
+  // for stops.
   bool begins() const { return !to_begin_.empty(); }
-  // One slice of that.
+  // Begins one slice of these motors.
   void work();
   // Motors' moves begun so far.
   std::uint64_t units() const { return units_; }
@@ -100,11 +100,11 @@ class Moves final : public Service {
   void plan(std::int64_t now_us, const std::vector<MotorId>& motors);
   std::map<McuId, motion::Tick> ticks_to_change_at(std::int64_t now_us,
                                                    const std::vector<MotorId>& motors) const;
-  // Buses that keep pace have ticks of their own, counted from the line's beginning they are the
-  // same.
+  // Buses that keep pace have ticks of their own, which are counted from the beginning of the line:
+  // makes the ticks of a line's motors in `at` equally far from it.
   void at_one_tick_of_line(const std::vector<MotorId>& motors,
                            std::map<McuId, motion::Tick>& at) const;
-  // Of motors whose line stops farther on than their own plan does: there.
+  // Where motors stop on their line, in its steps, if another one of the line stops farther on.
   std::map<MotorId, std::uint32_t> common_ends(const std::vector<MotorId>& motors) const;
   std::vector<MotorId> with_whole_lines(const std::vector<MotorId>& motors);
   bool has_time_to_retarget(std::int64_t now_us, MotorId motor) const;

@@ -181,19 +181,20 @@ Result<Settings> with_input_level(Settings settings, std::string_view text) {
   return settings;
 }
 
-// People at an MCU move it, or no longer do.
+// Whether local inputs or a keypad at its MCU move it.
 Result<Settings> with_people(Settings settings, SettingKey key, std::string_view text) {
   const std::string_view word = trimmed(text);
   if (word != "true" && word != "false") return refuse(key, text);
   if (word == "true" && settings.max_speed) {
     return refuse(key, text,
-                  "max_speed does not hold for local motion, which the MCU makes by the table "
-                  "alone; leave that out in bushd.toml first");
+                  "local motion goes by the table alone, and may be faster than max_speed; leave "
+                  "max_speed out in bushd.toml first");
   }
   if (word == "true" && settings.idle_disabled) {
-    return refuse(key, text,
-                  "its MCU has idle_disable_s, and people could not enable the drivers; leave that "
-                  "out in bushd.toml first");
+    return refuse(
+        key, text,
+        "its MCU has idle_disable_s, and local inputs cannot enable disabled drivers; leave "
+        "idle_disable_s out in bushd.toml first");
   }
   (key == SettingKey::kLocal ? settings.drive.local : settings.drive.keypad) = word == "true";
   return settings;
@@ -204,10 +205,11 @@ std::string_view why_not(SettingKey key) {
     case SettingKey::kVelocity:
       return "no local inputs move it; set local=true or keypad=true first";
     case SettingKey::kInputActive:
-      return "it has not just one input for itself; change `inputs` in bushd.toml";
+      return "only a motor without `inputs`, whose input no other motor uses, has this setting; "
+             "change `inputs` in bushd.toml";
     case SettingKey::kLocal:
     case SettingKey::kKeypad:
-      return "its bus has no MCUs, where people could move it";
+      return "its bus has no MCU with local inputs or a keypad";
     case SettingKey::kCurrents:
       return "its MCU does not drive it by phases; give that `emission = \"phases\"` in bushd.toml "
              "first";
@@ -259,7 +261,7 @@ bool applies(const Settings& settings, SettingKey key) {
   }
 }
 
-bool is_told(const Settings& settings, SettingKey key) {
+bool is_reported(const Settings& settings, SettingKey key) {
   if (key == SettingKey::kInputActive) return settings.drive.input_open;
   if (key == SettingKey::kLocal) return settings.drive.local;
   if (key == SettingKey::kKeypad) return settings.drive.keypad;

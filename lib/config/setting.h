@@ -37,21 +37,23 @@ struct Settings {
   std::optional<units::SoftLimits> soft_limits = {};
   Drive drive{};
   bool phases = false;     // its MCU drives it by phases: it may have currents
-  bool has_mcu = false;    // people may move it there
-  bool max_speed = false;  // it has one, which people could not be held to
-  // Its drivers are disabled at rest, and people cannot enable them.
+  bool has_mcu = false;    // its controller is an MCU, which can move it by local inputs
+  bool max_speed = false;  // max_speed is configured, which an MCU does not keep to by itself
+  // Its drivers are disabled at rest, and local inputs cannot enable them.
   bool idle_disabled = false;
-  bool has_one_input = false;  // whose level may be changed
+  // It has one input, which no other motor uses: input_active may be changed.
+  bool has_one_input = false;
 };
 struct Motor;
 struct Mcu;
 Settings settings_of(const Motor& motor, const Mcu& mcu);  // as bushd.toml has them
 
-// A motor without a unit has neither offset nor direction. Velocity is of one that people move,
-// currents are of one that is driven by phases.
+// Whether the motor has this setting. Offset, direction and soft limits need a unit, velocity needs
+// local inputs or a keypad, currents need a motor that is driven by phases.
 bool applies(const Settings& settings, SettingKey key);
-// Whether it is worth to be told: not that people do not move a motor, or that its input is closed.
-bool is_told(const Settings& settings, SettingKey key);
+// Whether it is listed when all settings are asked for. The defaults of `local`, `keypad` and
+// `input_active` are not.
+bool is_reported(const Settings& settings, SettingKey key);
 
 // "12.5"; "negative"; "[-5, 30]" or "none"; "true" or "false"; velocity and currents as an inline
 // table of TOML, or "none". The same value has one text.

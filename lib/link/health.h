@@ -24,7 +24,8 @@ struct McuHealth {
   // The fewest ticks that a moving motor had queued, since reset_low_water(); none: none moved.
   std::optional<std::uint16_t> low_water_ticks;
   double rate_ppm = 0.0;  // how much faster than its crystal the MCU counts, to follow the bus
-  // By how much later it heard the last SYNC than the first MCU that is in step, by its clock.
+  // By how much later it heard the last SYNC than the first MCU that is in step, by its clock. Of a
+  // serial port that makes pulses: by how much it was ahead of the slowest port of its last line.
   double clock_offset_us = 0.0;
 };
 

@@ -1,5 +1,7 @@
 #include "sim/virtual_mcu.h"
 
+#include "sim/disabled_capabilities.h"
+
 namespace bushd::sim {
 
 VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
@@ -18,11 +20,11 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   config.mcu.queue_ticks = options.queue_ticks;
   config.mcu.codes = codes_.data();
   config.mcu.code_count = options.code_count;
-  config.mcu.disabled_capabilities = options.disabled_capabilities;
   config.mcu.current_motors = options.current_motors;
   config.mcu.velocity_motors = options.velocity_motors;
-  config.mcu.keypad = options.keypad;
-  config.mcu.scratch = options.scratch ? &scratch_ : nullptr;
+  config.mcu.keypad = true;
+  config.mcu.scratch = &scratch_;
+  disable_capabilities(options.disabled_capabilities, &config.mcu);
   const std::uint64_t unique_id = options.unique_id != 0 ? options.unique_id : index + 1;
   for (std::size_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {
     config.mcu.unique_id[i] = static_cast<std::uint8_t>(unique_id >> 8 * i);

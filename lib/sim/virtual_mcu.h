@@ -22,11 +22,11 @@ struct McuOptions {
   std::uint16_t boot_number = 1;
   std::uint16_t queue_ticks = 1024;  // a power of two
   std::uint16_t code_count = 16384;
-  std::uint16_t disabled_capabilities = 0;  // BUSHD_CAN_* that it does as if it were too slow for
-  std::uint8_t current_motors = BUSHD_MAX_CURRENT_MOTORS;    // whose windings' currents it controls
-  std::uint8_t velocity_motors = BUSHD_MAX_VELOCITY_MOTORS;  // that may move by the velocity loop
-  bool keypad = true;                                        // it has a line for one
-  bool scratch = true;  // has a slot for a table that is not kept
+  std::uint32_t disabled_capabilities = 0;  // BUSHD_CAN_*: it has all others
+  // Of how many motors it controls the currents, and how many may move by the velocity loop; >= 1:
+  // an MCU without these capabilities has them disabled.
+  std::uint8_t current_motors = BUSHD_MAX_CURRENT_MOTORS;
+  std::uint8_t velocity_motors = BUSHD_MAX_VELOCITY_MOTORS;
   TimeNs boot_ns =
       0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
   std::int32_t clock_ppm = 0;  // > 0: its clock is fast

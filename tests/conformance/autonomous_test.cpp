@@ -3,6 +3,7 @@
 #include <random>
 
 #include "conformance/script.h"
+#include "keypad_bytes.h"
 #include "sim/switch.h"
 
 namespace bushd::sim {
@@ -166,27 +167,24 @@ TEST_P(DeniedKeypad, IsRefused) {
 TEST_P(KeypadLine, MovesItsMotors) {
   ASSERT_NO_FATAL_FAILURE(
       ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{0, 1 << kMotor, 100}));
-  constexpr std::uint8_t kForward = 0x00;
-  constexpr std::uint8_t kReverse = 0xFF;
-  constexpr std::uint8_t kSlower = 0xFE;
-  constexpr std::uint8_t kStop = 0xFD;
+  using enum test::KeypadByte;
   const auto press = [this](std::uint8_t key, int ticks) {
     to_inputs_time();
     for (std::size_t i = 0; i < 2; ++i) bus_.node(i).keypad_byte(key, bus_.now_ns());
     pass_ticks(ticks);
   };
-  press(kForward, 60);
+  press(kKeyForward, 60);
   EXPECT_EQ(master_.poll(kReal).autonomous, 1 << kMotor);
-  press(kSlower, 20);
-  press(kForward, 40);
-  press(kReverse, 60);
-  press(kStop, 20);
+  press(kKeySlower, 20);
+  press(kKeyForward, 40);
+  press(kKeyReverse, 60);
+  press(kKeyStop, 20);
   EXPECT_EQ(master_.poll(kReal).moving, 0);
   const std::size_t made = steps(1, kMotor).size();
   EXPECT_GT(made, 100u) << "3 ms and 3.3 ms a step";
   expect_alike();
   // Not repeated: for 100 ticks, and its ramp.
-  press(kForward, 160);
+  press(kKeyForward, 160);
   EXPECT_EQ(master_.poll(kReal).moving, 0);
   EXPECT_NEAR(static_cast<double>(steps(1, kMotor).size() - made), 100 * 2.56 / 3.3, 4);
   expect_alike();

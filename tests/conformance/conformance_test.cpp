@@ -1,4 +1,6 @@
 // Streams, table runs and methods of emission, told to an image and to its virtual twin.
+#include <utility>
+
 #include "conformance/script.h"
 #include "sim/random.h"
 
@@ -29,7 +31,7 @@ TEST_P(Conformance, TellsWhoItIs) {
   EXPECT_EQ(identity.slots, expected.slots);
   EXPECT_EQ(identity.queue_ticks, expected.queue_ticks);
   EXPECT_EQ(identity.table_codes, expected.table_codes);
-  EXPECT_EQ(identity.capabilities, expected.capabilities & ~real_->disabled_capabilities());
+  EXPECT_EQ(identity.capabilities, expected.capabilities);
   EXPECT_EQ(identity.unique_id[0], 8);
   EXPECT_EQ(identity.unique_id[7], 1);
 }
@@ -215,12 +217,24 @@ struct Mode {
   bushd_emission settings;
 };
 
-class ConformanceOfEmission : public Script,
-                              public testing::WithParamInterface<std::tuple<Target, Mode>> {
+using TargetAndMode = std::pair<Target, Mode>;
+
+class ConformanceOfEmission : public Script, public testing::WithParamInterface<TargetAndMode> {
  protected:
-  ConformanceOfEmission() : Script(std::get<Target>(GetParam())) {}
+  ConformanceOfEmission() : Script(GetParam().first), mode_(GetParam().second) {}
+
+  void expect_both_answer(bushd_status status) {
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, BUSHD_FORMAT_COARSE));
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      ASSERT_EQ(
+          master_.acknowledged(address, BUSHD_MSG_EMISSION, bushd_encode_emission, mode_.settings),
+          status);
+    }
+  }
+
+  const Mode mode_;
 };
-GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ConformanceOfEmission);
+class DeniedEmission : public ConformanceOfEmission {};
 
 std::vector<Mode> modes() {
   const auto mode = [](bushd_emission_mode of) {
@@ -242,26 +256,35 @@ void PrintTo(const Mode& mode, std::ostream* out) {
   *out << mode.name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, ConformanceOfEmission,
-                         testing::Combine(testing::ValuesIn(targets()), testing::ValuesIn(modes())),
-                         [](auto& test) {
-                           return std::get<Target>(test.param).name +
-                                  std::get<Mode>(test.param).name;
-                         });
+// Each mode with the targets that `those` gives for its capability.
+std::vector<TargetAndMode> with_modes(std::vector<Target> (*those)(std::uint32_t)) {
+  std::vector<TargetAndMode> pairs;
+  for (const Mode& mode : modes()) {
+    for (const Target& target : those(mode.needs)) pairs.emplace_back(target, mode);
+  }
+  return pairs;
+}
+
+std::string name_of(const testing::TestParamInfo<TargetAndMode>& test) {
+  return test.param.first.name + test.param.second.name;
+}
+
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ConformanceOfEmission);
+INSTANTIATE_TEST_SUITE_P(Of, ConformanceOfEmission, testing::ValuesIn(with_modes(targets_with)),
+                         name_of);
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(DeniedEmission);
+INSTANTIATE_TEST_SUITE_P(Of, DeniedEmission, testing::ValuesIn(with_modes(targets_without)),
+                         name_of);
+
+TEST_P(DeniedEmission, IsRefused) {
+  expect_both_answer(BUSHD_E_FORMAT);
+}
 
 // Four motors, or all that have phases, to and fro, in streams, where every output changes at the
 // same slots.
 TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
-  const Mode& mode = std::get<Mode>(GetParam());
-  const bool phases = mode.settings.mode == BUSHD_EMISSION_PHASES;
-  ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, BUSHD_FORMAT_COARSE));
-  const bool refuses = (real_->disabled_capabilities() & mode.needs) != 0;
-  for (const std::uint8_t address : {kVirtual, kReal}) {
-    EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_EMISSION, bushd_encode_emission,
-                                   mode.settings) == BUSHD_OK,
-              !refuses);
-  }
-  if (refuses) return;
+  const bool phases = mode_.settings.mode == BUSHD_EMISSION_PHASES;
+  ASSERT_NO_FATAL_FAILURE(expect_both_answer(BUSHD_OK));
   const auto outputs = real_->twin().motors;
   std::vector<std::uint8_t> motors = {0, 1, 2, 3};
   if (phases) motors.resize(outputs / BUSHD_PHASE_OUTPUTS);

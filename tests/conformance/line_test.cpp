@@ -58,6 +58,9 @@ BUSHD_FOR_TARGETS(LineScript, targets_with(BUSHD_CAN_LINE_RUN));
 class DeniedLine : public LineScript {};
 BUSHD_FOR_TARGETS(DeniedLine, targets_without(BUSHD_CAN_LINE_RUN));
 
+class LineByScratchTable : public LineScript {};
+BUSHD_FOR_TARGETS(LineByScratchTable, targets_with(BUSHD_CAN_LINE_RUN | BUSHD_CAN_SCRATCH));
+
 TEST_P(DeniedLine, IsRefusedAndNothingMoves) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
   const std::size_t before = steps(1, 1).size();
@@ -88,8 +91,7 @@ TEST_P(LineScript, EveryStepIsInTheSlotOfTheTwins) {
 }
 
 // By a table that is not kept, between lines by the one that is.
-TEST_P(LineScript, ATableForLinesMakesTheSameSteps) {
-  if (!real_->twin().scratch) GTEST_SKIP() << "has no slot for one";
+TEST_P(LineByScratchTable, MakesTheSameSteps) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
   std::vector<std::uint16_t> slower = codes_;
   for (std::uint16_t& code : slower) code = static_cast<std::uint16_t>(code * 7 / 6);

@@ -8,6 +8,12 @@ namespace {
 constexpr TimeNs kBootNs = 300'000'000;
 constexpr std::size_t kCodes = 3;
 
+std::vector<std::uint16_t> long_ramp() {
+  std::vector<std::uint16_t> codes;
+  while (codes.size() < 900) codes.push_back(static_cast<std::uint16_t>(2000 - codes.size()));
+  return codes;
+}
+
 class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
  protected:
   Nvm() : McuAlone(kBaud, kBootNs), real_(GetParam().make()) {
@@ -37,8 +43,7 @@ BUSHD_FOR_TARGETS(Nvm, targets());
 
 TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  std::vector<std::uint16_t> ramp;
-  while (ramp.size() < 900) ramp.push_back(static_cast<std::uint16_t>(2000 - ramp.size()));
+  const std::vector<std::uint16_t> ramp = long_ramp();
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp, 1100));
   bushd_set_inputs inputs{};
   inputs.system_inverted = BUSHD_INPUT_FORWARD;
@@ -128,34 +133,54 @@ TEST_P(Nvm, WhatIsTheSameIsNotWrittenAgain) {
   EXPECT_EQ(real_->nvm_writes(), written);
 }
 
-TEST_P(Nvm, ATableForLinesIsNotKeptAndLeavesTheOthersAlone) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(real_->keeps_within_ns(kCodes));
-  const std::uint64_t written = real_->nvm_writes();
-  const bushd_tables before = master_.tables(kAddress);
-  if (!real_->twin().scratch) {
-    const bushd_table_begin begin{BUSHD_SCRATCH_SLOT, 3, 0, 150, 10'000, 1};
-    EXPECT_EQ(ask(BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin), BUSHD_E_FORMAT);
-  } else {
-    std::vector<std::uint16_t> ramp;
-    while (ramp.size() < 900) ramp.push_back(static_cast<std::uint16_t>(2000 - ramp.size()));
-    ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, BUSHD_SCRATCH_SLOT, 10'000, ramp, 1100));
+// Slot 8, which is never kept, whether the MCU has it or refuses it.
+class NvmScratch : public Nvm {
+ protected:
+  void SetUp() override {
+    ASSERT_NO_FATAL_FAILURE(make_ready());
+    pass(real_->keeps_within_ns(kCodes));
+    written_ = real_->nvm_writes();
+    before_ = master_.tables(kAddress);
   }
-  pass(real_->keeps_within_ns(kCodes));
-  EXPECT_EQ(real_->nvm_writes(), written);
-  reboot();
-  const bushd_tables after = master_.tables(kAddress);
-  for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
-    EXPECT_EQ(after.slot[slot].valid, slot == 0);
-    EXPECT_EQ(after.slot[slot].crc, before.slot[slot].crc);
+
+  // What was kept before is there after a reset, nothing was written, and slot 8 is empty.
+  void expect_only_the_other_table_is_kept() {
+    pass(real_->keeps_within_ns(kCodes));
+    EXPECT_EQ(real_->nvm_writes(), written_);
+    reboot();
+    const bushd_tables after = master_.tables(kAddress);
+    for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
+      EXPECT_EQ(after.slot[slot].valid, slot == 0);
+      EXPECT_EQ(after.slot[slot].crc, before_.slot[slot].crc);
+    }
+    EXPECT_EQ(master_.poll(kAddress).faults, 0);
+    EXPECT_NE(ask(BUSHD_MSG_TABLE_END, bushd_encode_table_end, {BUSHD_SCRATCH_SLOT, 0}), BUSHD_OK);
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
+    run(3, 50);
+    pass(200 * TimeNs{kTickNs});
+    EXPECT_EQ(steps_made(3), 50u);
   }
-  EXPECT_EQ(master_.poll(kAddress).faults, 0);
-  EXPECT_NE(ask(BUSHD_MSG_TABLE_END, bushd_encode_table_end, {BUSHD_SCRATCH_SLOT, 0}), BUSHD_OK);
-  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
-  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
-  run(3, 50);
-  pass(200 * TimeNs{kTickNs});
-  EXPECT_EQ(steps_made(3), 50u);
+
+ private:
+  std::uint64_t written_ = 0;
+  bushd_tables before_{};
+};
+BUSHD_FOR_TARGETS(NvmScratch, targets_with(BUSHD_CAN_SCRATCH));
+
+TEST_P(NvmScratch, ATableForLinesIsNotKeptAndLeavesTheOthersAlone) {
+  ASSERT_NO_FATAL_FAILURE(
+      master_.upload_table(kAddress, BUSHD_SCRATCH_SLOT, 10'000, long_ramp(), 1100));
+  expect_only_the_other_table_is_kept();
+}
+
+class DeniedNvmScratch : public NvmScratch {};
+BUSHD_FOR_TARGETS(DeniedNvmScratch, targets_without(BUSHD_CAN_SCRATCH));
+
+TEST_P(DeniedNvmScratch, ATableForLinesIsRefusedAndLeavesTheOthersAlone) {
+  const bushd_table_begin begin{BUSHD_SCRATCH_SLOT, 3, 0, 150, 10'000, 1};
+  EXPECT_EQ(ask(BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin), BUSHD_E_FORMAT);
+  expect_only_the_other_table_is_kept();
 }
 
 TEST_P(Nvm, ABitThatHasFlippedIsAFault) {

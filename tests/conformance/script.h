@@ -130,7 +130,7 @@ class Script : public testing::Test {
       } else {
         bushd_run_expand_coarse(&run, tick_ns_, kCount, coarse.data(), 1);
       }
-      if (frame % 3 == 1 && (real_->disabled_capabilities() & BUSHD_CAN_TABLE_TICKS) == 0) {
+      if (frame % 3 == 1 && (real_->twin().disabled_capabilities & BUSHD_CAN_TABLE_TICKS) == 0) {
         const auto state_flags = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_FINE);
         payload.resize(
             bushd_encode_table_ticks(0, state_flags, first, kCount, &entry, 1, payload.data()));

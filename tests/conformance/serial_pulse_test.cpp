@@ -13,6 +13,18 @@ class Port : public testing::TestWithParam<PortTarget> {};
 INSTANTIATE_TEST_SUITE_P(Of, Port, testing::ValuesIn(port_targets()),
                          [](auto& target) { return target.param.name; });
 
+std::vector<PortTarget> targets_that_tell_empty() {
+  std::vector<PortTarget> those = port_targets();
+  std::erase_if(those, [](const PortTarget& target) { return !target.tells_empty; });
+  return those;
+}
+
+// Whose driver tells what it still has. Of what others hold untold it is taken for granted that it
+// leaves within 20 ms, so none of them is stalled.
+class PortThatTellsEmpty : public Port {};
+INSTANTIATE_TEST_SUITE_P(Of, PortThatTellsEmpty, testing::ValuesIn(targets_that_tell_empty()),
+                         [](auto& target) { return target.param.name; });
+
 TEST_P(Port, TellsWhoItIs) {
   PulseBench bench(GetParam());
   const link::McuView& view = bench.master().view({0});
@@ -260,8 +272,7 @@ TEST_P(Port, TheDirectionIsSetWellBeforeAStep) {
   bench.move(-700);
 }
 
-TEST_P(Port, AStalledDriverIsNotCountedOn) {
-  if (!GetParam().tells_empty) GTEST_SKIP() << "what an adapter holds untold has to leave in 20 ms";
+TEST_P(PortThatTellsEmpty, AStalledDriverIsNotCountedOn) {
   PulseBench bench(GetParam());
   bench.begin(3000);
   bench.run_for(0.7);
@@ -303,8 +314,7 @@ TEST_P(Port, AfterARestartItCountsOnFromWhereItIsTold) {
 }
 
 // What the daemon before had written moves the motor still: nobody is told that it stands.
-TEST_P(Port, AfterARestartInMotionItWaitsForTheBytesOfTheOneBefore) {
-  if (!GetParam().tells_empty) GTEST_SKIP() << "what an adapter holds untold has to leave in 20 ms";
+TEST_P(PortThatTellsEmpty, AfterARestartInMotionItWaitsForTheBytesOfTheOneBefore) {
   PulseBench bench(GetParam());
   bench.begin(3000);
   bench.run_for(0.7);
@@ -337,57 +347,6 @@ TEST_P(Port, CountsEveryStepOfRandomOrders) {
     ASSERT_NO_FATAL_FAILURE(bench.finish());
     ASSERT_NO_FATAL_FAILURE(bench.expect_run(made, 0, stopped));
   }
-}
-
-// Checks of MCUs that a port cannot pass, why not, and that it says so.
-struct Lack {
-  const char* name;
-  std::uint32_t capability;  // 0: `says_no` tells
-  bool (*says_no)(PulseBench& bench);
-  const char* why;
-};
-constexpr bool (*kByCapability)(PulseBench&) = nullptr;
-const std::vector<Lack> kLacks = {
-    {"Streams", 0, [](PulseBench& bench) { return !bench.master().streams(); },
-     "no step can be put at a time: bytes leave when they leave"},
-    {"SeveralMotors", 0,
-     [](PulseBench& bench) { return bench.master().view({0}).identity.motors == 1; },
-     "a port has one TXD; lines of several ports are tested with the daemon"},
-    {"DisablingDrivers", 0,
-     [](PulseBench& bench) {
-       bench.master().control({0}, BUSHD_CONTROL_DISABLE);
-       bench.run_for(0.1);
-       return bench.count_of<link::RequestRefused>() == 1;
-     },
-     "no line is left for EN"},
-    {"RunsOfLines", BUSHD_CAN_LINE_RUN, kByCapability, "no tick is common to two ports"},
-    {"TicksOfTables", BUSHD_CAN_TABLE_TICKS, kByCapability, "there are no slots"},
-    {"Trigger", BUSHD_CAN_TRIGGER, kByCapability,
-     "an edge at a modem line is seen milliseconds later"},
-    {"PositionCompare", BUSHD_CAN_POSITION_COMPARE, kByCapability, "no line is left for it"},
-    {"LocalInputs", BUSHD_CAN_LOCAL, kByCapability, "nothing runs without the daemon"},
-    {"VelocityLoop", BUSHD_CAN_VELOCITY, kByCapability, "nothing runs without the daemon"},
-    {"Travel", BUSHD_CAN_TRAVEL, kByCapability, "nothing runs without the daemon"},
-    {"Burst", BUSHD_CAN_BURST, kByCapability, "there are no slots"},
-    {"CommonDirection", BUSHD_CAN_COMMON_DIR, kByCapability, "there is one motor"},
-    {"Staggered", BUSHD_CAN_STAGGERED, kByCapability, "there is one motor"},
-    {"Phases", BUSHD_CAN_PHASES, kByCapability, "TXD is one line"},
-    {"Currents", BUSHD_CAN_CURRENTS, kByCapability, "there is no chopper"},
-};
-
-class PortLacks : public testing::TestWithParam<Lack> {};
-INSTANTIATE_TEST_SUITE_P(A, PortLacks, testing::ValuesIn(kLacks),
-                         [](auto& lack) { return std::string(lack.param.name); });
-
-TEST_P(PortLacks, IsDeniedAndSkipped) {
-  PulseBench bench(port_targets().front());
-  const Lack& lack = GetParam();
-  if (lack.says_no != nullptr) {
-    ASSERT_TRUE(lack.says_no(bench));
-  } else {
-    ASSERT_EQ(bench.master().view({0}).identity.capabilities & lack.capability, 0u);
-  }
-  GTEST_SKIP() << lack.why;
 }
 
 }  // namespace

@@ -57,12 +57,9 @@ class Atmega2560 final : public Avr {
     return {.slots = 128,
             .queue_ticks = 64,
             .code_count = 952,
-            .disabled_capabilities = disabled_capabilities(),
-            .current_motors = 0,
-            .velocity_motors = 0,
-            .scratch = false};
+            .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_CURRENTS |
+                                     BUSHD_CAN_VELOCITY | BUSHD_CAN_SCRATCH};
   }
-  std::uint16_t disabled_capabilities() const override { return BUSHD_CAN_TABLE_TICKS; }
 };
 
 class Atmega1284p final : public Avr {
@@ -76,14 +73,10 @@ class Atmega1284p final : public Avr {
             .slots = 128,
             .queue_ticks = 64,
             .code_count = 1536,
-            .disabled_capabilities = disabled_capabilities(),
+            .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN |
+                                     BUSHD_CAN_COMMON_DIR | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH,
             .current_motors = 1,
-            .velocity_motors = 2,
-            .keypad = false,
-            .scratch = false};
-  }
-  std::uint16_t disabled_capabilities() const override {
-    return BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_COMMON_DIR;
+            .velocity_motors = 2};
   }
 };
 #endif
@@ -95,11 +88,8 @@ class Lm3s6965 final : public McuUnderTest {
     return {.slots = 128,
             .queue_ticks = 512,
             .code_count = 12288,
-            .current_motors = 0,
-            .velocity_motors = 0,
-            .keypad = false};
+            .disabled_capabilities = BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD};
   }
-  std::uint16_t disabled_capabilities() const override { return 0; }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
   std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
                             EdgeSink* sink) override {
@@ -133,18 +123,10 @@ Target target(const char* name) {
   return {name, [] { return std::make_unique<Kind>(); }};
 }
 
-std::uint32_t denied(const McuUnderTest& mcu) {
-  std::uint32_t capabilities = mcu.disabled_capabilities();
-  if (mcu.twin().current_motors == 0) capabilities |= BUSHD_CAN_CURRENTS;
-  if (mcu.twin().velocity_motors == 0) capabilities |= BUSHD_CAN_VELOCITY;
-  if (!mcu.twin().keypad) capabilities |= BUSHD_CAN_KEYPAD;
-  return capabilities;
-}
-
-std::vector<Target> those_that_deny(std::uint32_t capability, bool deny) {
+std::vector<Target> those_that_deny(std::uint32_t capabilities, bool deny) {
   std::vector<Target> those = targets();
   std::erase_if(those, [=](const Target& target) {
-    return ((denied(*target.make()) & capability) != 0) != deny;
+    return ((target.make()->twin().disabled_capabilities & capabilities) != 0) != deny;
   });
   return those;
 }
@@ -163,12 +145,12 @@ std::vector<Target> targets() {
   };
 }
 
-std::vector<Target> targets_with(std::uint32_t capability) {
-  return those_that_deny(capability, false);
+std::vector<Target> targets_with(std::uint32_t capabilities) {
+  return those_that_deny(capabilities, false);
 }
 
-std::vector<Target> targets_without(std::uint32_t capability) {
-  return those_that_deny(capability, true);
+std::vector<Target> targets_without(std::uint32_t capabilities) {
+  return those_that_deny(capabilities, true);
 }
 
 }  // namespace bushd::sim

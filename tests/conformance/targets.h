@@ -28,9 +28,9 @@ class McuUnderTest {
   McuUnderTest& operator=(const McuUnderTest&) = delete;
   virtual ~McuUnderTest() = default;
 
-  // The virtual MCU that it is compared with: as many slots, ticks and codes.
+  // The virtual MCU that it is compared with: as many slots, ticks and codes, and the same
+  // capabilities.
   virtual McuOptions twin() const = 0;
-  virtual std::uint16_t disabled_capabilities() const = 0;  // BUSHD_CAN_* that the twin has
   // A tick in which it can make all that a frame may ask for: of all motors, to and fro, up to 127
   // steps.
   virtual std::uint32_t full_tick_ns(bushd_format format) const = 0;
@@ -60,9 +60,10 @@ struct Target {
 
 // Those whose image and simulator were there at build time.
 std::vector<Target> targets();
-// Of these, those that have such a capability (BUSHD_CAN_*), and those that deny it.
-std::vector<Target> targets_with(std::uint32_t capability);
-std::vector<Target> targets_without(std::uint32_t capability);
+// Of these, those that have all of these capabilities (BUSHD_CAN_*), and those that deny one. A
+// test that needs a capability belongs to a suite of the former, and so is never skipped.
+std::vector<Target> targets_with(std::uint32_t capabilities);
+std::vector<Target> targets_without(std::uint32_t capabilities);
 
 // A suite of tests with a parameter, for each of them; for none if no image was there.
 #define BUSHD_FOR_TARGETS(suite, those)                         \

@@ -35,8 +35,8 @@ inline std::string lab_with(const std::string& manner = "fine", const std::strin
 class CamacLab : public Lab {
  public:
   explicit CamacLab(const std::string& toml = lab_with(), sim::EdgeSink* sink = nullptr,
-                    int station = kStation, std::uint16_t without = 0)
-      : Lab(toml, "", sink, without), station_(station) {
+                    int station = kStation, std::uint32_t disabled_capabilities = 0)
+      : Lab(toml, "", sink, disabled_capabilities), station_(station) {
     connect();
   }
   Answer block(camac::Block block, int crate = 1) {

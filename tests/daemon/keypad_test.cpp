@@ -10,14 +10,10 @@
 #include <vector>
 
 #include "daemon/lab.h"
+#include "keypad_bytes.h"
 
 namespace bushd::test {
 namespace {
-
-constexpr std::uint8_t kForward = 0x00;
-constexpr std::uint8_t kReverse = 0xFF;
-constexpr std::uint8_t kSlower = 0xFE;
-constexpr std::uint8_t kStop = 0xFD;
 
 class KeypadLab : public Lab {
  public:
@@ -89,14 +85,14 @@ bool is_speed(double speed, double asked) {
 
 TEST(Keypads, LatchedKeyCountsUntilTheNextOne) {
   KeypadLab lab("mode = \"latch\"\n");
-  EXPECT_EQ(lab.press(kForward), "0300\n");
+  EXPECT_EQ(lab.press(kKeyForward), "0300\n");
   lab.live(1);
   // 3 ms a step.
   EXPECT_PRED2(is_speed, lab.speed(), 333.3);
-  EXPECT_EQ(lab.press(kReverse), "0300\n");
+  EXPECT_EQ(lab.press(kKeyReverse), "0300\n");
   lab.live(2);
   EXPECT_PRED2(is_speed, lab.speed(), -333.3);
-  lab.press(kStop);
+  lab.press(kKeyStop);
   lab.live(1);
   EXPECT_TRUE(lab.rests());
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
@@ -105,27 +101,27 @@ TEST(Keypads, LatchedKeyCountsUntilTheNextOne) {
 
 TEST(Keypads, SlowerIsShownAndTurnsRoundAtTheSlowest) {
   KeypadLab lab("mode = \"latch\"\n");
-  EXPECT_EQ(lab.press(kSlower), "0330\n");
+  EXPECT_EQ(lab.press(kKeySlower), "0330\n");
   EXPECT_EQ(lab.asked, 0);  // nothing jogs
-  lab.press(kForward);
+  lab.press(kKeyForward);
   lab.live(1);
   EXPECT_PRED2(is_speed, lab.speed(), 303);
   // 300 + 30 n of the source; its 3000 is still one, then it is the first again.
   for (int delay = 360; delay <= 3000; delay += 30) {
     std::string expected = std::to_string(delay) + "\n";
     if (expected.size() < 5) expected.insert(0, "0");
-    EXPECT_EQ(lab.press(kSlower), expected);
+    EXPECT_EQ(lab.press(kKeySlower), expected);
   }
   lab.live(1);
   EXPECT_PRED2(is_speed, lab.speed(), 33.3);
-  EXPECT_EQ(lab.press(kSlower), "0300\n");
+  EXPECT_EQ(lab.press(kKeySlower), "0300\n");
   lab.live(1);
   EXPECT_PRED2(is_speed, lab.speed(), 333.3);
 }
 
 TEST(Keypads, HeldKeyMovesAsLongAsItIsRepeated) {
   KeypadLab lab("");
-  lab.hold(kForward, 2);
+  lab.hold(kKeyForward, 2);
   EXPECT_FALSE(lab.rests());
   const std::int64_t at = lab.shaft_steps("m01");
   EXPECT_GT(at, 500);
@@ -133,16 +129,16 @@ TEST(Keypads, HeldKeyMovesAsLongAsItIsRepeated) {
   lab.live(1);
   EXPECT_TRUE(lab.rests());
   EXPECT_LE(lab.shaft_steps("m01") - at, 333 / 2 + 30);
-  lab.hold(kReverse, 1);
+  lab.hold(kKeyReverse, 1);
   EXPECT_LT(lab.shaft_steps("m01"), at + 100);
-  lab.press(kStop);
+  lab.press(kKeyStop);
   lab.live(0.3);
   EXPECT_TRUE(lab.rests());
 }
 
 TEST(Keypads, PortThatIsLostStopsWhatIsLatched) {
   KeypadLab lab("mode = \"latch\"\n");
-  lab.press(kForward);
+  lab.press(kKeyForward);
   lab.live(1);
   const std::int64_t at = lab.shaft_steps("m01");
   lab.keypad.port_lost();
@@ -153,22 +149,22 @@ TEST(Keypads, PortThatIsLostStopsWhatIsLatched) {
   EXPECT_EQ(lab.keypad.take_display(), "0300\n");
   lab.live(1);
   EXPECT_TRUE(lab.rests());
-  EXPECT_EQ(lab.press(kForward), "0300\n");
+  EXPECT_EQ(lab.press(kKeyForward), "0300\n");
   lab.live(1);
   EXPECT_FALSE(lab.rests());
 }
 
 TEST(Keypads, LimitsAndOtherClientsEndItsJog) {
   KeypadLab lab("mode = \"latch\"\n", "soft_limits = [-100, 400]\n");
-  lab.press(kForward);
+  lab.press(kKeyForward);
   lab.live(3);
   EXPECT_TRUE(lab.rests());
   EXPECT_EQ(lab.shaft_steps("m01"), 400);
   const int asked = lab.asked;
   lab.live(2);
   EXPECT_EQ(lab.asked, asked);  // it is not renewed any more
-  EXPECT_EQ(lab.press(kForward), "----\n");
-  EXPECT_EQ(lab.press(kReverse), "0300\n");
+  EXPECT_EQ(lab.press(kKeyForward), "----\n");
+  EXPECT_EQ(lab.press(kKeyReverse), "0300\n");
   lab.live(0.3);
   lab.wait(lab.send(Ask::kStop, {"m01"}));
   lab.live(2);

@@ -95,7 +95,7 @@ class Lab::Client final : public api::Session {
 };
 
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink,
-         std::uint32_t without)
+         std::uint32_t disabled_capabilities)
     : client_(std::make_shared<Client>()) {
   directory_ = std::filesystem::temp_directory_path() / ("bushd-lab-" + std::to_string(::getpid()));
   std::filesystem::create_directories(directory_);
@@ -122,8 +122,7 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
       sim::McuOptions options{.address = config_.mcus[m].address.value,
                               .boot_number = static_cast<std::uint16_t>(100 * b + m + 1),
                               .boot_ns = static_cast<std::int64_t>(m) * 777'777};
-      options.disabled_capabilities = static_cast<std::uint16_t>(without);
-      options.scratch = (without & BUSHD_CAN_SCRATCH) == 0;
+      options.disabled_capabilities = disabled_capabilities;
       if (config_.mcus[m].emission.measures()) options.supply = sim::SupplyRules{};
       buses_[b].bus->add_mcu(options);
     }

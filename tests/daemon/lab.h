@@ -75,10 +75,10 @@ struct Answer {
 class Lab : public daemon::Outputs, private state::Backend {
  public:
   // `toml` as in bushd.toml; its ports are only names here. Every MCU of it exists.
-  // `glacier` is the text of a table file of that name beside it, if not empty. No MCU has the
-  // capabilities `without`, BUSHD_CAN_*.
+  // `glacier` is the text of a table file of that name beside it, if not empty.
+  // `disabled_capabilities`: BUSHD_CAN_*, of all MCUs.
   explicit Lab(const std::string& toml, const std::string& glacier = {},
-               sim::EdgeSink* sink = nullptr, std::uint32_t without = 0);
+               sim::EdgeSink* sink = nullptr, std::uint32_t disabled_capabilities = 0);
   ~Lab() override;
 
   // Runs until `done` holds (checked after every event) or `limit_s` has passed; returns whether it

@@ -18,17 +18,17 @@ TEST(LinesByMcus, OneFrameTellsAnMcuAllOfIt) {
   struct Case {
     const char* manner;
     std::int64_t steps;
-    std::uint32_t without;
+    std::uint32_t disabled_capabilities;
     int most;
   };
-  for (const auto& [manner, steps, without, most] :
+  for (const auto& [manner, steps, disabled_capabilities, most] :
        std::vector<Case>{{"fine", 2000, 0, 2},
                          {"coarse", -1, 0, 2},
                          {"fine", 1999, 0, 2},
                          {"fine", 1999, BUSHD_CAN_SCRATCH, 1000},
                          {"fine_ticks", 2000, 0, 1000}}) {
     SCOPED_TRACE(std::string(manner) + " " + std::to_string(steps));
-    Lab lab(hall(2, 2, manner), {}, nullptr, without);
+    Lab lab(hall(2, 2, manner), {}, nullptr, disabled_capabilities);
     lab.connect();
     auto line = line_to({"m01", "m02", "m03"}, {2000, -2000, steps});
     line.dry_run = true;
@@ -118,19 +118,19 @@ TEST(LinesByMcus, AreStreamedIfTooFastForThem) {
   const std::string table =
       "name = \"glacier\"\ntime_unit_ns = 1000\naccel = [2000, 1000, 700, 500, 400, 300, 250]\n";
   struct Case {
-    std::uint16_t without;
+    std::uint32_t disabled_capabilities;
     double speed;
     std::size_t motors;  // of four, on two MCUs
     bool streamed;
   };
-  for (const auto& [without, speed, motors, streamed] :
+  for (const auto& [disabled_capabilities, speed, motors, streamed] :
        std::vector<Case>{{0, 3750, 4, false},
                          {BUSHD_CAN_TABLE_TICKS, 3700, 4, false},
                          {BUSHD_CAN_TABLE_TICKS, 3750, 4, true},
                          {BUSHD_CAN_TABLE_TICKS, 2500, 3, false},
                          {BUSHD_CAN_TABLE_TICKS, 2520, 3, true}}) {
-    SCOPED_TRACE(std::to_string(without) + " " + std::to_string(speed));
-    Lab lab(hall(2, 2, "fine", "glacier"), table, nullptr, without);
+    SCOPED_TRACE(std::to_string(disabled_capabilities) + " " + std::to_string(speed));
+    Lab lab(hall(2, 2, "fine", "glacier"), table, nullptr, disabled_capabilities);
     lab.connect();
     const std::vector<std::int64_t> steps{3000, -3000, 3000, 3000};
     auto line = line_to({kMotors.begin(), kMotors.begin() + static_cast<std::ptrdiff_t>(motors)},

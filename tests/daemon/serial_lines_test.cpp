@@ -3,48 +3,25 @@
 // the daemon says it had.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
-#include "daemon/lab.h"
+#include "daemon/pulse_ports.h"
 
 namespace bushd::test {
 namespace {
 
-// 100 Hz to 2500 Hz in 60 codes of 40 us, both sides the same.
-constexpr std::int64_t kLineUnitNs = 40'000;
-constexpr std::int64_t kLineCruise = 10;
-constexpr double kFastest = 2500;
-std::vector<std::int64_t> line_codes() {
-  std::vector<std::int64_t> all;
-  for (int i = 0; i < 60; ++i) all.push_back(std::llround(25'000.0 / (100 + 40.0 * i)));
-  return all;
-}
-
-std::string line_table() {
-  std::string text = "name = \"glacier\"\ntime_unit_ns = 40000\naccel = [";
-  for (const std::int64_t code : line_codes()) text += std::to_string(code) + ", ";
-  return text + std::to_string(kLineCruise) + "]\n";
-}
-
 std::string ports(int count, const std::string& more_of_motor = {},
                   const std::string& more_of_bus = {}) {
-  std::string toml = "[[group]]\nname = \"axes\"\ntable = \"glacier\"\n";
+  std::string toml = pulse_group();
   for (int i = 0; i < count; ++i) {
     const std::string name(1, static_cast<char>('a' + i));
-    toml += "[[bus]]\nname = \"com" + name + "\"\nkind = \"serial-pulse\"\nport = \"/dev/ttyS" +
-            std::to_string(i) +
-            "\"\ndirection_line = \"dtr\"\n"
-            "inputs = { home = \"cd\", positive = \"dsr\", negative = \"cts\" }\n" +
-            (i == 0 ? "" : more_of_bus) + "[[motor]]\nname = \"" + name + "\"\nmcu = \"com" + name +
-            "\"\ngroup = \"axes\"\nhome = { direction = \"negative\", most_steps = 5000 }\n" +
-            more_of_motor;
+    toml += pulse_port("com" + name, i, name, more_of_motor, i == 0 ? "" : more_of_bus);
   }
   return toml;
 }
 
-struct Table : Lab {
+struct Table : PulseLab {
   explicit Table(int count = 2, const std::string& toml = {})
-      : Lab(toml.empty() ? ports(count) : toml, line_table()) {}
+      : PulseLab(toml.empty() ? ports(count) : toml) {}
 
   std::int64_t line(const std::vector<std::string>& motors,
                     const std::vector<std::int64_t>& steps) {
@@ -58,35 +35,15 @@ struct Table : Lab {
     EXPECT_NE(at, std::string::npos) << answer.reason;
     return at == std::string::npos ? 0 : std::stod(answer.reason.substr(at + before.size()));
   }
-  std::vector<std::int64_t> times(std::size_t drive_index, std::size_t from = 0) {
-    const auto& all = drive(drive_index).step_times_ns();
-    return {all.begin() + static_cast<std::ptrdiff_t>(from), all.end()};
-  }
 
-  // Of a motor's run from rest to rest: the interval before its step j is at least A(j-1), D(N-j)
-  // and the cruise delay. Times are whole ns, so an interval is exact to one.
-  void expect_table(const std::vector<std::int64_t>& made) const {
-    const auto all = line_codes();
-    const auto side = [&](std::size_t i) {
-      return (i < all.size() ? all[i] : kLineCruise) * kLineUnitNs;
-    };
-    for (std::size_t j = 2; j <= made.size(); ++j) {
-      const std::int64_t least =
-          std::max({side(j - 1), side(made.size() - j), kLineCruise * kLineUnitNs});
-      ASSERT_GE(made[j - 1] - made[j - 2] + 1, least)
-          << "before step " << j << " of " << made.size();
-    }
-  }
-
-  // Where the longest motor makes its step s, another one makes its step j at s(j) = (j - 1/2) L /
-  // N
-  // + 1/2. When that is made, the longest has made s(j) steps, up to a whole one that it is in, and
-  // what it makes in `skew_ms`. 0.05 ms: the figure is rounded. 2 ms: the pace is told what has
-  // left once in that time.
+  // Where the longest motor makes its step s, another one makes its step j at
+  // s(j) = (j - 1/2) L / N + 1/2. When that is made, the longest has made s(j) steps, up to a whole
+  // one that it is in, and what it makes in `skew_ms`. 0.05 ms: the figure is rounded. 2 ms: the
+  // pace is told what has left once in that time.
   void expect_line(const std::vector<std::int64_t>& longest, std::int64_t of,
                    const std::vector<std::int64_t>& other, std::int64_t other_of,
                    double skew_ms) const {
-    const double most = 1 + (skew_ms + 0.05 + 2) * 1e-3 * kFastest;
+    const double most = 1 + (skew_ms + 0.05 + 2) * 1e-3 * kPulseFastestHz;
     double worst = 0;
     for (std::size_t j = 1; j <= other.size(); ++j) {
       const double s =
@@ -163,9 +120,7 @@ TEST(SerialLines, ThreePortsOfDriversThatCanLess) {
   for (const bool any : {true, false}) {
     for (const bool empty : {true, false}) {
       Whole lab(3);
-      lab.pulse_driver.any_rate = any;
-      lab.pulse_driver.empty.reset();
-      if (empty) lab.pulse_driver.empty = true;
+      lab.set_driver(any, empty);
       lab.connect();
       const std::vector<std::int64_t> steps = {-211, 800, 533};
       const Answer answer = lab.wait(lab.line({"a", "b", "c"}, steps));
@@ -428,10 +383,7 @@ TEST(SerialLines, CountsEveryStepOfADayOfOrders) {
     EXPECT_EQ(lab.motor(name).trust, api::Trust::kKnown) << lab.motor(name).uncertain_reason;
     EXPECT_EQ(lab.motor(name).activity, api::Activity::kResting) << name;
     EXPECT_EQ(lab.drive(i).faults(), 0u) << name;
-    const auto times = lab.times(i);
-    for (std::size_t j = 1; j < times.size(); ++j) {
-      ASSERT_GE(times[j] - times[j - 1] + 1, kLineCruise * kLineUnitNs) << name << ", step " << j;
-    }
+    ASSERT_NO_FATAL_FAILURE(lab.expect_no_faster(i));
   }
 }
 

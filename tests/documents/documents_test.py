@@ -64,6 +64,15 @@ class Documents(unittest.TestCase):
                 stands_for_another = "CHIP" in path or "NAME" in path
                 self.assertTrue(stands_for_another or (SOURCE / path).exists(), "mend CONTRIBUTING.md")
 
+    def test_protocol_lists_every_capability(self):
+        header = (SOURCE / "lib/engine/message_setup.h").read_text()
+        bits = {1 << int(shift) for shift in re.findall(r"\bBUSHD_CAN_\w+ = 1 << (\d+),", header)}
+        bits |= {int(value, 16) for value in re.findall(r"#define BUSHD_CAN_\w+ UINT32_C\((0x[0-9a-fA-F]+)\)", header)}
+        self.assertEqual(len(bits), len(set(re.findall(r"\bBUSHD_CAN_[A-Z]\w*\b(?= =| UINT32_C)", header))))
+        table = re.search(r"^\| capability \| \|\n(.*?)\n\n", (DOCS / "protocol.md").read_text(), re.DOTALL | re.MULTILINE)
+        listed = [int(bit) for bit in re.findall(r"^\| (\d+) \|", table[1], re.MULTILINE)]
+        self.assertEqual(listed, sorted(bits), "mend the table of capabilities in docs/protocol.md")
+
     def test_map_of_the_code_names_functions_that_are_there(self):
         rows = re.findall(
             r"^\|[^|]*\| `([\w:]+)` \| \[[^\]]*\]\(([^)]*)\)", (DOCS / "design.md").read_text(), re.MULTILINE

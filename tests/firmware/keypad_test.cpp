@@ -1,14 +1,11 @@
 // LOCAL by a keypad: bytes that begin, slow down and end motion, and what goes back for the
 // display.
 #include "firmware/streams.h"
+#include "keypad_bytes.h"
 
 namespace bushd::test {
 namespace {
 
-constexpr std::uint8_t kForward = 0x00;
-constexpr std::uint8_t kReverse = 0xFF;
-constexpr std::uint8_t kSlower = 0xFE;
-constexpr std::uint8_t kStop = 0xFD;
 constexpr std::uint16_t kMotors = 0b0110;
 
 // Steps of a table run whose delays are `floor` at least, from rest.
@@ -43,7 +40,7 @@ class Keypad : public Streams {
     EXPECT_EQ(rig.pulses(0), 0) << "not one of these";
   }
   void expect_counted_after_stop() {
-    press(kStop, 1);
+    press(kKeyStop, 1);
     expect_rest_as_counted();
   }
 };
@@ -51,14 +48,14 @@ INSTANTIATE_TEST_SUITE_P(Formats, Keypad, testing::Values(BUSHD_FORMAT_FINE, BUS
                          format_name);
 
 TEST_P(Keypad, ADirectionCountsUntilTheNextKeyWithTheFirstSpeed) {
-  for (const auto& [key, direction] : {std::pair{kForward, 1}, std::pair{kReverse, -1}}) {
+  for (const auto& [key, direction] : {std::pair{kKeyForward, 1}, std::pair{kKeyReverse, -1}}) {
     rig.forget_history();
     press(key, 200);
     EXPECT_EQ(rig.poll().autonomous, kMotors);
     EXPECT_EQ(rig.poll().running, 0) << "not for a master to end";
     EXPECT_EQ(rig.keypad_display(), "0300\n");
     expect_steps(3'000'000, direction, 190);
-    press(kStop, 1);
+    press(kKeyStop, 1);
     expect_rest_as_counted();
     EXPECT_EQ(rig.keypad_display(), "0300\n");
   }
@@ -66,32 +63,32 @@ TEST_P(Keypad, ADirectionCountsUntilTheNextKeyWithTheFirstSpeed) {
 
 TEST_P(Keypad, SlowerAddsTheSameUntilItBeginsAgain) {
   for (int times = 1; times <= 90; ++times) {
-    press(kSlower, 1);
+    press(kKeySlower, 1);
     char expected[6];
     std::snprintf(expected, sizeof expected, "%04d\n", 300 + 30 * times);
     EXPECT_EQ(rig.keypad_display(), expected);
   }
   rig.forget_history();
-  press(kForward, 300);
+  press(kKeyForward, 300);
   expect_steps(30'000'000, 1, 190);
-  press(kStop, 30);
-  press(kSlower, 1);
+  press(kKeyStop, 30);
+  press(kKeySlower, 1);
   EXPECT_EQ(rig.keypad_display(), "0300\n");
   expect_rest_as_counted();
 }
 
 TEST_P(Keypad, SlowerInMotionIsARampDownAndANewBeginning) {
-  press(kForward, 50);
+  press(kKeyForward, 50);
   rig.keypad_display();
   rig.forget_history();
-  press(kSlower, 200);
+  press(kKeySlower, 200);
   EXPECT_EQ(rig.keypad_display(), "0330\n");
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   // Pulses of a constant speed: 3.3 ms each.
   int steps = 0;
   for (std::size_t i = 100; i < 199; ++i) steps += rig.history(1)[i];
   EXPECT_NEAR(steps, 99 * 2.56 / 3.3, 1.0);
-  press(kStop, 1);
+  press(kKeyStop, 1);
   expect_rest_as_counted();
 }
 
@@ -104,25 +101,25 @@ TEST_P(Keypad, AMotorWithVelocityTakesTheSpeedUpInMotion) {
     rig.pass(60);
     return static_cast<double>(rig.pulses(1) - before);
   };
-  press(kForward, 100);
+  press(kKeyForward, 100);
   EXPECT_NEAR(steps_in_60_ticks(), 60 * 2.56 / 3.0, 1.0);
-  press(kSlower, 1);
+  press(kKeySlower, 1);
   for (int i = 0; i < 20; ++i) {
     EXPECT_NE(rig.poll().autonomous, 0) << "it need not come to rest";
     rig.pass(1);
   }
   rig.pass(20);
   EXPECT_NEAR(steps_in_60_ticks(), 60 * 2.56 / 3.3, 1.0);
-  press(kReverse, 200);
+  press(kKeyReverse, 200);
   EXPECT_NEAR(steps_in_60_ticks(), -60 * 2.56 / 3.3, 1.0);
   expect_counted_after_stop();
 }
 
 TEST_P(Keypad, AKeyThatIsNotRepeatedCountsForAWhileWhereThatIsSet) {
   ASSERT_EQ(rig.local(0, kMotors, 20), BUSHD_OK);
-  press(kForward, 19);
+  press(kKeyForward, 19);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
-  press(kForward, 19);
+  press(kKeyForward, 19);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   rig.pass_until_rest(60);
   EXPECT_EQ(rig.poll().autonomous, 0);
@@ -131,15 +128,15 @@ TEST_P(Keypad, AKeyThatIsNotRepeatedCountsForAWhileWhereThatIsSet) {
 }
 
 TEST_P(Keypad, ABrokenLineEndsMotionUntilAKeyIsPressed) {
-  press(kForward, 60);
+  press(kKeyForward, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   rig.keypad_break();
   rig.pass_until_rest(100);
   rig.pass(100);
   EXPECT_EQ(rig.poll().autonomous, 0);
-  press(kForward, 60);
+  press(kKeyForward, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
-  press(kStop, 1);
+  press(kKeyStop, 1);
   expect_rest_as_counted();
 }
 
@@ -151,25 +148,25 @@ TEST_P(Keypad, OtherBytesMeanNothing) {
 }
 
 TEST_P(Keypad, AFaultForgetsTheKey) {
-  press(kForward, 60);
+  press(kKeyForward, 60);
   rig.keypad_display();
   rig.emergency(BUSHD_STOP_RAMP);
   rig.pass(100);
   EXPECT_EQ(rig.poll().autonomous, 0);
   EXPECT_EQ(rig.keypad_display(), "----\n");
-  press(kForward, 10);
+  press(kKeyForward, 10);
   EXPECT_EQ(rig.keypad_display(), "----\n");
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
   rig.pass(60);
   EXPECT_EQ(rig.poll().autonomous, 0) << "it has to be pressed again";
-  press(kForward, 60);
+  press(kKeyForward, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   expect_counted_after_stop();
 }
 
 TEST_P(Keypad, NothingMovesWhileAHostHasDisabledTheDrivers) {
   ASSERT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_OK);
-  press(kForward, 60);
+  press(kKeyForward, 60);
   EXPECT_EQ(rig.keypad_display(), "----\n");
   ASSERT_EQ(rig.control(BUSHD_CONTROL_ENABLE), BUSHD_OK);
   rig.pass(60);
@@ -178,7 +175,7 @@ TEST_P(Keypad, NothingMovesWhileAHostHasDisabledTheDrivers) {
 
 TEST_P(Keypad, ALimitForgetsTheKeyWhenItInhibitsAllMotors) {
   ASSERT_EQ(rig.set_inputs({.limit_positive = kMotors}), BUSHD_OK);
-  press(kForward, 60);
+  press(kKeyForward, 60);
   rig.keypad_display();
   rig.pins({1 << 1, 0});
   rig.pass(60);
@@ -190,14 +187,14 @@ TEST_P(Keypad, ALimitForgetsTheKeyWhenItInhibitsAllMotors) {
   rig.pins({0, 0});
   rig.pass(60);
   EXPECT_EQ(rig.poll().autonomous, 0) << "it has to be pressed again";
-  press(kReverse, 60);
+  press(kKeyReverse, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   expect_counted_after_stop();
 }
 
 TEST_P(Keypad, PeopleAtTheInputsComeFirst) {
   ASSERT_EQ(rig.local(0b0001, kMotors), BUSHD_OK);
-  press(kForward, 60);
+  press(kKeyForward, 60);
   rig.keypad_display();
   rig.pins({0, BUSHD_INPUT_FORWARD});
   rig.pass(60);
@@ -214,11 +211,11 @@ TEST_P(Keypad, AHostsMotorIsNotItsUntilThatRests) {
   const Plan plan = plan_move(law, 400, Rig::kTickNs, format);
   const std::uint32_t start = rig.first_open();
   ASSERT_EQ(rig.take(rig.part(plan, start, 0, 20, 1)), BUSHD_OK);
-  press(kForward, 8);
+  press(kKeyForward, 8);
   EXPECT_EQ(rig.poll().autonomous, 1 << 2);
-  press(kStop, 1);
+  press(kKeyStop, 1);
   rig.pass_until_rest();
-  press(kForward, 60);
+  press(kKeyForward, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 20, 1)), BUSHD_E_STATE);
   expect_counted_after_stop();
@@ -226,14 +223,14 @@ TEST_P(Keypad, AHostsMotorIsNotItsUntilThatRests) {
 
 TEST_P(Keypad, SettingsAreRefusedThatDoNotFit) {
   EXPECT_EQ(rig.local(0, 0b1'0000), BUSHD_E_FORMAT);
-  press(kForward, 60);
+  press(kKeyForward, 60);
   EXPECT_EQ(rig.local(0, 0), BUSHD_E_STATE);
   EXPECT_EQ(rig.local(1, kMotors), BUSHD_E_STATE) << "its stuck inputs could not be told";
   EXPECT_EQ(rig.local(0, kMotors), BUSHD_OK) << "a host that connects says the same";
   rig.pass(10);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   expect_counted_after_stop();
-  Rig without({.keypad = false});
+  Rig without({.disabled_capabilities = BUSHD_CAN_KEYPAD});
   EXPECT_EQ(without.local(0, 1), BUSHD_E_FORMAT);
   EXPECT_EQ(without.identify().capabilities & BUSHD_CAN_KEYPAD, 0u);
 }
@@ -243,7 +240,7 @@ TEST_P(Keypad, TheSettingsOutliveAReset) {
   rig.restart_with_nvm();
   rig.pass(3);
   rig.forget_history();
-  press(kForward, 150);
+  press(kKeyForward, 150);
   EXPECT_TRUE(rig.enabled()) << "no host has set it up";
   expect_steps(3'000'000, 1, 100);
 }

@@ -113,7 +113,7 @@ TEST_P(LineRun, OfASlowMcuIsSlow) {
   fast.unit_ns = 1'000;
   fast.accel = fast.decel = {900, 500};
   fast.cruise = 269;
-  for (const std::uint16_t disabled : {std::uint16_t{0}, std::uint16_t{BUSHD_CAN_TABLE_TICKS}}) {
+  for (const std::uint32_t disabled : std::array<std::uint32_t, 2>{0, BUSHD_CAN_TABLE_TICKS}) {
     const bool slow = disabled != 0;
     Rig other({.queue_ticks = 256, .disabled_capabilities = disabled});
     other.make_ready(fast, format);

@@ -184,7 +184,7 @@ TEST_P(LineTrigger, IsRampedDownAlongTheLineInSilence) {
 
 TEST_P(LineTrigger, IsUnknownWithoutLinesOrAnInput) {
   Rig without_lines({.disabled_capabilities = BUSHD_CAN_LINE_RUN});
-  Rig without_input({.trigger_input = false});
+  Rig without_input({.disabled_capabilities = BUSHD_CAN_TRIGGER});
   for (Rig* other : {&without_lines, &without_input}) {
     other->make_ready(law, format);
     EXPECT_EQ(arm(*other, {.line = line()}), BUSHD_E_UNKNOWN_MESSAGE);

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "sim/disabled_capabilities.h"
+
 namespace bushd::test {
 namespace {
 
@@ -106,23 +108,24 @@ Rig::Rig(RigOptions options)
   port.read_current = [](void* context) { return static_cast<Rig*>(context)->current_; };
   port.self_test = [](void* context) { return static_cast<Rig*>(context)->options_.failing_tests; };
   port.keep_enable = [](void* context, bool on) { static_cast<Rig*>(context)->enable_kept_ = on; };
-  if (options.trigger_input) {
-    port.set_trigger = [](void* context, bushd_edge edge) {
-      static_cast<Rig*>(context)->awaited_edge_ = edge;
-    };
-  }
-  if (options.current_motors > 0) {
-    port.set_current = [](void* context, std::uint8_t motor, std::uint16_t ma, bool fast_decay) {
-      static_cast<Rig*>(context)->windings_.push_back({motor, ma, fast_decay});
-    };
-  }
   bushd_mcu_config config{};
   config.currents = currents_.data();
   config.current_motors = options.current_motors;
   config.velocity = velocity_.data();
   config.velocity_motors = options.velocity_motors;
-  config.keypad = options.keypad;
-  config.scratch = options.scratch ? &scratch_ : nullptr;
+  config.keypad = true;
+  config.scratch = &scratch_;
+  sim::disable_capabilities(options.disabled_capabilities, &config);
+  if ((options.disabled_capabilities & BUSHD_CAN_TRIGGER) == 0) {
+    port.set_trigger = [](void* context, bushd_edge edge) {
+      static_cast<Rig*>(context)->awaited_edge_ = edge;
+    };
+  }
+  if (config.current_motors > 0) {
+    port.set_current = [](void* context, std::uint8_t motor, std::uint16_t ma, bool fast_decay) {
+      static_cast<Rig*>(context)->windings_.push_back({motor, ma, fast_decay});
+    };
+  }
   config.address = options.address;
   config.motors = options.motors;
   config.slots = options.slots;
@@ -136,7 +139,6 @@ Rig::Rig(RigOptions options)
   config.code_count = options.code_count;
   config.reply = reply_.data();
   config.min_tick_ns = options.min_tick_ns;
-  config.disabled_capabilities = options.disabled_capabilities;
   config.pulse_ns = options.pulse_ns;
   std::ranges::copy(unique_id(), config.unique_id);
   bushd_mcu_boot(&mcu_, &port, &config);

@@ -30,15 +30,12 @@ struct RigOptions {
   std::uint8_t failing_tests = 0;
   bushd_reset_cause reset_cause = BUSHD_RESET_POWER_ON;
   bool enable_at_boot = false;
-  bool in_pieces = false;  // answers wait for work()
-  std::uint16_t disabled_capabilities = 0;
+  bool in_pieces = false;                   // answers wait for work()
+  std::uint32_t disabled_capabilities = 0;  // BUSHD_CAN_*: it has all others
   std::int32_t pulse_ns = 0;
   bool stores_address = true;
-  bool trigger_input = true;
-  std::uint8_t current_motors = 1;  // whose windings' currents the port controls
+  std::uint8_t current_motors = 1;  // whose windings' currents the port controls; >= 1
   std::uint8_t velocity_motors = 2;
-  bool keypad = true;
-  bool scratch = true;  // has BUSHD_SCRATCH_SLOT
 };
 
 struct Answer {

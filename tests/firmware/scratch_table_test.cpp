@@ -156,7 +156,7 @@ TEST_P(ScratchTable, IsNoPartOfWhatAPortKeeps) {
 }
 
 TEST_P(ScratchTable, IsNoSlotOfAnMcuWithoutIt) {
-  Rig none({.scratch = false});
+  Rig none({.disabled_capabilities = BUSHD_CAN_SCRATCH});
   none.make_ready(law, format);
   EXPECT_EQ(none.identify().capabilities & BUSHD_CAN_SCRATCH, 0u);
   EXPECT_EQ(none.begin(kScratch, law), BUSHD_E_FORMAT);

@@ -320,7 +320,7 @@ TEST_P(Trigger, ItsRunIsReplacedByTicks) {
 }
 
 TEST(TriggerInput, IsNotForAPortWithoutOne) {
-  Rig rig({.trigger_input = false});
+  Rig rig({.disabled_capabilities = BUSHD_CAN_TRIGGER});
   rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_TRIGGER, 0);
   EXPECT_EQ(rig.arm(1, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 5, 0}}), BUSHD_E_UNKNOWN_MESSAGE);

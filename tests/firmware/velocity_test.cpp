@@ -277,7 +277,7 @@ TEST_P(Velocity, WhatItCannotIsRefused) {
   EXPECT_EQ(rig.velocity({2, 40, 100, 1}), BUSHD_E_FORMAT) << "it has the loop for two motors";
   EXPECT_EQ(rig.velocity({2, 0, 0, 0}), BUSHD_OK);
   EXPECT_EQ(rig.velocity({4, 0, 0, 0}), BUSHD_E_FORMAT) << "it has four";
-  Rig none({.velocity_motors = 0});
+  Rig none({.disabled_capabilities = BUSHD_CAN_VELOCITY});
   EXPECT_EQ(none.velocity({0, 0, 0, 0}), BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(none.identify().capabilities & BUSHD_CAN_VELOCITY, 0u);
   Rig fresh;

@@ -1,5 +1,7 @@
 #include "fuzz/core_rig.h"
 
+#include "sim/disabled_capabilities.h"
+
 namespace bushd::fuzz {
 namespace {
 
@@ -64,7 +66,7 @@ void CoreRig::boot() {
                              .queue_ticks = configuration_.queue_ticks,
                              .min_tick_ns = configuration_.min_tick_ns,
                              .pulse_ns = configuration_.pulse_ns,
-                             .disabled_capabilities = configuration_.disabled_capabilities,
+                             .disabled_capabilities = 0,  // below
                              .currents = currents_.data(),
                              .current_motors = static_cast<std::uint8_t>(currents_.size()),
                              .velocity = velocity_.data(),
@@ -74,6 +76,7 @@ void CoreRig::boot() {
                              .code_count = configuration_.codes,
                              .reply = reply(),
                              .unique_id = {}};
+  sim::disable_capabilities(configuration_.disabled_capabilities, &config);
   std::copy(kUniqueId.begin(), kUniqueId.end(), config.unique_id);
   bushd_mcu_boot(&mcu_, &port, &config);
 }

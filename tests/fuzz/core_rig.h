@@ -21,7 +21,7 @@ struct CoreConfiguration {
   std::uint16_t codes;
   std::uint32_t min_tick_ns = BUSHD_MIN_TICK_NS;
   std::int32_t pulse_ns = 0;
-  std::uint16_t disabled_capabilities = 0;
+  std::uint32_t disabled_capabilities = 0;  // BUSHD_CAN_*
   bool in_pieces = false;
 };
 

@@ -16,11 +16,9 @@ A step lies in a slot of 20 us, whose interrupt may be late by 5 us: so interval
 """
 
 import itertools
-import os
-import pathlib
-import subprocess
 import sys
-import tempfile
+
+import traces
 
 SLOT_NS = 25_000
 LOOK_NS = 100_000
@@ -29,21 +27,16 @@ FORWARD, REVERSE, SLOWER, STOP = 0x00, 0xFF, 0xFE, 0xFD
 KEPT_TICKS = 100  # of a key in the test that sets it
 
 
-def read(path):
-    runs, run = [], None
-    for line in path.read_text().splitlines():
-        word, *numbers = line.split()
-        numbers = [int(n) for n in numbers]
-        if word == "tick":
-            run = {"tick": numbers[0], "events": [], "steps": []}
+def run_of(trace):
+    run = {"events": [], "steps": []}
+    for word, numbers in trace:
+        if word in ("tick", "end"):
+            run[word] = numbers[0]
         elif word == "step":
             run["steps"].append(tuple(numbers))
-        elif word == "end":
-            run["end"] = numbers[0]
-            runs.append(run)
         else:
             run["events"].append((numbers[0], word, numbers[1] if len(numbers) > 1 else None))
-    return runs
+    return run
 
 
 def delay_ns(times):
@@ -75,8 +68,8 @@ def parts(run):
 
 def judge(run):
     tick = run["tick"]
-    stretches, checked = parts(run), 0
-    for (_, was, old_ns), (begin, direction, new_ns), (end, *_) in zip(stretches, stretches[1:], stretches[2:]):
+    segments, checked = parts(run), 0
+    for (_, was, old_ns), (begin, direction, new_ns), (end, *_) in zip(segments, segments[1:], segments[2:]):
         went_on_ns = begin + 2 * tick + old_ns + FIRST_NS + LOOK_NS if was else begin
         latest_begin_ns = max(begin + 4 * tick, went_on_ns + tick) + LOOK_NS
         steps = [(ns, sign) for ns, sign in run["steps"] if begin <= ns < end]
@@ -106,11 +99,7 @@ def judge(run):
 
 
 def main(program):
-    with tempfile.TemporaryDirectory() as folder:
-        trace = pathlib.Path(folder) / "trace"
-        subprocess.run([program, "--gtest_filter=KeypadPair.*", "--gtest_brief=1"], check=True,
-                       env=os.environ | {"BUSHD_KEYPAD_TRACE": str(trace)})
-        runs = read(trace)
+    runs = [run_of(trace) for trace in traces.recorded_by(program, "KeypadPair.*", "BUSHD_KEYPAD_TRACE")]
     assert len(runs) == 3, f"{len(runs)} traces"
     for run in runs:
         checked = judge(run)

@@ -9,11 +9,9 @@ here in its words: inputs count from the third reading on, a release at once; a 
 
 import collections
 import math
-import os
-import pathlib
-import subprocess
 import sys
-import tempfile
+
+import traces
 
 INTERVAL = 25_000
 FORWARD, REVERSE, LIMIT = 2, 4, 256
@@ -110,26 +108,20 @@ def predicted(run):
     return out
 
 
-def read(path):
-    runs, run = [], None
-    for line in path.read_text().splitlines():
-        word, *numbers = line.split()
-        numbers = [int(n) for n in numbers]
-        if word == "tick":
-            run = {"tick": numbers[0], "motor": {}, "inputs": [], "step": [], "counted": {}}
-        elif word == "slots":
-            run["slots"] = numbers[0]
+def run_of(trace):
+    run = {"motor": {}, "inputs": [], "step": [], "counted": {}}
+    for word, numbers in trace:
+        if word in ("tick", "slots"):
+            run[word] = numbers[0]
         elif word == "motor":
             run["motor"][numbers[0]] = numbers[1:]
         elif word == "counted":
             run["counted"][numbers[0]] = numbers[1]
         elif word == "at":
             run["begin"] = numbers[1] - numbers[0] * run["tick"]
-        elif word == "end":
-            runs.append(run)
-        else:
+        elif word != "end":
             run[word].append(tuple(numbers))
-    return runs
+    return run
 
 
 def judge(run):
@@ -151,11 +143,7 @@ def judge(run):
 
 
 def main(program):
-    with tempfile.TemporaryDirectory() as folder:
-        trace = pathlib.Path(folder) / "trace"
-        subprocess.run([program, "--gtest_filter=VelocityOfTheImage.*", "--gtest_brief=1"], check=True,
-                       env=os.environ | {"BUSHD_VELOCITY_TRACE": str(trace)})
-        runs = read(trace)
+    runs = [run_of(trace) for trace in traces.recorded_by(program, "VelocityOfTheImage.*", "BUSHD_VELOCITY_TRACE")]
     assert len(runs) == 4, f"{len(runs)} traces"
     for run in runs:
         steps, latest = judge(run)

@@ -11,7 +11,6 @@ namespace bushfaults {
 namespace {
 
 using bushd::camac::Bushd2;
-using bushd::sim::TimeNs;
 
 // A result is due after 40 s (witness_jogs.cpp); before that its MCUs come to rest and get a table,
 // with twice as long for those that are away.
@@ -37,8 +36,8 @@ void Crates::daemon_started(TimeNs now_ns, bool kept) {
   steps_told_.reset();
 }
 
-Crates::Wrong Crates::completed(TimeNs now_ns, const Request& request,
-                                const bushd::api::CamacResult& result) {
+Wrong Crates::completed(TimeNs now_ns, const Request& request,
+                        const bushd::api::CamacResult& result) {
   using bushd::camac::BlockMode;
   const bool single = request.block_mode == BlockMode::kSingle;
   const bool scan = request.block_mode == BlockMode::kScan;
@@ -55,8 +54,8 @@ Crates::Wrong Crates::completed(TimeNs now_ns, const Request& request,
   return observe((result.requests >> (kBushd2Station - 1) & 1) != 0);
 }
 
-Crates::Wrong Crates::in_single_mode(TimeNs now_ns, const Request& request,
-                                     const std::vector<Response>& responses) {
+Wrong Crates::in_single_mode(TimeNs now_ns, const Request& request,
+                             const std::vector<Response>& responses) {
   if (responses.size() != request.cycles.size()) {
     return "as many answers as cycles were due: " + text_of(request);
   }
@@ -71,8 +70,8 @@ Crates::Wrong Crates::in_single_mode(TimeNs now_ns, const Request& request,
 }
 
 // Word after word, until there is no Q; in the mode repeat a word is tried a hundred times.
-Crates::Wrong Crates::of_one_address(TimeNs now_ns, const Request& request,
-                                     const std::vector<Response>& responses) {
+Wrong Crates::of_one_address(TimeNs now_ns, const Request& request,
+                             const std::vector<Response>& responses) {
   constexpr int kTries = 100;
   for (std::size_t i = 0; i < responses.size(); ++i) {
     const Response& response = responses[i];
@@ -96,8 +95,8 @@ Crates::Wrong Crates::of_one_address(TimeNs now_ns, const Request& request,
 
 // Of all stations only that of BUSHD-2 answers: with its memory, which has no Q while L is raised,
 // and then with its registers.
-Crates::Wrong Crates::scanned(TimeNs now_ns, const Request& request,
-                              const std::vector<Response>& responses) {
+Wrong Crates::scanned(TimeNs now_ns, const Request& request,
+                      const std::vector<Response>& responses) {
   constexpr std::size_t kRegisters = 4;
   if (responses.empty()) {
     registers_.count_up();
@@ -115,7 +114,7 @@ Crates::Wrong Crates::scanned(TimeNs now_ns, const Request& request,
   return std::nullopt;
 }
 
-Crates::Wrong Crates::cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
+Wrong Crates::cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
   if (naf.station == kBushd2Station) return module_cycle(now_ns, naf, response);
   const bool common = naf.station == 28 && naf.function == 26;
   if (common && naf.subaddress == 8) {
@@ -132,7 +131,7 @@ Crates::Wrong Crates::cycle(TimeNs now_ns, const Naf& naf, const Response& respo
   return std::nullopt;
 }
 
-Crates::Wrong Crates::module_cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
+Wrong Crates::module_cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
   if (ModuleRegisters::is_memory(naf)) {
     if (auto wrong = registers_.memory_cycle(now_ns, naf, response)) return wrong;
     return observe(!response.q);
@@ -147,13 +146,13 @@ Crates::Wrong Crates::module_cycle(TimeNs now_ns, const Naf& naf, const Response
   return std::nullopt;
 }
 
-Crates::Wrong Crates::read_register(const Naf& naf, const Response& response) {
+Wrong Crates::read_register(const Naf& naf, const Response& response) {
   if (!response.x || !response.q) return "a register does not answer";
   if (naf.subaddress == 3) return read_requests(response);
   return registers_.read(naf, response);
 }
 
-Crates::Wrong Crates::read_requests(const Response& response) const {
+Wrong Crates::read_requests(const Response& response) const {
   if (!steps_told_) return std::nullopt;
   const auto received = response.data >> kReceivedShift & kReceivedBits;
   const bool done = (response.data & kStepDone) != 0;
@@ -162,7 +161,7 @@ Crates::Wrong Crates::read_requests(const Response& response) const {
 }
 
 // What only a disabled request could raise is not to be seen.
-Crates::Wrong Crates::observe(bool lam) {
+Wrong Crates::observe(bool lam) {
   if (!is_enabled()) {
     if (lam && (registers_.control() & (kEnables | 0x10)) == 0)
       return "L, and no request is enabled";
@@ -177,7 +176,7 @@ Crates::Wrong Crates::observe(bool lam) {
   return std::nullopt;
 }
 
-Crates::Wrong Crates::raised(TimeNs, const bushd::api::CamacLam& lam) {
+Wrong Crates::raised(TimeNs, const bushd::api::CamacLam& lam) {
   const std::uint32_t station = 1U << (kBushd2Station - 1);
   if (lam.crate != kCrate || (lam.raised & station) == 0) return std::nullopt;
   if (published_) return "a second LAM, and the first one was not cleared";
@@ -270,7 +269,7 @@ void Crates::wait_since(TimeNs now_ns) {
   if (start_) start_->since_ns = now_ns;
 }
 
-Crates::Wrong Crates::check_deadline(TimeNs now_ns) const {
+Wrong Crates::check_deadline(TimeNs now_ns) const {
   if (!any_open() || now_ns - start_->since_ns <= kLamDueNs) return std::nullopt;
   return fmt::format("no LAM {} s after a start", kLamDueNs / kSecond);
 }

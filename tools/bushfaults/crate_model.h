@@ -33,8 +33,6 @@ struct ProgramMotion {
 
 class Crates {
  public:
-  using TimeNs = bushd::sim::TimeNs;
-  using Wrong = std::optional<std::string>;
   // As the daemon names the module.
   static constexpr const char* kBushd2Client = "camac-1-5";
 
@@ -68,8 +66,6 @@ class Crates {
   std::uint64_t ended_all_steps() const { return ended_all_steps_; }
 
  private:
-  using Naf = bushd::camac::Naf;
-  using Response = bushd::camac::Response;
   struct Start {
     TimeNs since_ns = 0;
     // False: it may have had no effect, since the motion before it had perhaps not ended.

@@ -20,8 +20,7 @@ void ModuleRegisters::daemon_started(TimeNs now_ns, bool kept) {
   initialise();
 }
 
-ModuleRegisters::Wrong ModuleRegisters::memory_cycle(TimeNs now_ns, const Naf& naf,
-                                                     const Response& response) {
+Wrong ModuleRegisters::memory_cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
   std::optional<std::uint8_t>& byte = memory_[address_];
   const std::size_t address = address_;
   count_up();
@@ -36,7 +35,7 @@ ModuleRegisters::Wrong ModuleRegisters::memory_cycle(TimeNs now_ns, const Naf& n
   return std::nullopt;
 }
 
-ModuleRegisters::Wrong ModuleRegisters::read(const Naf& naf, const Response& response) const {
+Wrong ModuleRegisters::read(const Naf& naf, const Response& response) const {
   const std::uint32_t expected =
       naf.subaddress == 1 ? static_cast<std::uint32_t>(address_) : control_;
   if (response.data == expected) return std::nullopt;

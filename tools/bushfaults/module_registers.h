@@ -14,6 +14,11 @@
 
 namespace bushfaults {
 
+using bushd::camac::Naf;
+using bushd::camac::Response;
+using bushd::sim::TimeNs;
+using Wrong = std::optional<std::string>;  // what is, if something is
+
 enum ModuleFunction {
   kRead = 0,
   kTestLam = 8,
@@ -25,11 +30,6 @@ enum ModuleFunction {
 
 class ModuleRegisters {
  public:
-  using TimeNs = bushd::sim::TimeNs;
-  using Wrong = std::optional<std::string>;
-  using Naf = bushd::camac::Naf;
-  using Response = bushd::camac::Response;
-
   explicit ModuleRegisters(std::size_t bytes) : memory_(bytes, 0) {}
 
   // `kept`: it has what an earlier daemon has put on the disk.

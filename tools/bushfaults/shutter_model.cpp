@@ -10,8 +10,6 @@
 namespace bushfaults {
 namespace {
 
-using bushd::sim::TimeNs;
-
 constexpr TimeNs kRequestDueNs = 120 * kSecond;  // as of BUSHD-2 (crate_model.cpp)
 constexpr TimeNs kTableNs = 20 * kSecond;
 constexpr TimeNs kRestNs = kSecond / 2;  // so long at rest, a travel is over
@@ -61,7 +59,7 @@ void ShutterModel::daemon_started(TimeNs now_ns, bool kept) {
   start_.reset();
 }
 
-ShutterModel::Wrong ShutterModel::cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
+Wrong ShutterModel::cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
   if (!is_here()) return std::nullopt;
   if (naf.station == 28 && naf.function == 26 && (naf.subaddress == 8 || naf.subaddress == 9)) {
     if (naf.subaddress == 8) {
@@ -89,8 +87,7 @@ ShutterModel::Wrong ShutterModel::cycle(TimeNs now_ns, const Naf& naf, const Res
   return std::nullopt;
 }
 
-ShutterModel::Wrong ShutterModel::memory_cycle(TimeNs now_ns, const Naf& naf,
-                                               const Response& response) {
+Wrong ShutterModel::memory_cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
   // Q is that before the cycle.
   auto wrong = observe(!response.q);
   const auto held = registers_.memory_cycle(now_ns, naf, response);
@@ -116,7 +113,7 @@ std::uint32_t ShutterModel::possible() const {
   return possible_ | limits | (start_->lasts() ? kFailed : kStepDone | kStepNotDone);
 }
 
-ShutterModel::Wrong ShutterModel::observe(bool lam) {
+Wrong ShutterModel::observe(bool lam) {
   if (!is_here()) return std::nullopt;
   if (now_ && lam != lam_of(*now_)) {
     return fmt::format("L is {}, with requests {:#x} and enables {:#x}", lam, *now_,
@@ -127,7 +124,7 @@ ShutterModel::Wrong ShutterModel::observe(bool lam) {
   return std::nullopt;
 }
 
-ShutterModel::Wrong ShutterModel::read_requests(std::uint32_t data) {
+Wrong ShutterModel::read_requests(std::uint32_t data) {
   const std::uint32_t requests = data & kRequests;
   if ((requests & ~possible()) != 0) {
     return fmt::format("it says {:#x}, and at most {:#x} can have been raised", requests,
@@ -154,7 +151,7 @@ ShutterModel::Wrong ShutterModel::read_requests(std::uint32_t data) {
   return end_travel(requests);
 }
 
-ShutterModel::Wrong ShutterModel::end_step(std::uint32_t fresh) {
+Wrong ShutterModel::end_step(std::uint32_t fresh) {
   const Start ended = *start_;
   over();
   if (!ended.sure || ended.disturbed) return std::nullopt;
@@ -169,7 +166,7 @@ ShutterModel::Wrong ShutterModel::end_step(std::uint32_t fresh) {
 }
 
 // One that makes a single travel has been to both limits.
-ShutterModel::Wrong ShutterModel::end_travel(std::uint32_t all) {
+Wrong ShutterModel::end_travel(std::uint32_t all) {
   const std::uint32_t both = kRightLimit | kLeftLimit;
   if (!start_ || !start_->sure || start_->mode != Mode::kTravel || start_->cleared) {
     return std::nullopt;
@@ -203,7 +200,7 @@ void ShutterModel::stop() {
   start_->rests_since_ns.reset();
 }
 
-ShutterModel::Wrong ShutterModel::raised(const bushd::api::CamacLam& lam) {
+Wrong ShutterModel::raised(const bushd::api::CamacLam& lam) {
   if (!is_here() || (lam.raised >> (kBushd1Station - 1) & 1) == 0) return std::nullopt;
   if (start_) start_->told = true;
   if (lam_of(possible())) return std::nullopt;
@@ -252,7 +249,7 @@ void ShutterModel::disturbed() {
   if (start_) start_->disturbed = true;
 }
 
-ShutterModel::Wrong ShutterModel::stepped(TimeNs now_ns, bool right, std::int64_t stands) {
+Wrong ShutterModel::stepped(TimeNs now_ns, bool right, std::int64_t stands) {
   stands_ = stands;
   if (!start_ || !start_->sure || start_->disturbed) return std::nullopt;
   if (!start_->lasts()) {
@@ -275,7 +272,7 @@ ShutterModel::Wrong ShutterModel::stepped(TimeNs now_ns, bool right, std::int64_
 }
 
 // The first step of a run.
-ShutterModel::Wrong ShutterModel::begin_run(TimeNs now_ns, bool right) {
+Wrong ShutterModel::begin_run(TimeNs now_ns, bool right) {
   Start& start = *start_;
   const TimeNs tick_ns = config_.buses[0].tick_ns();
   const TimeNs begins_ns = now_ns - start.delays_ns.front();
@@ -306,7 +303,7 @@ ShutterModel::Wrong ShutterModel::begin_run(TimeNs now_ns, bool right) {
 }
 
 // Steps of a run that is ramped down come later, never earlier.
-ShutterModel::Wrong ShutterModel::next_step(TimeNs now_ns, bool right) {
+Wrong ShutterModel::next_step(TimeNs now_ns, bool right) {
   Start& start = *start_;
   if (right == (start.left != start.returns)) return "it turns in the middle of a run";
   const TimeNs tick_ns = config_.buses[0].tick_ns();
@@ -348,7 +345,7 @@ void ShutterModel::calm() {
   start_->sure = false;
 }
 
-ShutterModel::Wrong ShutterModel::check_deadline(TimeNs now_ns) const {
+Wrong ShutterModel::check_deadline(TimeNs now_ns) const {
   constexpr std::uint32_t kAll = kRightLimit | kLeftLimit | kStepDone | kFailureEnabled;
   if (!start_ || !start_->sure || start_->stopped || start_->told || seen_ != 0) {
     return std::nullopt;

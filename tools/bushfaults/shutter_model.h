@@ -33,10 +33,6 @@ struct ShutterPlace {
 
 class ShutterModel {
  public:
-  using TimeNs = bushd::sim::TimeNs;
-  using Wrong = std::optional<std::string>;
-  using Naf = bushd::camac::Naf;
-  using Response = bushd::camac::Response;
   // As the daemon names the module.
   static constexpr const char* kClient = "camac-1-7";
 

@@ -242,6 +242,7 @@ static void port_keep_enable(void* context, bool on) {
 }
 
 static void boot(bushd_virtual* v) {
+  const bool has_trigger = (v->config.mcu.disabled_capabilities & BUSHD_CAN_TRIGGER) == 0;
   const bushd_port port = {
       .context = v,
       .transmit = port_transmit,
@@ -254,7 +255,7 @@ static void boot(bushd_virtual* v) {
       .read_current = port_read_current,
       .self_test = port_self_test,
       .keep_enable = port_keep_enable,
-      .set_trigger = port_set_trigger,
+      .set_trigger = has_trigger ? port_set_trigger : NULL,
       .set_current = v->config.mcu.current_motors > 0 ? port_set_current : NULL};
   v->config.mcu.reset_cause = v->reset_cause;
   v->config.mcu.enable_at_boot = v->enable_kept && v->reset_cause == BUSHD_RESET_WATCHDOG;

@@ -1,0 +1,114 @@
+// What an MCU may have and a port does not have, with the reason, and that the port denies it. The
+// list is compared with the capabilities in docs/protocol.md, so it is complete.
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <string>
+
+#include "conformance/pulse_bench.h"
+#include "source_path.h"
+
+namespace bushd::test {
+namespace {
+
+struct Lack {
+  const char* name;          // the protocol's, as far as names of tests can have it
+  std::uint32_t capability;  // of docs/protocol.md; 0: `says_no` tells
+  bool (*says_no)(PulseBench& bench);
+  const char* why;
+};
+constexpr bool (*kByCapability)(PulseBench&) = nullptr;
+const std::vector<Lack> kLacks = {
+    {"TICKS", 0, [](PulseBench& bench) { return !bench.master().streams(); },
+     "no step can be put at a time: bytes leave when they leave"},
+    {"several_motors", 0,
+     [](PulseBench& bench) { return bench.master().view({0}).identity.motors == 1; },
+     "a port has one TXD; lines of several ports are tested with the daemon"},
+    {"CONTROL_disable_drivers", 0,
+     [](PulseBench& bench) {
+       bench.master().control({0}, BUSHD_CONTROL_DISABLE);
+       bench.run_for(0.1);
+       return bench.count_of<link::RequestRefused>() == 1;
+     },
+     "no line is left for EN"},
+    {"TABLE_TICKS", BUSHD_CAN_TABLE_TICKS, kByCapability, "there are no slots"},
+    {"LOCAL", BUSHD_CAN_LOCAL, kByCapability, "nothing runs without the daemon"},
+    {"TRIGGER", BUSHD_CAN_TRIGGER, kByCapability,
+     "an edge at a modem line is seen milliseconds later"},
+    {"POSITION_COMPARE", BUSHD_CAN_POSITION_COMPARE, kByCapability, "no line is left for it"},
+    {"EMISSION_burst", BUSHD_CAN_BURST, kByCapability, "there are no slots"},
+    {"EMISSION_common_DIR", BUSHD_CAN_COMMON_DIR, kByCapability, "there is one motor"},
+    {"EMISSION_staggered", BUSHD_CAN_STAGGERED, kByCapability, "there is one motor"},
+    {"EMISSION_phases", BUSHD_CAN_PHASES, kByCapability, "TXD is one line"},
+    {"MOTOR_INPUTS", BUSHD_CAN_MOTOR_INPUTS, kByCapability,
+     "`inputs` of the bus names the modem lines that are switches; no request changes them"},
+    {"LINE_RUN", BUSHD_CAN_LINE_RUN, kByCapability, "no tick is common to two ports"},
+    {"TRAVEL", BUSHD_CAN_TRAVEL, kByCapability, "nothing runs without the daemon"},
+    {"CURRENTS", BUSHD_CAN_CURRENTS, kByCapability, "there is no chopper"},
+    {"VELOCITY", BUSHD_CAN_VELOCITY, kByCapability, "nothing runs without the daemon"},
+    {"LOCAL_keypad", BUSHD_CAN_KEYPAD, kByCapability, "RXD is not connected"},
+    {"volatile_table_slot", BUSHD_CAN_SCRATCH, kByCapability, "no table is uploaded to a port"},
+};
+
+// Words of the protocol by capability.
+std::map<std::uint32_t, std::string> capabilities_of_protocol() {
+  std::map<std::uint32_t, std::string> capabilities;
+  std::ifstream page(source_path("docs/protocol.md"));
+  static const std::regex kRow(R"(\| (\d+) \| (.*) \|)");
+  bool in_table = false;
+  std::smatch row;
+  for (std::string line; std::getline(page, line);) {
+    if (line == "| capability | |") in_table = true;
+    if (in_table && line.empty()) break;
+    if (in_table && std::regex_match(line, row, kRow)) {
+      capabilities[static_cast<std::uint32_t>(std::stoul(row[1]))] = row[2];
+    }
+  }
+  return capabilities;
+}
+
+class PortLacks : public testing::TestWithParam<Lack> {};
+INSTANTIATE_TEST_SUITE_P(A, PortLacks, testing::ValuesIn(kLacks),
+                         [](auto& lack) { return std::string(lack.param.name); });
+
+TEST_P(PortLacks, IsDenied) {
+  const Lack& lack = GetParam();
+  std::printf("  a port lacks %s: %s\n", lack.name, lack.why);
+  RecordProperty("lacks", lack.name);
+  RecordProperty("why", lack.why);
+  for (const PortTarget& target : port_targets()) {
+    SCOPED_TRACE(target.name);
+    PulseBench bench(target);
+    if (lack.says_no != nullptr) {
+      EXPECT_TRUE(lack.says_no(bench));
+    } else {
+      EXPECT_EQ(bench.master().view({0}).identity.capabilities & lack.capability, 0u);
+    }
+  }
+}
+
+class PortOffers : public testing::TestWithParam<PortTarget> {};
+INSTANTIATE_TEST_SUITE_P(Of, PortOffers, testing::ValuesIn(port_targets()),
+                         [](auto& target) { return target.param.name; });
+
+// Every capability of the protocol, but for those that are listed above; and no bit beyond them.
+TEST_P(PortOffers, WhatIsNotListedAsLacking) {
+  std::map<std::uint32_t, std::string> left = capabilities_of_protocol();
+  ASSERT_GE(left.size(), 19u) << "the table of capabilities was not found in docs/protocol.md";
+  for (const Lack& lack : kLacks) {
+    if (lack.capability == 0) continue;
+    EXPECT_EQ(left.erase(lack.capability), 1u)
+        << lack.name << " is listed twice, or is no capability of the protocol";
+  }
+  PulseBench bench(GetParam());
+  std::uint32_t offered = bench.master().view({0}).identity.capabilities;
+  for (const auto& [bit, words] : left) {
+    EXPECT_NE(offered & bit, 0u) << '"' << words << "\" is neither offered nor listed as lacking";
+    offered &= ~bit;
+  }
+  EXPECT_EQ(offered, 0u) << "no capability of the protocol, or listed as lacking";
+}
+
+}  // namespace
+}  // namespace bushd::test

@@ -1,0 +1,47 @@
+// What a virtual MCU is by its options.
+#include "sim/mcu_alone.h"
+
+namespace bushd::sim::virtual_mcu_test {
+namespace {
+
+constexpr std::uint32_t kAll = (UINT32_C(2) * BUSHD_CAN_SCRATCH) - 1;  // of 19 bits
+
+class DisabledCapability : public McuAlone, public testing::WithParamInterface<std::uint32_t> {
+ protected:
+  DisabledCapability() : McuAlone(kBaud, 0) {
+    bus_.add_mcu({.address = kAddress, .disabled_capabilities = GetParam()});
+    pass(kTickNs);
+  }
+
+  std::uint32_t capabilities() {
+    bushd_identity identity{};
+    const auto reply = master_.identify(kAddress);
+    EXPECT_TRUE(reply && bushd_decode_identity(reply->payload.data(), reply->payload.size(),
+                                               &identity) == BUSHD_OK);
+    return identity.capabilities;
+  }
+};
+
+std::vector<std::uint32_t> every_one_none_and_all() {
+  std::vector<std::uint32_t> disabled{0, kAll};
+  for (std::uint32_t bit = 1; bit <= BUSHD_CAN_SCRATCH; bit *= 2) disabled.push_back(bit);
+  return disabled;
+}
+INSTANTIATE_TEST_SUITE_P(Of, DisabledCapability, testing::ValuesIn(every_one_none_and_all()),
+                         testing::PrintToStringParamName());
+
+TEST_P(DisabledCapability, IsTheOnlyOneThatIsNotInTheIdentity) {
+  EXPECT_EQ(capabilities(), kAll & ~GetParam());
+}
+
+// The one that a port has or has not. Messages of the others are those of the core, whose tests
+// send them.
+TEST_P(DisabledCapability, OfATriggerInputRefusesTrigger) {
+  Bytes disarm(BUSHD_FRAME_MAX_PAYLOAD);
+  disarm.resize(bushd_encode_trigger(0, BUSHD_EDGE_NONE, 0, nullptr, 0, disarm.data()));
+  EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_TRIGGER, disarm),
+            (GetParam() & BUSHD_CAN_TRIGGER) == 0 ? BUSHD_OK : BUSHD_E_UNKNOWN_MESSAGE);
+}
+
+}  // namespace
+}  // namespace bushd::sim::virtual_mcu_test
