@@ -6,7 +6,7 @@
 #include "keypad_bytes.h"
 #include "sim/switch.h"
 
-namespace bushd::sim {
+namespace bushd::sim::autonomous_test {
 namespace {
 
 constexpr std::uint8_t kMotor = 6;
@@ -279,4 +279,4 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::autonomous_test

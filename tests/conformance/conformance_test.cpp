@@ -4,7 +4,7 @@
 #include "conformance/script.h"
 #include "sim/random.h"
 
-namespace bushd::sim {
+namespace bushd::sim::conformance_test {
 namespace {
 
 class Conformance : public Script, public testing::WithParamInterface<Target> {
@@ -315,4 +315,4 @@ TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::conformance_test

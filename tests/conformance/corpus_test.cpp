@@ -19,7 +19,7 @@
 #include "sim/pulse_counter.h"
 #include "source_path.h"
 
-namespace bushd::sim {
+namespace bushd::sim::corpus_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -391,4 +391,4 @@ INSTANTIATE_TEST_SUITE_P(Of, Corpus, testing::ValuesIn(all()), [](const auto& te
 });
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::corpus_test

@@ -7,7 +7,7 @@
 #include "sim/bus_fixture.h"
 #include "source_path.h"
 
-namespace bushd::sim {
+namespace bushd::sim::faults_test {
 namespace {
 
 constexpr std::uint32_t kBaud = 500'000;
@@ -314,4 +314,4 @@ TEST_P(GoldenFrames, AreAnsweredLikeTheVirtualMcuDoes) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::faults_test

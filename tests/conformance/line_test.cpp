@@ -6,7 +6,7 @@
 
 #include "conformance/script.h"
 
-namespace bushd::sim {
+namespace bushd::sim::line_test {
 namespace {
 
 constexpr std::uint32_t kLongest = 400;
@@ -226,4 +226,4 @@ TEST_P(LineScript, TriggeredEveryStepIsWithinASlotOfItsTime) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::line_test

@@ -2,7 +2,7 @@
 #include "conformance/targets.h"
 #include "sim/mcu_alone.h"
 
-namespace bushd::sim {
+namespace bushd::sim::nvm_test {
 namespace {
 
 constexpr TimeNs kBootNs = 300'000'000;
@@ -201,4 +201,4 @@ TEST_P(Nvm, ABitThatHasFlippedIsAFault) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::nvm_test

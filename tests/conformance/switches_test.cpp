@@ -8,7 +8,7 @@
 #include "conformance/script.h"
 #include "sim/switch.h"
 
-namespace bushd::sim {
+namespace bushd::sim::switches_test {
 namespace {
 
 constexpr std::uint8_t kMotor = 6;
@@ -198,4 +198,4 @@ TEST_P(Switches, NoHomeBetweenTheLimits) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::switches_test

@@ -3,7 +3,7 @@
 
 #include "conformance/script.h"
 
-namespace bushd::sim {
+namespace bushd::sim::travel_test {
 namespace {
 
 constexpr TimeNs kSlotNs = kTickNs / 128;
@@ -142,4 +142,4 @@ TEST_P(Travels, OneStepIsSeenOrNot) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::travel_test

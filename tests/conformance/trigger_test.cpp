@@ -5,7 +5,7 @@
 #include "conformance/script.h"
 #include "sim/supply_current.h"
 
-namespace bushd::sim {
+namespace bushd::sim::trigger_test {
 namespace {
 
 constexpr TimeNs kSlotNs = kTickNs / 128;
@@ -201,4 +201,4 @@ TEST_P(Current, IsMeasuredAndPulsesAreAsFarApart) {
 }
 
 }  // namespace
-}  // namespace bushd::sim
+}  // namespace bushd::sim::trigger_test
