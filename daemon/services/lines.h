@@ -109,6 +109,7 @@ class Lines final : public Service {
     };
     std::vector<End> low;
     std::vector<End> high;
+    std::vector<units::Scale> scales;  // of each motor, by which all points are meant
     std::int32_t rows = 0;
     int direction = 0;  // of a motor with speeds
   };
@@ -145,6 +146,7 @@ class Lines final : public Service {
                  const std::vector<std::size_t>& indices, std::uint32_t to);
 
   Result<Incoming> begin_points(const api::MovePath& request) const;
+  Result<void> same_scales(const Incoming& incoming) const;
   Result<void> add_points(Incoming& incoming, const api::MovePath& request) const;
   Result<std::uint16_t> floor_to(Incoming& incoming, std::int64_t point, double speed) const;
   Result<void> check_ends(const Incoming& incoming) const;

@@ -79,6 +79,7 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
       good = fail(begun.error());
     }
   }
+  if (good) good = same_scales(incoming->second);
   if (good) good = add_points(incoming->second, request);
   if (good && *last) good = check_ends(incoming->second);
   if (good && *last && coming_.size() >= kMostComing) {
@@ -121,6 +122,7 @@ Result<Lines::Incoming> Lines::begin_points(const api::MovePath& request) const 
     motors.push_back({&line.tables.back()->view(), *floor});
     to.floors.push_back(*floor);
     begin.push_back(installation_[id].position_steps());
+    incoming.scales.push_back(installation_[id].coordinates().scale());
     incoming.low.push_back({0, begin.back()});
     incoming.high.push_back({0, begin.back()});
   }
@@ -131,6 +133,18 @@ Result<Lines::Incoming> Lines::begin_points(const api::MovePath& request) const 
                                              static_cast<std::size_t>(request.rows));
   if (auto may = may_begin(line); !may) return fail(may.error());
   return incoming;
+}
+
+// All points are positions by the same offset and direction.
+Result<void> Lines::same_scales(const Incoming& incoming) const {
+  for (std::size_t m = 0; m < incoming.scales.size(); ++m) {
+    const motion::Motor& motor = installation_[incoming.line.motors[m]];
+    if (motor.coordinates().scale() == incoming.scales[m]) continue;
+    return fail(motor.name() +
+                ": its offset or direction has changed since the path's first points came; send "
+                "the path again from its beginning");
+  }
+  return {};
 }
 
 Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request) const {

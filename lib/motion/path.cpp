@@ -87,6 +87,7 @@ void Path::prepare(std::size_t points) {
   }
   const std::size_t width = motors_.size();
   travel_.assign(width, 0);
+  flat_.reserve(points);
   corner_.reserve(points);
   first_.reserve(points);
   last_.reserve(points);
@@ -206,7 +207,9 @@ std::uint32_t Path::least_before(const Shares& before, const Shares& behind,
 
 // Steps of a motor's own in a segment, but for parts of steps.
 std::uint32_t Path::own_made(std::size_t segment, const PathShare& share) const {
-  return static_cast<std::uint32_t>(std::uint64_t{share.steps} * made_of(segment) / share.longest);
+  const std::uint32_t made = made_of(segment);
+  if (made == share.longest) return share.steps;
+  return static_cast<std::uint32_t>(quotient(std::uint64_t{share.steps} * made, share.longest));
 }
 
 std::int64_t Path::accel_place(const PathShare& now, const PathShare& before, std::uint32_t delay,
@@ -243,7 +246,8 @@ Path::Head Path::head(std::size_t segment, std::size_t motor, const PathShare& b
   const double delay = code * static_cast<double>(now.numerator) /
                        static_cast<double>(now.denominator) * (1 + r1) / (1 + r2);
   const std::uint64_t twice = std::uint64_t{now.longest} + now.steps;
-  return {static_cast<std::uint32_t>((twice + 2 * now.steps - 1) / (2 * now.steps)),
+  const std::uint64_t twice_own = 2 * std::uint64_t{now.steps};
+  return {static_cast<std::uint32_t>(quotient(twice + twice_own - 1, twice_own)),
           rounded_up(delay)};
 }
 
@@ -261,7 +265,7 @@ void Path::raise_heads(std::size_t segment, const Shares& before, const Shares& 
 // its own first step.
 std::uint32_t Path::first_delay(std::size_t segment, const Shares& before, const Shares& now,
                                 const Places& places) const {
-  std::uint32_t least = flat(segment, now);
+  std::uint32_t least = flat_[segment];
   for (std::size_t m = 0; m < now.size(); ++m) {
     if (!now[m].moves()) continue;
     const std::int64_t index = places[m] + now[m].steps - 1;
@@ -274,6 +278,7 @@ std::uint32_t Path::first_delay(std::size_t segment, const Shares& before, const
 
 void Path::corners_step(std::size_t i) {
   load(i, now_);
+  flat_.push_back(flat(i, now_));
   corner_.push_back(rests_at(i) ? 0 : corner(before_, now_));
   first_.push_back(0);
   last_.push_back(0);
@@ -377,7 +382,7 @@ void Path::shape(std::size_t i, const Shares& before, const Shares& now, const S
   };
   take(accel_, up);
   take(decel_, down);
-  merger.merge(up, down, flat(i, now), made_of(i), profile);
+  merger.merge(up, down, flat_[i], made_of(i), profile);
   for (std::size_t m = 0; m < width; ++m) places[m] = accel_[i * width + m];
   if (i > 0) raise_heads(i, before, now, false, places, delay_before, profile);
   if (delay_before != kRest) {

@@ -170,8 +170,9 @@ class Path {
   std::vector<double> start_units_;                                  // 1 / F
   std::uint64_t number_ = 0;
 
-  // By segment: the least delay of its first step, by the corner; the same and by what comes
-  // behind; of its last step; when it ends.
+  // By segment: the least delay of all its steps, and of its first one by the corner; that and by
+  // what comes behind; of its last step; when it ends.
+  std::vector<std::uint32_t> flat_;
   std::vector<std::uint32_t> corner_;
   std::vector<std::uint32_t> first_;
   std::vector<std::uint32_t> last_;

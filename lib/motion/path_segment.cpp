@@ -7,12 +7,6 @@ namespace {
 
 __extension__ using Wide = unsigned __int128;
 
-// Most numbers are small, and their division takes half the time.
-std::uint64_t quotient(std::uint64_t dividend, std::uint64_t divisor) {
-  if ((dividend | divisor) >> 32 != 0) return dividend / divisor;
-  return static_cast<std::uint32_t>(dividend) / static_cast<std::uint32_t>(divisor);
-}
-
 void append(Profile& profile, std::uint32_t steps, std::uint32_t delay) {
   if (steps == 0) return;
   if (!profile.empty() && profile.back().delay == delay) {
@@ -30,18 +24,8 @@ std::uint64_t run_step(const PathShare& share, std::uint64_t made) {
 
 }  // namespace
 
-std::uint32_t PathShare::scaled(std::uint16_t own) const {
-  if (numerator == denominator) return own;
-  if (numerator >> 47 == 0) {
-    return static_cast<std::uint32_t>(quotient(own * numerator + denominator - 1, denominator));
-  }
+std::uint32_t PathShare::scaled_widely(std::uint16_t own) const {
   return static_cast<std::uint32_t>((Wide{own} * numerator + denominator - 1) / denominator);
-}
-
-std::uint16_t PathShare::code(bool decel, std::int64_t index) const {
-  const bushd_ramp& ramp = decel ? table->decel : table->accel;
-  if (index >= ramp.count) return table->cruise;
-  return std::max(ramp.code[std::max<std::int64_t>(index, 0)], table->cruise);
 }
 
 std::int64_t PathShare::first_at_most(bool decel, std::uint32_t delay) const {
@@ -54,8 +38,12 @@ std::int64_t PathShare::first_at_most(bool decel, std::uint32_t delay) const {
     own = numerator == denominator ? delay : quotient(own, numerator);
   }
   if (own < table->cruise) return ramp.count;
-  const std::uint16_t* const end = ramp.code + ramp.count;
-  return std::partition_point(ramp.code, end, [own](std::uint16_t code) { return code > own; }) -
+  // Mostly near rest: where corners are many, few motors are fast.
+  std::int64_t most = 1;
+  while (most < ramp.count && ramp.code[most - 1] > own) most *= 2;
+  most = std::min<std::int64_t>(most, ramp.count);
+  return std::partition_point(ramp.code + most / 2, ramp.code + most,
+                              [own](std::uint16_t code) { return code > own; }) -
          ramp.code;
 }
 
@@ -72,51 +60,55 @@ void RampMerger::Slowest::start(std::span<const PathRamp> ramps, bool decel, std
   decel_ = decel;
   flat_ = flat;
   climbs_.clear();
+  order_.clear();
+  leader_ = 0;
   for (const PathRamp& ramp : ramps) {
     const std::uint32_t delay = ramp.share->at(decel, ramp.place);
-    if (delay > flat) climbs_.push_back({ramp, run_step(*ramp.share, 1), delay});
-  }
-  find_leader();
-}
-
-void RampMerger::Slowest::find_leader() {
-  leader_ = 0;
-  second_ = 0;
-  for (std::size_t i = 1; i < climbs_.size(); ++i) {
-    const bool leads = climbs_[i].delay > climbs_[leader_].delay;
-    second_ = std::max(second_, climbs_[leads ? leader_ : i].delay);
-    if (leads) leader_ = i;
+    if (delay <= flat) continue;
+    // By insertion: mostly there are a few.
+    const Place place{delay, static_cast<std::uint32_t>(climbs_.size())};
+    std::size_t at = order_.size();
+    order_.push_back(place);
+    for (; at > 0 && order_[at - 1].delay < delay; --at) order_[at] = order_[at - 1];
+    order_[at] = place;
+    climbs_.push_back({ramp, 0, run_step(*ramp.share, 1)});
   }
 }
 
 void RampMerger::Slowest::go_to(std::uint64_t step) {
-  while (!climbs_.empty()) {
-    Climb& leader = climbs_[leader_];
+  while (leader_ < order_.size()) {
+    const std::uint32_t climb = order_[leader_].climb;
+    Climb& leader = climbs_[climb];
     if (leader.next > step) return;
     const PathShare& share = *leader.ramp.share;
-    const std::uint64_t made =
-        share.steps == share.longest ? step : quotient(step * share.steps, share.longest);
-    leader.next = run_step(share, made + 1);
-    leader.delay = share.at(decel_, leader.ramp.place + static_cast<std::int64_t>(made));
-    if (leader.delay <= flat_) {
-      leader = climbs_.back();
-      climbs_.pop_back();
-      find_leader();
-    } else if (leader.delay < second_) {
-      find_leader();
+    // A motor makes one step in a step of the run at most.
+    leader.made = leader.next == step            ? leader.made + 1
+                  : share.steps == share.longest ? step
+                                                 : quotient(step * share.steps, share.longest);
+    leader.next = run_step(share, leader.made + 1);
+    const std::uint32_t delay =
+        share.at(decel_, leader.ramp.place + static_cast<std::int64_t>(leader.made));
+    if (delay <= flat_) {
+      ++leader_;
+      continue;
     }
+    // Others may lead now.
+    std::size_t at = leader_;
+    for (; at + 1 < order_.size() && order_[at + 1].delay > delay; ++at)
+      order_[at] = order_[at + 1];
+    order_[at] = {delay, climb};
   }
 }
 
 bool RampMerger::Slowest::has_codes() const {
-  if (climbs_.empty()) return true;
-  const PathShare& share = *climbs_[leader_].ramp.share;
+  if (leader_ == order_.size()) return true;
+  const PathShare& share = *leader().ramp.share;
   return share.steps == share.longest && share.numerator == share.denominator;
 }
 
 RampMerger::Slowest::Codes RampMerger::Slowest::codes(std::uint64_t step) const {
-  if (climbs_.empty()) return {};
-  const PathRamp& leader = climbs_[leader_].ramp;
+  if (leader_ == order_.size()) return {};
+  const PathRamp& leader = this->leader().ramp;
   const bushd_ramp& side = decel_ ? leader.share->table->decel : leader.share->table->accel;
   // Behind the codes is the cruise delay, which is not above `flat`.
   const std::uint64_t at = static_cast<std::uint64_t>(leader.place) + step;
@@ -124,8 +116,10 @@ RampMerger::Slowest::Codes RampMerger::Slowest::codes(std::uint64_t step) const 
 }
 
 void RampMerger::Slowest::leave_codes(std::uint64_t step) {
-  if (climbs_.empty()) return;
-  climbs_[leader_].next = step;
+  if (leader_ == order_.size() || step == 0) return;
+  Climb& leader = climbs_[order_[leader_].climb];
+  leader.made = step - 1;  // it makes each step of the run
+  leader.next = step;
   go_to(step);
 }
 

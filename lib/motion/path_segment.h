@@ -4,6 +4,7 @@
 // up. All delays here are in one time unit, that of the path, and have 32 bits.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,6 +24,12 @@ using Profile = std::vector<Delays>;
 
 inline constexpr std::uint32_t kRest = UINT32_MAX;  // in place of a delay
 
+// Most numbers are small, and their division takes half the time.
+inline std::uint64_t quotient(std::uint64_t dividend, std::uint64_t divisor) {
+  if ((dividend | divisor) >> 32 != 0) return dividend / divisor;
+  return static_cast<std::uint32_t>(dividend) / static_cast<std::uint32_t>(divisor);
+}
+
 // A motor's part of a segment. Without steps it asks for nothing.
 struct PathShare {
   const bushd_table* table = nullptr;
@@ -36,8 +43,17 @@ struct PathShare {
   double ratio = 0;  // r
 
   bool moves() const { return steps != 0; }
-  std::uint32_t scaled(std::uint16_t own) const;
-  std::uint16_t code(bool decel, std::int64_t index) const;
+  std::uint32_t scaled(std::uint16_t own) const {
+    if (numerator == denominator) return own;
+    if (numerator >> 47 != 0) return scaled_widely(own);
+    return static_cast<std::uint32_t>(quotient(own * numerator + denominator - 1, denominator));
+  }
+  std::uint32_t scaled_widely(std::uint16_t own) const;  // where 64 bits may be too few
+  std::uint16_t code(bool decel, std::int64_t index) const {
+    const bushd_ramp& ramp = decel ? table->decel : table->accel;
+    if (index >= ramp.count) return table->cruise;
+    return std::max(ramp.code[std::max<std::int64_t>(index, 0)], table->cruise);
+  }
   // What it asks for at an index of its table; one below 0 counts as 0.
   std::uint32_t at(bool decel, std::int64_t index) const { return scaled(code(decel, index)); }
   // First index of a side that asks for at most this delay.
@@ -71,8 +87,8 @@ class RampMerger {
   class Slowest {
    public:
     void start(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat);
-    std::uint32_t delay() const { return climbs_.empty() ? 0 : climbs_[leader_].delay; }
-    std::uint64_t until() const { return climbs_[leader_].next; }
+    std::uint32_t delay() const { return leader_ == order_.size() ? 0 : order_[leader_].delay; }
+    std::uint64_t until() const { return leader().next; }
     void go_to(std::uint64_t step);
 
     // The codes that come one by one as long as they are above `others`, if the slowest motor makes
@@ -84,24 +100,30 @@ class RampMerger {
     };
     bool has_codes() const;
     Codes codes(std::uint64_t step) const;
-    std::uint32_t others() const { return second_; }
+    std::uint32_t others() const {
+      return leader_ + 1 < order_.size() ? order_[leader_ + 1].delay : 0;
+    }
     void leave_codes(std::uint64_t step);
 
    private:
     struct Climb {
       PathRamp ramp;
+      std::uint64_t made;  // of the motor's own, from there
       std::uint64_t next;  // step of the run from which on the delay is another one
-      std::uint32_t delay;
     };
-    void find_leader();
+    struct Place {
+      std::uint32_t delay;
+      std::uint32_t climb;
+    };
+    const Climb& leader() const { return climbs_[order_[leader_].climb]; }
 
     bool decel_ = false;
     std::uint32_t flat_ = 0;
-    // Delays of all but the leader may be those of an earlier step. As no side rises they are not
-    // too short.
     std::vector<Climb> climbs_;
+    // From the leader on, the slowest first; those before it count no more. Delays of all but the
+    // leader may be those of an earlier step. As no side rises they are not too short.
+    std::vector<Place> order_;
     std::size_t leader_ = 0;
-    std::uint32_t second_ = 0;
   };
 
   void merge_codes(Profile& merged);

@@ -104,25 +104,24 @@ class Pace {
   // A step at t_ns, not before the last one. O(1) amortised.
   Jump step(TimeNs t_ns, bool positive);
   // Its next motion, from rest, is one of a line, until it is said to rest. Without `ramped_down`
-  // it may still move, as its MCU makes it: if that makes the line's run itself (`by_mcu`), along
-  // the line, for as long as it goes on without a master.
+  // it may still move, along the line, for as long as its MCU goes on without a master, by what is
+  // queued or by a run of its own.
   // A line before that was forgotten is over where it has made no step for so long as at rest.
-  void begin_on_line(TimeNs now_ns, bool by_mcu) {
+  void begin_on_line(TimeNs now_ns) {
     if (excused_ && count_ != 0 && now_ns - last_ns() >= rules_->rest_ns()) count_ = 0;
     on_line_ = told_ = true;
-    by_mcu_ = by_mcu;
     line_until_ns_ = kNever;
   }
   Jump rest_on_line(TimeNs now_ns, bool ramped_down) {
     if (!on_line_) return Jump::kNone;
-    if (by_mcu_ && !ramped_down) {
+    if (!ramped_down) {
       line_until_ns_ = now_ns + kMostSilenceNs + rules_->ramp_down_ns(rules_->last()) +
                        rules_->longest_told_ns();
       return Jump::kNone;
     }
-    leave_line(!ramped_down);
-    told_ = !ramped_down;
-    return ramped_down && count_ != 0 ? come_to_rest() : Jump::kNone;
+    leave_line(false);
+    told_ = false;
+    return count_ != 0 ? come_to_rest() : Jump::kNone;
   }
   // Another motion begins: whatever the line was, it is over.
   void forget_line() {
@@ -180,7 +179,6 @@ class Pace {
   std::size_t count_ = 0;  // steps since rest, at most kHistory
   bool positive_ = false;
   bool on_line_ = false;
-  bool by_mcu_ = false;
   // By a line, also by one that was lost: its running step may be as slow as any that can be told.
   bool told_ = false;
   TimeNs line_until_ns_ = kNever;

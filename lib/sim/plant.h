@@ -24,8 +24,8 @@ class Plant final : public EdgeSink {
   void attach(std::size_t mcu, std::size_t output, const PaceRules& rules);
 
   // The motor's next motion, from rest, is one of a line; and it rests after that (sim/pace.h).
-  void begin_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output, bool by_mcu) {
-    motor_of_[mcu].at(output)->pace.begin_on_line(now_ns, by_mcu);
+  void begin_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output) {
+    motor_of_[mcu].at(output)->pace.begin_on_line(now_ns);
   }
   void forget_line(std::size_t mcu, std::size_t output) {
     motor_of_[mcu].at(output)->pace.forget_line();

@@ -191,6 +191,29 @@ TEST(Paths, PointsComeInSeveralRequests) {
   EXPECT_THAT(lab.wait(lab.send(part(20, 50))).reason, HasSubstr("send it again"));
 }
 
+TEST(Paths, PointsAreMeantByOneOffset) {
+  std::string toml = hall(1, 2);
+  toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n");
+  Lab lab(toml);
+  lab.connect();
+  api::MovePath path = path_of({"m01", "m02"}, {0.5, 100});
+  path.rows = 2;
+  EXPECT_EQ(lab.wait(lab.send(path)).result, "done");
+  const auto change = lab.send(
+      api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", "offset", "10"}}});
+  ASSERT_EQ(lab.wait(change).result, "done");
+  path.first_row = 1;
+  path.positions = {10.25, 0};
+  const Answer answer = lab.wait(lab.send(path));
+  EXPECT_EQ(answer.result, "refused");
+  EXPECT_THAT(answer.reason, HasSubstr("m01: its offset or direction has changed"));
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  path.first_row = 0;
+  path.positions = {10.5, 100, 10.25, 0};
+  EXPECT_EQ(lab.wait(lab.send(path)).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 100);
+}
+
 TEST(Paths, ADryRunTellsWhenEachPointIsReached) {
   Lab lab(hall(1, 2));
   lab.connect();

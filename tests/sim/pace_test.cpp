@@ -163,7 +163,7 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
     }
     return first;
   };
-  pace.begin_on_line(now, false);
+  pace.begin_on_line(now);
   EXPECT_EQ(ramps(true, kSteps), Jump::kNone);
   const TimeNs begun_ns = pace.first_ns();
   now -= rules.delay_ns(0) / 2;  // half a delay after the last step
@@ -171,7 +171,7 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
   EXPECT_EQ(pace.first_ns(), begun_ns) << "that was no rest";
   EXPECT_EQ(pace.rest_on_line(now, true), Jump::kNone);
   now += 100 * kTickNs;
-  pace.begin_on_line(now, false);
+  pace.begin_on_line(now);
   EXPECT_EQ(ramps(true, kSteps - 3), Jump::kNone);
   EXPECT_EQ(ramps(false, kSteps), Jump::kStoppedDead);
 }
@@ -179,11 +179,11 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
 // A master that was killed has not told that its line is over; another one starts from rest.
 TEST_P(PaceTest, AMotionBeginsWhereTheLineBeforeWasForgotten) {
   for (const bool positive : {true, false}) {
-    pace.begin_on_line(now, false);
+    pace.begin_on_line(now);
     EXPECT_EQ(pace.step(now, true), Jump::kNone);
     now += 1000 * kTickNs;
     pace.forget_line();
-    pace.begin_on_line(now, false);
+    pace.begin_on_line(now);
     EXPECT_EQ(pace.step(now, positive), Jump::kNone);
     EXPECT_EQ(pace.first_ns(), now) << "in either direction";
     now += 1000 * kTickNs;
@@ -195,7 +195,7 @@ TEST_P(PaceTest, AMotionBeginsWhereTheLineBeforeWasForgotten) {
 TEST_P(PaceTest, OneThatIsLostOnALineMayTakeTheLongestDelay) {
   EXPECT_EQ(pace.step(now, true), Jump::kNone);
   EXPECT_LT(pace.ramp_down_ns(), rules.longest_told_ns());
-  pace.begin_on_line(now, false);
+  pace.begin_on_line(now);
   EXPECT_GE(pace.ramp_down_ns(), rules.longest_told_ns());
   EXPECT_EQ(pace.rest_on_line(now, false), Jump::kNone);
   now += 1000 * kTickNs;
@@ -203,6 +203,32 @@ TEST_P(PaceTest, OneThatIsLostOnALineMayTakeTheLongestDelay) {
   EXPECT_GE(pace.ramp_down_ns(), rules.longest_told_ns());
   pace.forget_line();
   EXPECT_LT(pace.ramp_down_ns(), rules.longest_told_ns());
+}
+
+// What is queued speeds up along the line, in fewer steps than its table has after such a delay.
+TEST_P(PaceTest, OneThatIsLostOnALineMaySpeedUpAlongIt) {
+  constexpr std::size_t kSteps = 60;
+  for (const bool lost : {true, false}) {
+    pace.begin_on_line(now);
+    for (std::size_t k = 0; k < kSteps; ++k) {
+      EXPECT_EQ(pace.step(now, true), Jump::kNone);
+      now += rules.delay_ns(0);
+    }
+    if (lost) {
+      EXPECT_EQ(pace.rest_on_line(now, false), Jump::kNone);
+    } else {
+      pace.forget_line();
+    }
+    Jump first = pace.step(now, true);
+    for (std::size_t k = kSteps + 1; k < 2 * kSteps && first == Jump::kNone; ++k) {
+      now += rules.delay_ns(k);
+      first = pace.step(now, true);
+    }
+    EXPECT_EQ(first, lost ? Jump::kNone : Jump::kTooFast);
+    now += 10'000 * kTickNs;
+    pace.silent(now);
+    pace.cut();
+  }
 }
 
 TEST_P(PaceTest, AFifthFasterThanTheTableIsFound) {

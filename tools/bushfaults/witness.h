@@ -55,8 +55,7 @@ class Witness {
   void description(TimeNs now_ns, const bushd::api::Description& said);
   void lam(TimeNs now_ns, const bushd::api::CamacLam& lam);
   // A run of this motor begins, one of a line or of its own, or has ended as this word says.
-  std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, bool on_line, bool by_mcu)>
-      on_run;
+  std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, bool on_line)> on_run;
   std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, const std::string& word)>
       on_run_end;
   // From time to time; the plant has come to now_ns.

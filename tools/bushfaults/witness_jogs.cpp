@@ -220,7 +220,10 @@ void Witness::configure_accepted(Asked& asked) {
   for (const std::string& name : request.motors) {
     const Motor& motor = *find(name);
     const auto limits = units_.limits(index_of(motor));
-    const bool known = trusted(motor) && offset(motor);
+    // Of one that is not online nothing is said.
+    const auto& state = states_[motor.mcu];
+    const bool known = trusted(motor) && offset(motor) && state->state != api::McuState::kOffline &&
+                       state->state != api::McuState::kBusy;
     const std::int64_t at = known ? plant_steps(motor) - *offset(motor) : 0;
     const bool outside = limits && (at < limits->low || at > limits->high);
     asked.outside.push_back(known ? std::optional(outside) : std::nullopt);

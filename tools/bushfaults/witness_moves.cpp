@@ -88,9 +88,9 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.stops.push_back(false);
   // The trigger begins it before anybody tells; what came before is over.
   if (request.ask == Ask::kArm && request.line && on_run && on_run_end) {
-    on_run(now_ns, motor.mcu, motor.output, true, true);
+    on_run(now_ns, motor.mcu, motor.output, true);
     on_run_end(now_ns, motor.mcu, motor.output, "stopped");
-    on_run(now_ns, motor.mcu, motor.output, true, true);
+    on_run(now_ns, motor.mcu, motor.output, true);
   }
   if (is_shutter(motor) && request.client != ShutterModel::kClient) shutter_.disturbed();
   if (request.ask == Ask::kHome) {
@@ -206,7 +206,10 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
     if (motor == nullptr || motor->move != key) continue;
     motor->move.reset();
     const bool waited = request.ask == Ask::kArm && request.line && !asked.began[i];
-    if (waited && on_run_end) on_run_end(now_ns, motor->mcu, motor->output, "stopped");
+    const auto* results = std::get_if<Motors>(&completed.detail);
+    if (!waited || results == nullptr || !on_run_end) continue;
+    // The trigger may have begun it, and nobody has told before its MCU was lost.
+    on_run_end(now_ns, motor->mcu, motor->output, std::string(word((*results)[i].outcome)));
   }
 }
 
@@ -267,10 +270,8 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   if (!begins && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
   if (begins && on_run) {
-    // One that is lost makes what its MCU has: of a path, or an array, it may speed up again.
-    const bool winds = line.contains("path") || line.contains("array");
-    on_run(now_ns, motor.mcu, motor.output, winds || line.contains("line"),
-           winds || line.at("moves") == "table");
+    const bool on_line = line.contains("line") || line.contains("path") || line.contains("array");
+    on_run(now_ns, motor.mcu, motor.output, on_line);
   }
   if (begins && motor.move) return run_begins(now_ns, motor);
   if (begins) return;

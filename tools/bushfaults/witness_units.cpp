@@ -59,7 +59,8 @@ std::int64_t Witness::said_steps(const Motor& motor) const {
 // In the daemon's count.
 std::optional<std::int64_t> Witness::target_asked(const Motor& motor, const Request& request,
                                                   std::size_t i) const {
-  if (!trusted(motor) || !offset(motor)) return std::nullopt;
+  // Of an array that is told in parts the last one may come later, and be refused.
+  if (!trusted(motor) || !offset(motor) || request.unknown_way) return std::nullopt;
   if (request.ask == Ask::kMoveTo) return position_asked(request, i);
   const auto base = base_of(motor);
   if (!base || std::abs(request.steps[i]) > kMost) return std::nullopt;
