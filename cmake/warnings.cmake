@@ -36,7 +36,7 @@ function(bushd_in_batches)
 endfunction()
 
 # bushd_built_quickly(bushctl ...): command lines and screens, whose speed nobody could tell, take half the compiler's time with
-# -Og, and with sanitizers as they are. Packages are built with the flags of the distribution.
+# -Og; with sanitizers they are not optimised at all. Packages are built with the flags of the distribution.
 function(bushd_built_quickly)
   foreach(target IN LISTS ARGN)
     if(BUSHD_SANITIZE AND NOT BUSHD_FUZZ)

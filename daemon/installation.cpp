@@ -169,7 +169,9 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
 
 link::LineRun Mcu::line_run(const motion::LineShare& share, std::uint16_t floor,
                             link::Tick ticks) const {
-  return {.slot = master_.slot_of(on_bus_, share.table->view()).value_or(BUSHD_SCRATCH_SLOT),
+  // What really begins has its table there. A dry run may ask before: this is where it would be.
+  const auto slot = master_.slot_of(on_bus_, share.table->view());
+  return {.slot = slot.value_or(BUSHD_SCRATCH_SLOT),
           .floor = floor,
           .longest = share.longest,
           .from = share.from,

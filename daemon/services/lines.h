@@ -109,7 +109,7 @@ class Lines final : public Service {
     };
     std::vector<End> low;
     std::vector<End> high;
-    std::vector<units::Scale> scales;  // of each motor, by which all points are meant
+    std::vector<units::Scale> scales;  // of each motor at the first point; the same for all
     std::int32_t rows = 0;
     int direction = 0;  // of a motor with speeds
   };

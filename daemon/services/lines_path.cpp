@@ -135,14 +135,16 @@ Result<Lines::Incoming> Lines::begin_points(const api::MovePath& request) const 
   return incoming;
 }
 
-// All points are positions by the same offset and direction.
+// Points become steps as they are taken: by another offset or direction later ones would lie
+// elsewhere.
 Result<void> Lines::same_scales(const Incoming& incoming) const {
   for (std::size_t m = 0; m < incoming.scales.size(); ++m) {
     const motion::Motor& motor = installation_[incoming.line.motors[m]];
     if (motor.coordinates().scale() == incoming.scales[m]) continue;
-    return fail(motor.name() +
-                ": its offset or direction has changed since the path's first points came; send "
-                "the path again from its beginning");
+    return fail(
+        motor.name() +
+        ": its offset or direction has changed since the path's first points were received; send "
+        "the path again from its beginning");
   }
   return {};
 }

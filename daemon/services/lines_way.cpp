@@ -45,7 +45,7 @@ Result<void> Lines::may_be_one_line(const std::vector<MotorId>& motors) const {
   const auto not_at_port = std::ranges::find_if_not(motors, keeps_pace);
   if (not_at_port != motors.end()) {
     return fail(fmt::format(
-        "{} is at a serial port that makes pulses, and {} is not, but at {}: their steps have no "
+        "{} is at a serial port that makes pulses, and {} is connected to {}: their steps have no "
         "common time. Move them without --line, or connect both to such ports or both to one bus",
         installation_[*at_port].name(), installation_[*not_at_port].name(),
         installation_.mcu_of(*not_at_port).name()));

@@ -72,8 +72,8 @@ typedef struct bushd_mcu_config {
       queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
   uint32_t min_tick_ns;  // shorter ones are refused
   int32_t pulse_ns;  // how long STEP pulses last; 0: half a slot; less: so much shorter than that
-  uint16_t disabled_capabilities;  // BUSHD_CAN_* that it is too slow for: not in the identity, and
-                                   // refused
+  uint16_t disabled_capabilities;  // BUSHD_CAN_* below 1 << 16 that it does not have: not in
+                                   // the identity, and refused
   // Of motors 0 .. current_motors-1, whose windings' currents the port controls; all zero.
   bushd_mcu_currents* currents;
   uint8_t current_motors;  // at most BUSHD_MAX_CURRENT_MOTORS

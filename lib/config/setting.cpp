@@ -205,8 +205,8 @@ std::string_view why_not(SettingKey key) {
     case SettingKey::kVelocity:
       return "no local inputs move it; set local=true or keypad=true first";
     case SettingKey::kInputActive:
-      return "only a motor without `inputs`, whose input no other motor uses, has this setting; "
-             "change `inputs` in bushd.toml";
+      return "it is for a motor without `inputs`, where no other motor names the input with the "
+             "number of its output; change `inputs` in bushd.toml";
     case SettingKey::kLocal:
     case SettingKey::kKeypad:
       return "its bus has no MCU with local inputs or a keypad";

@@ -88,6 +88,7 @@ class RampMerger {
    public:
     void start(std::span<const PathRamp> ramps, bool decel, std::uint32_t flat);
     std::uint32_t delay() const { return leader_ == order_.size() ? 0 : order_[leader_].delay; }
+    // Precondition: delay() is not 0.
     std::uint64_t until() const { return leader().next; }
     void go_to(std::uint64_t step);
 

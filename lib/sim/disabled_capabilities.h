@@ -9,8 +9,9 @@
 
 namespace bushd::sim {
 
-// `capabilities`: BUSHD_CAN_*. `config` is as of an MCU that has them all; its port gives no
-// set_trigger without BUSHD_CAN_TRIGGER, and no set_current if current_motors is 0 then.
+// `capabilities`: BUSHD_CAN_*. `config` is as of an MCU that has them all. The caller's port gives
+// no set_trigger if BUSHD_CAN_TRIGGER is among them, and no set_current if current_motors is 0
+// afterwards.
 inline void disable_capabilities(std::uint32_t capabilities, bushd_mcu_config* config) {
   config->disabled_capabilities = static_cast<std::uint16_t>(capabilities & UINT16_MAX);
   if ((capabilities & BUSHD_CAN_CURRENTS) != 0) config->current_motors = 0;

@@ -337,6 +337,20 @@ TEST_F(WaitingLine, OutlivesLostParts) {
   EXPECT_EQ(sent[BUSHD_MSG_TICKS], 0);
 }
 
+// It waits half a second at most, and a step of the daemon takes no time here.
+TEST_F(WaitingLine, IsStreamedIfItsTableDoesNotArrive) {
+  sent.lost = BUSHD_MSG_TABLE_DATA;
+  const std::int64_t before_ns = lab.bus(0).now_ns();
+  const auto line = lab.send(line_to(kFour, kOwnTable));
+  ASSERT_TRUE(lab.run_until([&] { return !lab.replies(line).empty(); }, 2));
+  EXPECT_LE(lab.bus(0).now_ns() - before_ns, 510'000'000);
+  EXPECT_EQ(lab.wait(line).result, "reached");
+  EXPECT_EQ(sent[BUSHD_MSG_LINE_RUN], 0);
+  expect_rest_at(kOwnTable);
+  sent.lost.reset();
+  expect_reached();
+}
+
 // One that the MCU does not take is streamed.
 TEST_F(WaitingLine, EndsWithARefusal) {
   const auto line = begin();

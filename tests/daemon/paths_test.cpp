@@ -199,19 +199,27 @@ TEST(Paths, PointsAreMeantByOneOffset) {
   api::MovePath path = path_of({"m01", "m02"}, {0.5, 100});
   path.rows = 2;
   EXPECT_EQ(lab.wait(lab.send(path)).result, "done");
-  const auto change = lab.send(
-      api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", "offset", "10"}}});
-  ASSERT_EQ(lab.wait(change).result, "done");
-  path.first_row = 1;
-  path.positions = {10.25, 0};
-  const Answer answer = lab.wait(lab.send(path));
-  EXPECT_EQ(answer.result, "refused");
-  EXPECT_THAT(answer.reason, HasSubstr("m01: its offset or direction has changed"));
-  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  const auto configure = [](const char* key, const char* value) {
+    return api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", key, value}}};
+  };
+  for (const api::Request& change :
+       std::vector<api::Request>{configure("direction", "negative"), configure("offset", "20"),
+                                 api::SetPosition{.motors = {{"m01", api::UserUnits{10}}}}}) {
+    path.first_row = 0;
+    path.positions = {0.5, 100};
+    EXPECT_EQ(lab.wait(lab.send(path)).result, "done");
+    ASSERT_EQ(lab.wait(lab.send(change)).result, "done");
+    path.first_row = 1;
+    path.positions = {10.25, 0};
+    const Answer answer = lab.wait(lab.send(path));
+    EXPECT_EQ(answer.result, "refused");
+    EXPECT_THAT(answer.reason, HasSubstr("m01: its offset or direction has changed"));
+    EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  }
   path.first_row = 0;
   path.positions = {10.5, 100, 10.25, 0};
   EXPECT_EQ(lab.wait(lab.send(path)).result, "reached");
-  EXPECT_EQ(lab.shaft_steps("m01"), 100);
+  EXPECT_EQ(lab.shaft_steps("m01"), -100);
 }
 
 TEST(Paths, ADryRunTellsWhenEachPointIsReached) {

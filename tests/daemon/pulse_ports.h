@@ -1,8 +1,10 @@
 // A lab of serial ports that make pulses: their configuration, the table of their motors, and the
-// law of its runs. Times are those of the steps that virtual drives have made.
+// profile of their runs. Times are those of the steps that virtual drives have made.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 

@@ -116,6 +116,9 @@ Rig::Rig(RigOptions options)
   config.keypad = true;
   config.scratch = &scratch_;
   sim::disable_capabilities(options.disabled_capabilities, &config);
+  // These are the port's: the core sees by itself that it gives no function for them.
+  config.disabled_capabilities = static_cast<std::uint16_t>(
+      config.disabled_capabilities & ~(BUSHD_CAN_TRIGGER | BUSHD_CAN_CURRENTS));
   if ((options.disabled_capabilities & BUSHD_CAN_TRIGGER) == 0) {
     port.set_trigger = [](void* context, bushd_edge edge) {
       static_cast<Rig*>(context)->awaited_edge_ = edge;
