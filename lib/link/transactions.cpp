@@ -8,6 +8,8 @@ namespace bushd::link {
 void Transactions::reset() {
   receiver_ = {};
   open_.reset();
+  expired_.reset();
+  patience_us_ = kMaxPatienceUs;
 }
 
 void Transactions::ask(std::int64_t now_us, const Request& request) {
@@ -69,6 +71,7 @@ void Transactions::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
   Awaited* const from = awaited_from(frame);
   if (from == nullptr) {
     ++health_.stray_frames;
+    if (is_too_late(frame)) be_more_patient();
     return;
   }
   from->answered = true;
@@ -95,6 +98,17 @@ Transactions::Awaited* Transactions::awaited_from(const bushd_frame& frame) {
   return &*found;
 }
 
+bool Transactions::is_too_late(const bushd_frame& frame) {
+  const bool late = expired_ && frame.sequence == expired_->sequence &&
+                    frame.type == (expired_->type | BUSHD_TYPE_REPLY);
+  if (late) expired_.reset();
+  return late;
+}
+
+void Transactions::be_more_patient() {
+  patience_us_ = std::min(2 * patience_us_, kMaxPatienceUs);
+}
+
 // In which of several slots an answer came is not known here.
 void Transactions::note_latency(std::int64_t now_us, const Awaited& from) {
   if (open_->several) return;
@@ -105,14 +119,16 @@ void Transactions::note_latency(std::int64_t now_us, const Awaited& from) {
 }
 
 void Transactions::expire(std::int64_t now_us) {
-  if (open_ && now_us >= open_->timeout_us) finish(now_us);
+  if (!open_ || now_us < open_->timeout_us) return;
+  expired_ = Expired{.type = open_->type, .sequence = open_->sequence};
+  finish(now_us);
 }
 
 void Transactions::finish(std::int64_t now_us) {
   const Open over = *std::exchange(open_, std::nullopt);
   for (const Awaited& awaited : over.awaited) {
     if (awaited.answered || !listener_.unanswered(now_us, awaited.mcu, over.type)) continue;
-    patience_us_ = std::min(2 * patience_us_, kMaxPatienceUs);
+    be_more_patient();
   }
   listener_.ended(now_us, over.awaited.front().mcu, over.type);
 }

@@ -103,17 +103,26 @@ class Transactions {
     bool several;  // MCUs may answer in the place of one
   };
 
+  struct Expired {
+    std::uint8_t type;
+    std::uint8_t sequence;
+  };
+
   void handle_frame(std::int64_t now_us, const bushd_frame& frame);
   Awaited* awaited_from(const bushd_frame& frame);
   void note_latency(std::int64_t now_us, const Awaited& from);
+  bool is_too_late(const bushd_frame& frame);  // an answer to what has expired; true once
+  void be_more_patient();
   void finish(std::int64_t now_us);
 
   FrameWriter& writer_;
   Listener& listener_;
   bushd_receiver receiver_{};
   std::optional<Open> open_;
+  std::optional<Expired> expired_;
   // How long an answer may be late. All wait meanwhile, so it follows the latencies seen: from 40
-  // ms, which any adapter keeps, down to 10 ms on a good one.
+  // ms, which any adapter keeps, down to 10 ms on a good one. A newly opened port is perhaps that
+  // of another adapter.
   static constexpr std::int64_t kMaxPatienceUs = 40'000;
   static constexpr std::int64_t kMinPatienceUs = 10'000;
   std::int64_t patience_us_ = kMaxPatienceUs;

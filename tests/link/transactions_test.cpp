@@ -155,6 +155,36 @@ TEST_F(Transacting, PatienceFollowsLatencies) {
   EXPECT_EQ(patience_us(), 32'000) << "four latencies";
 }
 
+// Another adapter is perhaps slower. What answers too late is heard in time from then on.
+TEST_F(Transacting, PatienceGrowsWithAnAdapterThatIsSlower) {
+  const auto patience_us = [this] { return transactions.timeout_us() - transactions.quiet_us(); };
+  const auto learn = [this] {
+    for (int i = 0; i < 20; ++i) {
+      ask();
+      answer(9, BUSHD_MSG_CONTROL);
+    }
+    ask();
+  };
+  learn();
+  ASSERT_EQ(patience_us(), 10'000);
+  transactions.reset();
+  ask();
+  EXPECT_EQ(patience_us(), 40'000) << "of another port nothing is known yet";
+  learn();
+  ASSERT_EQ(patience_us(), 10'000);
+  expected = false;
+  now_us = transactions.timeout_us();
+  transactions.expire(now_us);
+  answer(9, BUSHD_MSG_CONTROL);
+  EXPECT_EQ(transactions.health().stray_frames, 1u);
+  ask();
+  EXPECT_EQ(patience_us(), 20'000) << "after an answer that came too late";
+  hear(9, BUSHD_MSG_CONTROL | BUSHD_TYPE_REPLY, static_cast<std::uint8_t>(sequence - 1));
+  hear(9, BUSHD_MSG_CONTROL | BUSHD_TYPE_REPLY, static_cast<std::uint8_t>(sequence - 2));
+  ask();
+  EXPECT_EQ(patience_us(), 20'000) << "once for each";
+}
+
 TEST_F(Transacting, AnswerThatLayUnreadIsNotInTime) {
   ask();
   now_us = transactions.timeout_us() + 1;
