@@ -280,7 +280,7 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
 }
 
 void Lines::step(std::int64_t now_us) {
-  if (!coming_.empty() && coming_.front().line.path->is_planned()) {
+  if (!coming_.empty() && coming_.front().path.line.path->is_planned()) {
     Coming planned = std::move(coming_.front());
     coming_.pop_front();
     begin_path(now_us, std::move(planned));

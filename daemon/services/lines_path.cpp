@@ -81,7 +81,7 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
   }
   if (good) good = same_scales(incoming->second);
   if (good) good = add_points(incoming->second, request);
-  if (good && *last) good = check_ends(incoming->second);
+  if (good && *last) good = check(incoming->second);
   if (good && *last && coming_.size() >= kMostComing) {
     good = fail(fmt::format("{} paths are being planned; try again in a moment", coming_.size()));
   }
@@ -96,14 +96,14 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
                                        .reason = "these points are taken; more are to come",
                                        .detail = {}});
   }
-  Line line = std::move(incoming->second.line);
-  incoming_.erase(incoming);
+  Line& line = incoming->second.line;
   line.rest = line.path;
   line.target = line.longest();
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     line.points.front().steps.push_back(line.path->point(line.path->segments(), i));
   }
-  coming_.push_back({asker, request.dry_run, std::move(line)});
+  coming_.push_back({asker, request.dry_run, std::move(incoming->second)});
+  incoming_.erase(incoming);
 }
 
 Result<Lines::Incoming> Lines::begin_points(const api::MovePath& request) const {
@@ -201,8 +201,9 @@ Result<std::uint16_t> Lines::floor_to(Incoming& incoming, std::int64_t point, do
 }
 
 // A motor may go where it may go to the ends of its way.
-Result<void> Lines::check_ends(const Incoming& incoming) const {
+Result<void> Lines::check(const Incoming& incoming) const {
   const Line& line = incoming.line;
+  if (auto same = same_scales(incoming); !same) return same;
   for (std::size_t m = 0; m < line.motors.size(); ++m) {
     const motion::Motor& motor = installation_[line.motors[m]];
     for (const auto& [row, steps] : {incoming.low[m], incoming.high[m]}) {
@@ -251,14 +252,15 @@ void Lines::work() {
       return;
     }
   }
-  if (!coming_.empty()) coming_.front().line.path->plan(kSegmentsPerSlice);
+  if (!coming_.empty()) coming_.front().path.line.path->plan(kSegmentsPerSlice);
 }
 
 void Lines::begin_path(std::int64_t now_us, Coming coming) {
-  auto& [asker, dry_run, line] = coming;
+  const api::Asker& asker = coming.asker;
+  Line& line = coming.path.line;
   const auto refuse = [&](const Error& why) { asker.answer(api::Refused{why.text()}); };
-  // A table that a path uses may have been replaced, so that this comes first.
-  if (const auto may = may_begin(line); !may) return refuse(may.error());
+  // Limits, offsets and tables may have been changed while it was planned; it uses the tables.
+  if (const auto may = check(coming.path); !may) return refuse(may.error());
   const motion::Path& path = *line.path;
   const double tick_ns = installation_[line.motors.front()].axis().tick_ns();
   const double longest_ns = tick_ns * motion::Axis::kMaxDurationTicks;
@@ -269,7 +271,7 @@ void Lines::begin_path(std::int64_t now_us, Coming coming) {
                           "days: make several paths of it",
                           duration_ns / 86400e9, longest_ns / 86400e9)});
   }
-  if (!dry_run) return start(now_us, asker, std::move(line));
+  if (!coming.dry_run) return start(now_us, asker, std::move(line));
   std::vector<DryRun::Part> parts;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     const std::int64_t from = path.point(0, i);

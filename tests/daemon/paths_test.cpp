@@ -222,6 +222,36 @@ TEST(Paths, PointsAreMeantByOneOffset) {
   EXPECT_EQ(lab.shaft_steps("m01"), -100);
 }
 
+TEST(Paths, AreRefusedIfWhatTheyWereCheckedByHasChangedWhileTheyWerePlanned) {
+  std::string toml = hall(1, 2);
+  toml.insert(toml.find("name = \"m01\""),
+              "unit = \"mm\"\nsteps_per_unit = 400\nsoft_limits = [-5, 5]\n");
+  Lab lab(toml);
+  lab.connect();
+  const auto configure = [](const char* key, const char* value) {
+    return api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", key, value}}};
+  };
+  api::MovePath path = path_of({"m01", "m02"}, {0.5, 100, 0.25, 0});
+  const std::vector<std::pair<api::Request, std::string>> changes{
+      {configure("direction", "negative"), "m01: its offset or direction has changed"},
+      {configure("direction", "positive"), "m01: its offset or direction has changed"},
+      {configure("offset", "1"), "m01: its offset or direction has changed"},
+      {configure("offset", "0"), "m01: its offset or direction has changed"},
+      {configure("soft_limits", "[-1, 0.25]"), "point 1, m01: target 0.5"}};
+  for (const auto& [change, reason] : changes) {
+    SCOPED_TRACE(reason);
+    const auto planned = lab.send(path);
+    ASSERT_FALSE(lab.has_result(planned));
+    ASSERT_EQ(lab.wait(lab.send(change)).result, "done");
+    const Answer answer = lab.wait(planned);
+    EXPECT_EQ(answer.result, "refused");
+    EXPECT_THAT(answer.reason, HasSubstr(reason));
+    EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  }
+  ASSERT_EQ(lab.wait(lab.send(configure("soft_limits", "[-1, 0.5]"))).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(path)).result, "reached");
+}
+
 TEST(Paths, ADryRunTellsWhenEachPointIsReached) {
   Lab lab(hall(1, 2));
   lab.connect();
