@@ -100,8 +100,10 @@ std::string summary_text(const World& world, double processor_s) {
                       world.witness().steps_commanded(), world.plant().steps_made(),
                       world.witness().steps_unaccounted());
   if (world.witness().ways() > 0) {
-    text += fmt::format("ways       {} lines and paths reached, {:.1f} steps off them at most\n",
-                        world.witness().ways(), world.witness().worst_off_way());
+    text += fmt::format(
+        "ways       {} lines and paths reached, {:.1f} steps off them at most, where "
+        "all MCUs changed at one tick\n",
+        world.witness().ways(), world.witness().worst_off_way());
   }
   text += fmt::format("skew       {:.1f} us between MCUs in step, at most\n",
                       static_cast<double>(world.skew().worst_ns()) / 1000);

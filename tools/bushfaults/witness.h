@@ -96,7 +96,8 @@ class Witness {
   std::uint64_t approaches() const { return approaches_; }
   std::uint64_t times_paused() const { return times_paused_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
-  // Lines and paths that were reached, and how far motors were off them, in steps.
+  // Lines and paths that were reached, and how far motors were off them, in steps, where all MCUs
+  // took each change at the same tick.
   std::uint64_t ways() const { return ways_; }
   double worst_off_way() const { return worst_off_way_; }
   // Between the last states and the motors, where the daemon claims to know.
@@ -173,6 +174,8 @@ class Witness {
     std::optional<JogOpen> jog{};
     std::vector<std::int64_t> polyline{};  // row by row, from where they stood, as the plant counts
     double off_way = 0;                    // at most, so far
+    // By motor: at which ticks its MCU has taken a pause, or another speed or end, on the way.
+    std::vector<std::vector<std::int64_t>> changed_at{};
     bool way_is_over = false;  // a motor of it, which has ended, moves for somebody else
     std::vector<std::uint64_t> changes{};        // of settings
     std::vector<std::optional<bool>> outside{};  // of its new limits; nothing: it is not known
@@ -231,6 +234,8 @@ class Witness {
   // Motors on one way, along a line or a path.
   void begin_way(Asked& asked);
   void watch_ways();
+  void run_changed(const Motor& motor, std::int64_t tick);
+  std::int64_t ticks_apart(const Asked& asked) const;
   void check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
   void run_begins(TimeNs now_ns, Motor& motor);
   void disarm_accepted(const Request& request);

@@ -106,11 +106,13 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
 
 // What a relative move counts from, as the plant counts.
 std::optional<std::int64_t> Witness::base_of(const Motor& motor) const {
-  if (motor.moves()) return motor.target;
-  if (!motor.stands_paused()) return plant_steps(motor);
-  // Nobody has told whether it is paused, or has come to its end while others of it move.
-  if (asked_.at(*motor.move).request.motors.size() == 1) return motor.target;
-  return std::nullopt;
+  if (!motor.move || (motor.over && !motor.pauses)) return plant_steps(motor);
+  // Of several nobody has told whether this one waits for the trigger, or waits no more; whether it
+  // is paused, or has come to its end while others of it move.
+  const Asked& asked = asked_.at(*motor.move);
+  const bool begins = asked.began.empty() || asked.began[asked.index_of(motor.name)];
+  if (asked.request.motors.size() > 1 && (motor.over || !begins)) return std::nullopt;
+  return motor.target;
 }
 
 // As the EPICS motor record does it. One that moves always makes both.
@@ -267,8 +269,10 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
                            line.at("motors").front());
   }
   const bool begins = line.at("event") == "move";
-  if (!begins && line.at("event") != "result") return;
+  const bool changes = line.at("event") == "stop" || line.at("event") == "retarget";
+  if (!begins && !changes && line.at("event") != "result") return;
   Motor& motor = *find(line.at("motor").get<std::string>());
+  if (changes) return run_changed(motor, line.at("tick"));
   if (begins && on_run) {
     const bool on_line = line.contains("line") || line.contains("path") || line.contains("array");
     on_run(now_ns, motor.mcu, motor.output, on_line);

@@ -78,24 +78,59 @@ void Witness::watch_ways() {
   }
 }
 
+void Witness::run_changed(const Motor& motor, std::int64_t tick) {
+  if (!motor.move) return;
+  Asked& asked = asked_.at(*motor.move);
+  if (asked.polyline.empty()) return;
+  asked.changed_at.resize(asked.request.motors.size());
+  asked.changed_at[asked.index_of(motor.name)].push_back(tick);
+}
+
+// An MCU that did not hear of a change in time takes it later than the others: in as many ticks it
+// leaves them, until it stands where they do. Added up over the changes of one motor, each of which
+// is the same one as that of another motor which is nearest to it.
+std::int64_t Witness::ticks_apart(const Asked& asked) const {
+  std::int64_t most = 0;
+  for (const std::vector<std::int64_t>& own : asked.changed_at) {
+    std::int64_t sum = 0;
+    for (const std::int64_t tick : own) {
+      std::int64_t farthest = 0;
+      for (const std::vector<std::int64_t>& others : asked.changed_at) {
+        std::int64_t nearest = others.empty() ? 0 : INT64_MAX;
+        for (const std::int64_t other : others) {
+          nearest = std::min(nearest, std::abs(other - tick));
+        }
+        farthest = std::max(farthest, nearest);
+      }
+      sum += farthest;
+    }
+    most = std::max(most, sum);
+  }
+  return most;
+}
+
 // Each motor is within half a step of its place, by the run of all; a step of a streamed tick, and
 // an MCU that has only just been brought into step, is off by up to a tick (sim/pace.h), in which a
-// motor makes so many steps, and one more. The nearest point is no farther than that of the same
-// time. A motor that was not ramped down with the others ends otherwise than by reaching its end.
+// motor makes so many steps, and one more; in the ticks between two MCUs' changes as many each. The
+// nearest point is no farther than that of the same time. A motor that was not ramped down with the
+// others ends otherwise than by reaching its end.
 void Witness::check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result) {
   if (asked.polyline.empty() || result.outcome != bushd::api::Outcome::kReached) return;
   ++ways_;
+  const std::int64_t apart = ticks_apart(asked);
+  const TimeNs late_ns = (apart + 1) * config_.buses.front().tick_ns();
   double square = 0;
   for (const std::string& name : asked.request.motors) {
     const bushd_table& table = config_.table_of(config_.motors[index_of(*find(name))]).view();
     const double step_ns = static_cast<double>(table.cruise) * table.time_unit_ns;
-    const double most = 1.5 + static_cast<double>(config_.buses.front().tick_ns()) / step_ns;
+    const double most = 1.5 + static_cast<double>(late_ns) / step_ns;
     square += most * most;
   }
-  worst_off_way_ = std::max(worst_off_way_, asked.off_way);
+  if (apart == 0) worst_off_way_ = std::max(worst_off_way_, asked.off_way);
   if (asked.off_way * asked.off_way <= square) return;
-  violated(now_ns, fmt::format("{:.1f} steps off the way, and {:.1f} are possible: {}",
-                               asked.off_way, std::sqrt(square), text_of(asked.request)));
+  violated(now_ns, fmt::format("{:.1f} steps off the way, and {:.1f} are possible, its MCUs having "
+                               "changed {} ticks apart: {}",
+                               asked.off_way, std::sqrt(square), apart, text_of(asked.request)));
 }
 
 }  // namespace bushfaults

@@ -99,8 +99,9 @@ void World::add_motors() {
   };
   witness_.on_run_end = [this](TimeNs at_ns, std::size_t mcu, std::size_t output,
                                const std::string& word) {
-    const bool planned = word == "reached" || word == "stopped" || word == "turned";
-    plant_.rest_on_line(at_ns, mcu, output, planned);
+    // Otherwise its MCU was lost, or went its own way, and may not rest yet.
+    const bool rests = word != "link" && word != "fault";
+    plant_.rest_on_line(at_ns, mcu, output, rests);
   };
   plant_.on_violation = [this](TimeNs time_ns, std::size_t mcu, std::size_t output,
                                const std::string& what) {
