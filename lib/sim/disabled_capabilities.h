@@ -1,4 +1,4 @@
-// How a simulated MCU, or the firmware core in a test, is made one that lacks capabilities. The
+// How a simulated MCU, or the firmware core in a test, is made one with disabled capabilities. The
 // core has a mask of 16 bits, and knows the others by what its port gives it: here all are one
 // mask.
 #pragma once

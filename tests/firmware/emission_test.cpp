@@ -124,7 +124,7 @@ TEST(Emission, SettingsThatSlotsCannotKeepAreRefusedWithTheirStatus) {
       << "what is refused changes nothing";
 }
 
-TEST(Emission, ModeThatThePortLacksIsRefused) {
+TEST(Emission, ModeThatThePortDoesNotSupportIsRefused) {
   Rig rig({.disabled_capabilities = BUSHD_CAN_PHASES});
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_PHASES, 0);
   rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);

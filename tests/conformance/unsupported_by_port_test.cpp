@@ -1,4 +1,4 @@
-// What an MCU may have and a port does not have, with the reason, and that the port denies it. The
+// What an MCU may support and a port does not, with the reason, and that the port denies it. The
 // list is compared with the capabilities in docs/protocol.md, so it is complete.
 #include <cstdio>
 #include <fstream>
@@ -12,14 +12,14 @@
 namespace bushd::test {
 namespace {
 
-struct Lack {
+struct Unsupported {
   const char* name;          // the protocol's, as far as names of tests can have it
   std::uint32_t capability;  // of docs/protocol.md; 0: `says_no` tells
   bool (*says_no)(PulseBench& bench);
   const char* why;
 };
 constexpr bool (*kByCapability)(PulseBench&) = nullptr;
-const std::vector<Lack> kLacks = {
+const std::vector<Unsupported> kUnsupported = {
     {"TICKS", 0, [](PulseBench& bench) { return !bench.master().streams(); },
      "no step can be put at a time: bytes leave when they leave"},
     {"several_motors", 0,
@@ -68,46 +68,46 @@ std::map<std::uint32_t, std::string> capabilities_of_protocol() {
   return capabilities;
 }
 
-class PortLacks : public testing::TestWithParam<Lack> {};
-INSTANTIATE_TEST_SUITE_P(A, PortLacks, testing::ValuesIn(kLacks),
-                         [](auto& lack) { return std::string(lack.param.name); });
+class UnsupportedByPort : public testing::TestWithParam<Unsupported> {};
+INSTANTIATE_TEST_SUITE_P(Is, UnsupportedByPort, testing::ValuesIn(kUnsupported),
+                         [](auto& entry) { return std::string(entry.param.name); });
 
-TEST_P(PortLacks, IsDenied) {
-  const Lack& lack = GetParam();
-  std::printf("  a port lacks %s: %s\n", lack.name, lack.why);
-  RecordProperty("lacks", lack.name);
-  RecordProperty("why", lack.why);
+TEST_P(UnsupportedByPort, IsDenied) {
+  const Unsupported& entry = GetParam();
+  std::printf("  a port does not support %s: %s\n", entry.name, entry.why);
+  RecordProperty("unsupported", entry.name);
+  RecordProperty("why", entry.why);
   for (const PortTarget& target : port_targets()) {
     SCOPED_TRACE(target.name);
     PulseBench bench(target);
-    if (lack.says_no != nullptr) {
-      EXPECT_TRUE(lack.says_no(bench));
+    if (entry.says_no != nullptr) {
+      EXPECT_TRUE(entry.says_no(bench));
     } else {
-      EXPECT_EQ(bench.master().view({0}).identity.capabilities & lack.capability, 0u);
+      EXPECT_EQ(bench.master().view({0}).identity.capabilities & entry.capability, 0u);
     }
   }
 }
 
-class PortOffers : public testing::TestWithParam<PortTarget> {};
-INSTANTIATE_TEST_SUITE_P(Of, PortOffers, testing::ValuesIn(port_targets()),
+class SupportedByPort : public testing::TestWithParam<PortTarget> {};
+INSTANTIATE_TEST_SUITE_P(Is, SupportedByPort, testing::ValuesIn(port_targets()),
                          [](auto& target) { return target.param.name; });
 
 // Every capability of the protocol, but for those that are listed above; and no bit beyond them.
-TEST_P(PortOffers, WhatIsNotListedAsLacking) {
+TEST_P(SupportedByPort, WhatIsNotListedAsUnsupported) {
   std::map<std::uint32_t, std::string> left = capabilities_of_protocol();
   ASSERT_GE(left.size(), 19u) << "the table of capabilities was not found in docs/protocol.md";
-  for (const Lack& lack : kLacks) {
-    if (lack.capability == 0) continue;
-    EXPECT_EQ(left.erase(lack.capability), 1u)
-        << lack.name << " is listed twice, or is no capability of the protocol";
+  for (const Unsupported& entry : kUnsupported) {
+    if (entry.capability == 0) continue;
+    EXPECT_EQ(left.erase(entry.capability), 1u)
+        << entry.name << " is listed twice, or is no capability of the protocol";
   }
   PulseBench bench(GetParam());
-  std::uint32_t offered = bench.master().view({0}).identity.capabilities;
+  std::uint32_t supported = bench.master().view({0}).identity.capabilities;
   for (const auto& [bit, words] : left) {
-    EXPECT_NE(offered & bit, 0u) << '"' << words << "\" is neither offered nor listed as lacking";
-    offered &= ~bit;
+    EXPECT_NE(supported & bit, 0u) << '"' << words << "\" is neither supported nor listed";
+    supported &= ~bit;
   }
-  EXPECT_EQ(offered, 0u) << "no capability of the protocol, or listed as lacking";
+  EXPECT_EQ(supported, 0u) << "no capability of the protocol, or listed as unsupported";
 }
 
 }  // namespace
