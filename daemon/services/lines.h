@@ -149,7 +149,7 @@ class Lines final : public Service {
   Result<void> same_scales(const Incoming& incoming) const;
   Result<void> add_points(Incoming& incoming, const api::MovePath& request) const;
   Result<std::uint16_t> floor_to(Incoming& incoming, std::int64_t point, double speed) const;
-  Result<void> check(const Incoming& incoming) const;
+  Result<void> may_follow(const Incoming& incoming) const;
   Result<void> may_begin(const Line& line) const;
   void begin_path(std::int64_t now_us, Coming coming);
 

@@ -81,7 +81,7 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
   }
   if (good) good = same_scales(incoming->second);
   if (good) good = add_points(incoming->second, request);
-  if (good && *last) good = check(incoming->second);
+  if (good && *last) good = may_follow(incoming->second);
   if (good && *last && coming_.size() >= kMostComing) {
     good = fail(fmt::format("{} paths are being planned; try again in a moment", coming_.size()));
   }
@@ -200,9 +200,11 @@ Result<std::uint16_t> Lines::floor_to(Incoming& incoming, std::int64_t point, do
   return std::max(*floor, line.points.front().floors.front());
 }
 
-// A motor may go where it may go to the ends of its way.
-Result<void> Lines::check(const Incoming& incoming) const {
+// All stand at its beginning, points are still the steps that they were, and each motor may go to
+// the ends of its way.
+Result<void> Lines::may_follow(const Incoming& incoming) const {
   const Line& line = incoming.line;
+  if (auto may = may_begin(line); !may) return may;
   if (auto same = same_scales(incoming); !same) return same;
   for (std::size_t m = 0; m < line.motors.size(); ++m) {
     const motion::Motor& motor = installation_[line.motors[m]];
@@ -213,7 +215,7 @@ Result<void> Lines::check(const Incoming& incoming) const {
       return fail(fmt::format("{}{}: {}", where, motor.name(), may.error().text()));
     }
   }
-  return may_begin(line);
+  return {};
 }
 
 // All stand where the path begins, and nothing keeps them there.
@@ -259,8 +261,8 @@ void Lines::begin_path(std::int64_t now_us, Coming coming) {
   const api::Asker& asker = coming.asker;
   Line& line = coming.path.line;
   const auto refuse = [&](const Error& why) { asker.answer(api::Refused{why.text()}); };
-  // Limits, offsets and tables may have been changed while it was planned; it uses the tables.
-  if (const auto may = check(coming.path); !may) return refuse(may.error());
+  // This comes first: the path points to tables, which may have been replaced while it was planned.
+  if (const auto may = may_follow(coming.path); !may) return refuse(may.error());
   const motion::Path& path = *line.path;
   const double tick_ns = installation_[line.motors.front()].axis().tick_ns();
   const double longest_ns = tick_ns * motion::Axis::kMaxDurationTicks;

@@ -205,7 +205,7 @@ std::string_view why_not(SettingKey key) {
     case SettingKey::kVelocity:
       return "no local inputs move it; set local=true or keypad=true first";
     case SettingKey::kInputActive:
-      return "it is for a motor without `inputs`, where no other motor names the input with the "
+      return "it needs a motor without `inputs`, and no other motor may use the input that has the "
              "number of its output; change `inputs` in bushd.toml";
     case SettingKey::kLocal:
     case SettingKey::kKeypad:

@@ -8,7 +8,7 @@ namespace bushd::link {
 void Transactions::reset() {
   receiver_ = {};
   open_.reset();
-  expired_.reset();
+  expired_ = {};
   patience_us_ = kMaxPatienceUs;
 }
 
@@ -71,7 +71,7 @@ void Transactions::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
   Awaited* const from = awaited_from(frame);
   if (from == nullptr) {
     ++health_.stray_frames;
-    if (is_too_late(frame)) be_more_patient();
+    if (take_if_expired(frame)) be_more_patient();
     return;
   }
   from->answered = true;
@@ -98,11 +98,16 @@ Transactions::Awaited* Transactions::awaited_from(const bushd_frame& frame) {
   return &*found;
 }
 
-bool Transactions::is_too_late(const bushd_frame& frame) {
-  const bool late = expired_ && frame.sequence == expired_->sequence &&
-                    frame.type == (expired_->type | BUSHD_TYPE_REPLY);
-  if (late) expired_.reset();
-  return late;
+// That of another master may have the same type and sequence number: then less is lost than with
+// answers that are never awaited.
+bool Transactions::take_if_expired(const bushd_frame& frame) {
+  const auto found = std::ranges::find_if(expired_, [&](const std::optional<Expired>& request) {
+    return request && frame.sequence == request->sequence &&
+           frame.type == (request->type | BUSHD_TYPE_REPLY);
+  });
+  if (found == expired_.end()) return false;
+  found->reset();
+  return true;
 }
 
 void Transactions::be_more_patient() {
@@ -120,7 +125,8 @@ void Transactions::note_latency(std::int64_t now_us, const Awaited& from) {
 
 void Transactions::expire(std::int64_t now_us) {
   if (!open_ || now_us < open_->timeout_us) return;
-  expired_ = Expired{.type = open_->type, .sequence = open_->sequence};
+  std::ranges::rotate(expired_, expired_.begin() + 1);
+  expired_.back() = Expired{.type = open_->type, .sequence = open_->sequence};
   finish(now_us);
 }
 

@@ -5,6 +5,7 @@
 // them.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -111,7 +112,8 @@ class Transactions {
   void handle_frame(std::int64_t now_us, const bushd_frame& frame);
   Awaited* awaited_from(const bushd_frame& frame);
   void note_latency(std::int64_t now_us, const Awaited& from);
-  bool is_too_late(const bushd_frame& frame);  // an answer to what has expired; true once
+  // An answer to what has expired is taken once.
+  bool take_if_expired(const bushd_frame& frame);
   void be_more_patient();
   void finish(std::int64_t now_us);
 
@@ -119,10 +121,11 @@ class Transactions {
   Listener& listener_;
   bushd_receiver receiver_{};
   std::optional<Open> open_;
-  std::optional<Expired> expired_;
+  // The last ones, oldest first: as many as expire within 40 ms if each is awaited for 10 ms.
+  std::array<std::optional<Expired>, 4> expired_;
   // How long an answer may be late. All wait meanwhile, so it follows the latencies seen: from 40
-  // ms, which any adapter keeps, down to 10 ms on a good one. A newly opened port is perhaps that
-  // of another adapter.
+  // ms, which any adapter keeps, down to 10 ms on a good one. An opened port begins with the
+  // longest: it may belong to another adapter.
   static constexpr std::int64_t kMaxPatienceUs = 40'000;
   static constexpr std::int64_t kMinPatienceUs = 10'000;
   std::int64_t patience_us_ = kMaxPatienceUs;

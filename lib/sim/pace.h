@@ -103,7 +103,7 @@ class Pace {
 
   // A step at t_ns, not before the last one. O(1) amortised.
   Jump step(TimeNs t_ns, bool positive);
-  // Its next motion, from rest, is one of a line, until it is said to rest. Without `ramped_down`
+  // Its next motion, from rest, is one of a line, until it is said to rest. Without `rests`
   // it may still move, along the line, for as long as its MCU goes on without a master, by what is
   // queued or by a run of its own.
   // A line before that was forgotten is over where it has made no step for so long as at rest.
@@ -112,9 +112,9 @@ class Pace {
     on_line_ = told_ = true;
     line_until_ns_ = kNever;
   }
-  Jump rest_on_line(TimeNs now_ns, bool ramped_down) {
+  Jump rest_on_line(TimeNs now_ns, bool rests) {
     if (!on_line_) return Jump::kNone;
-    if (!ramped_down) {
+    if (!rests) {
       line_until_ns_ = now_ns + kMostSilenceNs + rules_->ramp_down_ns(rules_->last()) +
                        rules_->longest_told_ns();
       return Jump::kNone;

@@ -120,9 +120,9 @@ void Plant::settled(TimeNs until_ns) {
   }
 }
 
-void Plant::rest_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output, bool ramped_down) {
+void Plant::rest_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output, bool rests) {
   Motor& motor = *motor_of_[mcu].at(output);
-  report(now_ns, mcu, output, motor, motor.pace.rest_on_line(now_ns, ramped_down));
+  report(now_ns, mcu, output, motor, motor.pace.rest_on_line(now_ns, rests));
 }
 
 void Plant::cut(std::size_t mcu) {

@@ -30,7 +30,7 @@ class Plant final : public EdgeSink {
   void forget_line(std::size_t mcu, std::size_t output) {
     motor_of_[mcu].at(output)->pace.forget_line();
   }
-  void rest_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output, bool ramped_down);
+  void rest_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output, bool rests);
 
   // Puts a rotor on that motor; `rules` outlive the plant. It slips where the torque does not hold
   // it, which is a violation. Its driver is taken to be on all the time.

@@ -70,7 +70,7 @@ TEST(Setting, VelocityAndCurrentsHaveOneTextAndReadBack) {
 TEST(Setting, TheLevelOfAnInputIsAWord) {
   Settings settings = blade();
   EXPECT_THAT(with(settings, SettingKey::kInputActive, "open").error().message,
-              HasSubstr("it is for a motor without `inputs`"));
+              HasSubstr("it needs a motor without `inputs`"));
   settings.has_one_input = true;
   EXPECT_EQ(text_of(settings, SettingKey::kInputActive), "closed");
   EXPECT_FALSE(is_reported(settings, SettingKey::kInputActive));

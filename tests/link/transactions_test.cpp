@@ -170,6 +170,7 @@ TEST_F(Transacting, PatienceGrowsWithAnAdapterThatIsSlower) {
   transactions.reset();
   ask();
   EXPECT_EQ(patience_us(), 40'000) << "of another port nothing is known yet";
+  answer(9, BUSHD_MSG_CONTROL);
   learn();
   ASSERT_EQ(patience_us(), 10'000);
   expected = false;
@@ -181,8 +182,38 @@ TEST_F(Transacting, PatienceGrowsWithAnAdapterThatIsSlower) {
   EXPECT_EQ(patience_us(), 20'000) << "after an answer that came too late";
   hear(9, BUSHD_MSG_CONTROL | BUSHD_TYPE_REPLY, static_cast<std::uint8_t>(sequence - 1));
   hear(9, BUSHD_MSG_CONTROL | BUSHD_TYPE_REPLY, static_cast<std::uint8_t>(sequence - 2));
+  answer(9, BUSHD_MSG_CONTROL);
   ask();
-  EXPECT_EQ(patience_us(), 20'000) << "once for each";
+  EXPECT_EQ(patience_us(), 17'500) << "once for each; and it falls by an eighth";
+}
+
+// It is 25 ms late, and others have been sent and given up meanwhile.
+TEST_F(Transacting, PatienceGrowsWithAnAnswerToAnEarlierRequest) {
+  const auto patience_us = [this] { return transactions.timeout_us() - transactions.quiet_us(); };
+  for (int i = 0; i < 20; ++i) {
+    ask();
+    answer(9, BUSHD_MSG_CONTROL);
+  }
+  expected = false;
+  for (int i = 0; i < 4; ++i) {
+    ask();
+    now_us = transactions.timeout_us();
+    transactions.expire(now_us);
+  }
+  poll();
+  now_us = transactions.timeout_us();
+  transactions.expire(now_us);
+  ask();
+  ASSERT_EQ(patience_us(), 10'000);
+  hear(9, BUSHD_MSG_CONTROL | BUSHD_TYPE_REPLY, static_cast<std::uint8_t>(sequence - 5));
+  answer(9, BUSHD_MSG_CONTROL);
+  ask();
+  EXPECT_EQ(patience_us(), 10'000) << "that was too long ago";
+  hear(9, BUSHD_MSG_CONTROL | BUSHD_TYPE_REPLY, static_cast<std::uint8_t>(sequence - 5));
+  hear(9, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY, static_cast<std::uint8_t>(sequence - 2));
+  answer(9, BUSHD_MSG_CONTROL);
+  ask();
+  EXPECT_EQ(patience_us(), 35'000) << "both were too late";
 }
 
 TEST_F(Transacting, AnswerThatLayUnreadIsNotInTime) {

@@ -100,10 +100,12 @@ std::string summary_text(const World& world, double processor_s) {
                       world.witness().steps_commanded(), world.plant().steps_made(),
                       world.witness().steps_unaccounted());
   if (world.witness().ways() > 0) {
+    const Witness& witness = world.witness();
     text += fmt::format(
-        "ways       {} lines and paths reached, {:.1f} steps off them at most, where "
-        "all MCUs changed at one tick\n",
-        world.witness().ways(), world.witness().worst_off_way());
+        "ways       {} lines and paths reached, {:.1f} steps off them at most; {} of them changed "
+        "at "
+        "different ticks, {} apart at most\n",
+        witness.ways(), witness.worst_off_way(), witness.ways_apart(), witness.most_ticks_apart());
   }
   text += fmt::format("skew       {:.1f} us between MCUs in step, at most\n",
                       static_cast<double>(world.skew().worst_ns()) / 1000);

@@ -96,9 +96,11 @@ class Witness {
   std::uint64_t approaches() const { return approaches_; }
   std::uint64_t times_paused() const { return times_paused_; }
   std::uint64_t steps_commanded() const { return steps_commanded_; }
-  // Lines and paths that were reached, and how far motors were off them, in steps, where all MCUs
-  // took each change at the same tick.
+  // Lines and paths that were reached, those of them that MCUs changed at different ticks, how far
+  // apart these were at most, and how many steps motors were off the others.
   std::uint64_t ways() const { return ways_; }
+  std::uint64_t ways_apart() const { return ways_apart_; }
+  std::int64_t most_ticks_apart() const { return most_ticks_apart_; }
   double worst_off_way() const { return worst_off_way_; }
   // Between the last states and the motors, where the daemon claims to know.
   std::uint64_t steps_unaccounted() const;
@@ -174,8 +176,13 @@ class Witness {
     std::optional<JogOpen> jog{};
     std::vector<std::int64_t> polyline{};  // row by row, from where they stood, as the plant counts
     double off_way = 0;                    // at most, so far
-    // By motor: at which ticks its MCU has taken a pause, or another speed or end, on the way.
+    // By motor: at which ticks its MCU has taken a pause, or another speed or end, since all stood
+    // at one place of the way; how far apart MCUs have been before that, and how many runs have
+    // begun now.
     std::vector<std::vector<std::int64_t>> changed_at{};
+    std::int64_t most_ticks_apart = 0;
+    TimeNs runs_begun_ns = -1;
+    std::size_t runs_begun = 0;
     bool way_is_over = false;  // a motor of it, which has ended, moves for somebody else
     std::vector<std::uint64_t> changes{};        // of settings
     std::vector<std::optional<bool>> outside{};  // of its new limits; nothing: it is not known
@@ -234,8 +241,8 @@ class Witness {
   // Motors on one way, along a line or a path.
   void begin_way(Asked& asked);
   void watch_ways();
+  static void run_of_way_begins(TimeNs now_ns, Asked& asked);
   void run_changed(const Motor& motor, std::int64_t tick);
-  std::int64_t ticks_apart(const Asked& asked) const;
   void check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result);
   void run_begins(TimeNs now_ns, Motor& motor);
   void disarm_accepted(const Request& request);
@@ -308,6 +315,8 @@ class Witness {
   std::uint64_t times_paused_ = 0;
   std::uint64_t steps_commanded_ = 0;
   std::uint64_t ways_ = 0;
+  std::uint64_t ways_apart_ = 0;
+  std::int64_t most_ticks_apart_ = 0;
   double worst_off_way_ = 0;
 };
 

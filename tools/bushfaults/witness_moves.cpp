@@ -107,11 +107,11 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
 // What a relative move counts from, as the plant counts.
 std::optional<std::int64_t> Witness::base_of(const Motor& motor) const {
   if (!motor.move || (motor.over && !motor.pauses)) return plant_steps(motor);
-  // Of several nobody has told whether this one waits for the trigger, or waits no more; whether it
-  // is paused, or has come to its end while others of it move.
+  // Of several motors nobody has told whether one that was to wait for the trigger still does.
+  // Likewise one that rests may be paused, or have come to its end while others move.
   const Asked& asked = asked_.at(*motor.move);
-  const bool begins = asked.began.empty() || asked.began[asked.index_of(motor.name)];
-  if (asked.request.motors.size() > 1 && (motor.over || !begins)) return std::nullopt;
+  const bool begun = asked.began.empty() || asked.began[asked.index_of(motor.name)];
+  if (asked.request.motors.size() > 1 && (motor.over || !begun)) return std::nullopt;
   return motor.target;
 }
 
@@ -292,6 +292,7 @@ void Witness::run_begins(TimeNs now_ns, Motor& motor) {
   asked.began[index] = true;
   if (motor.over && !motor.goes_on) violated(now_ns, motor.name + " moves on after its end");
   motor.over = motor.goes_on = false;
+  if (!asked.polyline.empty()) run_of_way_begins(now_ns, asked);
   // The trigger may have begun it a while ago.
   motor.run_from = waited ? asked.from[index] : plant_steps(motor);
   if (waited && asked.request.line) pause_with_others(motor, asked);

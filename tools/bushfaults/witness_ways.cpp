@@ -35,6 +35,29 @@ double off_polyline(const std::vector<std::int64_t>& rows, const std::vector<std
   return least;
 }
 
+// An MCU that did not hear of a change in time takes it later than the others: in as many ticks it
+// leaves them. Added up over the changes of one motor, each of which is the same one as that of
+// another motor which is nearest to it. A motor without changes has come to the end of its run.
+std::int64_t ticks_apart(const std::vector<std::vector<std::int64_t>>& changed_at) {
+  std::int64_t most = 0;
+  for (const std::vector<std::int64_t>& own : changed_at) {
+    std::int64_t sum = 0;
+    for (const std::int64_t tick : own) {
+      std::int64_t farthest = 0;
+      for (const std::vector<std::int64_t>& others : changed_at) {
+        std::int64_t nearest = others.empty() ? 0 : INT64_MAX;
+        for (const std::int64_t other : others) {
+          nearest = std::min(nearest, std::abs(other - tick));
+        }
+        farthest = std::max(farthest, nearest);
+      }
+      sum += farthest;
+    }
+    most = std::max(most, sum);
+  }
+  return most;
+}
+
 }  // namespace
 
 // Where all of it is known, and all motors rest.
@@ -78,6 +101,15 @@ void Witness::watch_ways() {
   }
 }
 
+// All of its motors begin a run at once where they stand at one place. Others only catch up.
+void Witness::run_of_way_begins(TimeNs now_ns, Asked& asked) {
+  if (now_ns != asked.runs_begun_ns) asked.runs_begun = 0;
+  asked.runs_begun_ns = now_ns;
+  if (++asked.runs_begun < asked.request.motors.size()) return;
+  asked.most_ticks_apart = std::max(asked.most_ticks_apart, ticks_apart(asked.changed_at));
+  asked.changed_at.clear();
+}
+
 void Witness::run_changed(const Motor& motor, std::int64_t tick) {
   if (!motor.move) return;
   Asked& asked = asked_.at(*motor.move);
@@ -86,38 +118,19 @@ void Witness::run_changed(const Motor& motor, std::int64_t tick) {
   asked.changed_at[asked.index_of(motor.name)].push_back(tick);
 }
 
-// An MCU that did not hear of a change in time takes it later than the others: in as many ticks it
-// leaves them, until it stands where they do. Added up over the changes of one motor, each of which
-// is the same one as that of another motor which is nearest to it.
-std::int64_t Witness::ticks_apart(const Asked& asked) const {
-  std::int64_t most = 0;
-  for (const std::vector<std::int64_t>& own : asked.changed_at) {
-    std::int64_t sum = 0;
-    for (const std::int64_t tick : own) {
-      std::int64_t farthest = 0;
-      for (const std::vector<std::int64_t>& others : asked.changed_at) {
-        std::int64_t nearest = others.empty() ? 0 : INT64_MAX;
-        for (const std::int64_t other : others) {
-          nearest = std::min(nearest, std::abs(other - tick));
-        }
-        farthest = std::max(farthest, nearest);
-      }
-      sum += farthest;
-    }
-    most = std::max(most, sum);
-  }
-  return most;
-}
-
 // Each motor is within half a step of its place, by the run of all; a step of a streamed tick, and
 // an MCU that has only just been brought into step, is off by up to a tick (sim/pace.h), in which a
-// motor makes so many steps, and one more; in the ticks between two MCUs' changes as many each. The
-// nearest point is no farther than that of the same time. A motor that was not ramped down with the
-// others ends otherwise than by reaching its end.
+// motor makes so many steps, and one more; in the ticks between two MCUs' changes as many each.
+// (One that speeds up meanwhile ramps down from a greater speed, too. That the way is left by one
+// side of the motors only, and the bound counts all, makes up for it.) The nearest point is no
+// farther than that of the same time. A motor that was not ramped down with the others ends
+// otherwise than by reaching its end.
 void Witness::check_way(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result) {
   if (asked.polyline.empty() || result.outcome != bushd::api::Outcome::kReached) return;
   ++ways_;
-  const std::int64_t apart = ticks_apart(asked);
+  const std::int64_t apart = std::max(asked.most_ticks_apart, ticks_apart(asked.changed_at));
+  most_ticks_apart_ = std::max(most_ticks_apart_, apart);
+  ways_apart_ += apart != 0 ? 1u : 0u;
   const TimeNs late_ns = (apart + 1) * config_.buses.front().tick_ns();
   double square = 0;
   for (const std::string& name : asked.request.motors) {
