@@ -87,10 +87,10 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.told.push_back(false);
   asked.stops.push_back(false);
   // The trigger begins it before anybody tells; what came before is over.
-  if (request.ask == Ask::kArm && request.line && on_run && on_run_end) {
-    on_run(now_ns, motor.mcu, motor.output, true);
-    on_run_end(now_ns, motor.mcu, motor.output, "stopped");
-    on_run(now_ns, motor.mcu, motor.output, true);
+  if (request.ask == Ask::kArm && on_run && on_run_end) {
+    on_run(now_ns, motor.mcu, motor.output, request.line);
+    if (request.line) on_run_end(now_ns, motor.mcu, motor.output, "stopped");
+    if (request.line) on_run(now_ns, motor.mcu, motor.output, true);
   }
   if (is_shutter(motor) && request.client != ShutterModel::kClient) shutter_.disturbed();
   if (request.ask == Ask::kHome) {
