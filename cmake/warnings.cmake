@@ -14,7 +14,7 @@ function(bushd_target target)
   endif()
   if(BUSHD_SANITIZE)
     # With the pattern, a pointer that was never set fails at its first use, whatever the stack held. In C++ it would take
-    # a tenth of the time of build and tests.
+    # a tenth of the build's time.
     #
     # In C++, checks of pointers are left to AddressSanitizer: those of UBSan are a quarter of what the build takes.
     #
