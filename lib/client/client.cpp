@@ -50,11 +50,21 @@ std::int64_t unix_time_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count();
 }
 
+// "": it is not set.
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value != nullptr ? value : "";
+}
+
 std::vector<std::string> socket_paths(const ClientOptions& options) {
   if (!options.socket.empty()) return {options.socket};
-  const char* path = std::getenv("BUSHD_CONTROL");
-  if (path != nullptr && *path != '\0') return {path};
+  if (std::string path = environment("BUSHD_CONTROL"); !path.empty()) return {std::move(path)};
   return control::default_paths();
+}
+
+// By the caller or by the user; "": by nobody.
+std::string named_url(const std::string& given) {
+  return given.empty() ? environment("LCM_DEFAULT_URL") : given;
 }
 
 struct Opened {
@@ -73,9 +83,10 @@ Result<Opened> open_link(const ClientOptions& options) {
       if (!first) first = link.error();
       if (barred.empty() && is_barred(path)) barred = link.error().text();
     }
-    if (options.way == Way::kSocket) return fail(*first);
+    const bool lcm_too = !barred.empty() || !named_url(options.url).empty();
+    if (options.way == Way::kSocket || !lcm_too) return fail(*first);
   }
-  auto link = open_lcm(options.url, options.prefix);
+  auto link = open_lcm(lcm_url(options.url), options.prefix);
   if (link) return Opened{.link = std::move(*link), .barred = std::move(barred)};
   Error error = link.error();
   if (!barred.empty()) error.message += " (LCM was tried because " + barred + ")";
@@ -83,6 +94,11 @@ Result<Opened> open_link(const ClientOptions& options) {
 }
 
 }  // namespace
+
+std::string lcm_url(const std::string& given) {
+  std::string url = named_url(given);
+  return url.empty() ? kDefaultUrl : url;
+}
 
 Result<std::unique_ptr<Client>> Client::open(ClientOptions options) {
   auto opened = open_link(options);

@@ -21,15 +21,20 @@ namespace bushd::client {
 inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
 inline constexpr const char* kDefaultPrefix = "BUSHD";
 
+// The URL of LCM that is used where this one is given: it, else $LCM_DEFAULT_URL, else kDefaultUrl.
+std::string lcm_url(const std::string& given);
+
 struct ClientOptions {
   enum class Way {
-    kAny,  // the control socket if there is one, else LCM
+    // The control socket. LCM only where this user has no right to that, or where there is none
+    // and a URL of LCM is given.
+    kAny,
     kSocket,
     kLcm
   };
   Way way = Way::kAny;
   std::string socket = {};  // path; empty: $BUSHD_CONTROL, else the default ones (control/path.h)
-  std::string url = kDefaultUrl;
+  std::string url = {};     // of LCM (lcm_url)
   std::string prefix = kDefaultPrefix;            // of the channels, [lcm] prefix in bushd.toml
   std::string program = "client";                 // begins the client_id
   int interrupt_fd = -1;                          // once readable, waiting ends; -1: never
@@ -48,6 +53,9 @@ class Client {
  public:
   using Clock = std::chrono::steady_clock;
 
+  // Fails at once where no daemon can be: without a socket, with one at which nobody listens, or
+  // to which this user has no right, and without a network for LCM. Whether one answers by LCM is
+  // seen by the first request.
   static Result<std::unique_ptr<Client>> open(ClientOptions options);
   // Over a link that is there already; `barred` as below.
   Client(std::unique_ptr<Link> link, ClientOptions options, std::string barred = {});

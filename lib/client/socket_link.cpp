@@ -36,6 +36,23 @@ std::string no_right(const std::string& path) {
       entry->gr_name);
 }
 
+// There is no daemon behind this path, as connect() says.
+std::string no_daemon(const std::string& path, int error) {
+  constexpr const char* kStart =
+      "Start it with 'sudo systemctl start bushd', or 'bushd --config FILE'; for another daemon "
+      "use "
+      "--socket PATH ($BUSHD_CONTROL), or --lcm";
+  if (error == ENOENT || error == ENOTDIR) {
+    return fmt::format("no control socket at {}: bushd is not running. {}", path, kStart);
+  }
+  if (error == ECONNREFUSED) {
+    return fmt::format("nobody listens at the control socket {}: bushd has ended. {}", path,
+                       kStart);
+  }
+  return fmt::format("no bushd at the control socket {}: {}. {}", path, std::strerror(error),
+                     kStart);
+}
+
 class SocketLink : public Link {
  public:
   SocketLink(int fd, std::string path)
@@ -101,10 +118,7 @@ Result<std::unique_ptr<Link>> open_socket(const std::string& path) {
   if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int error = errno;
     if (error == EACCES) return fail(Error{.message = no_right(path), .file = path});
-    const std::string why = std::strerror(error);
-    return fail(Error{.message = "no bushd at this control socket: " + why +
-                                 ". Start `bushd --config FILE`, or use LCM with --lcm",
-                      .file = path});
+    return fail(no_daemon(path, error));
   }
   return link;
 }

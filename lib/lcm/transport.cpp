@@ -1,7 +1,10 @@
 #include "lcm/transport.h"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <lcm/lcm.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cctype>
 #include <set>
@@ -22,6 +25,29 @@ std::string multicast_address(const std::string& url) {
   const std::string rest = url.substr(kScheme.size());
   const std::string address = rest.substr(0, rest.find_first_of(":?"));
   return address.empty() ? "239.255.76.67" : address;
+}
+
+// Packets to this address have a way, as LCM finds by the same two calls. Where they have none it
+// writes a page on stderr.
+bool has_route(const std::string& address) {
+  sockaddr_in group{};
+  group.sin_family = AF_INET;
+  group.sin_port = htons(1);  // any
+  if (inet_aton(address.c_str(), &group.sin_addr) == 0) return false;
+  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) return true;  // its business
+  const ip_mreq membership{.imr_multiaddr = group.sin_addr, .imr_interface = {INADDR_ANY}};
+  const bool has =
+      ::connect(fd, reinterpret_cast<const sockaddr*>(&group), sizeof group) == 0 &&
+      ::setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0;
+  ::close(fd);
+  return has;
+}
+
+// What is not is told here, in one line: LCM's library says it in its own words, on stderr.
+bool is_usable(const std::string& url) {
+  const std::string address = multicast_address(url);
+  return address.empty() ? url.find("://") != std::string::npos : has_route(address);
 }
 
 Error cannot_open(const std::string& url) {
@@ -66,6 +92,7 @@ Result<void> check_channel(const std::string& channel) {
 
 Result<std::unique_ptr<Transport>> Transport::open(const std::string& url,
                                                    const std::vector<std::string>& channels) {
+  if (!is_usable(url)) return fail(cannot_open(url));
   const std::set<int> others = udp_sockets();
   lcm_t* lcm = lcm_create(url.c_str());
   if (lcm == nullptr) return fail(cannot_open(url));

@@ -95,6 +95,11 @@ class ControlSocket(EndToEndTest):
     def test_what_a_killed_daemon_has_left_is_replaced(self):
         self.bring_up()
         self.bushd.end(9)
+        for command in ("status", "move a0 5", "stop", "estop"):
+            told = self.bushctl(*command.split())
+            self.assertEqual((told.returncode, told.stdout), (1, ""), command)
+            self.assertRegex(told.stderr, rf"^bushctl: nobody listens at the control socket {self.file('control')}: bushd has ended\. "
+                                          r"Start it with 'sudo systemctl start bushd', or .*\n$")
         self.bushd = self.start_bushd()
         self.wait_until_ready()
         self.command("status", "--socket", self.file("control"))
@@ -128,6 +133,17 @@ class ControlSocket(EndToEndTest):
             client.send(b"junk")
         self.wait_until("all of them to be read", lambda: self.dropped() >= 1000)
         self.assert_undisturbed()
+
+    def test_a_daemon_that_is_not_running(self):
+        self.write_config()
+        bushd = self.start_bushd()
+        self.wait_until("bushd to offer its socket", self.file("control").exists)
+        self.assertEqual(bushd.end(), 0)
+        for command in ("status", "move a0 5", "stop", "estop"):
+            told = self.bushctl(*command.split())
+            self.assertEqual((told.returncode, told.stdout), (1, ""), command)
+            self.assertRegex(told.stderr, rf"^bushctl: no control socket at {self.file('control')}: bushd is not running\. "
+                                          r"Start it with 'sudo systemctl start bushd', or .*\n$")
 
     def test_without_a_network_the_socket_serves(self):
         self.write_config()

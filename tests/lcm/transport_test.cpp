@@ -143,12 +143,14 @@ TEST(Transport, HostileStatesAreCountedAndValidOnesArrive) {
 }
 
 TEST(Transport, AnUnusableUrlIsNamedTogetherWithTheRemedy) {
+  testing::internal::CaptureStderr();
   const auto nonsense = Transport::open("nonsense");
   ASSERT_FALSE(nonsense);
   EXPECT_NE(nonsense.error().text().find("nonsense"), std::string::npos);
   const auto no_address = Transport::open("udpm://239.255.76.999:7667?ttl=0");
   ASSERT_FALSE(no_address);
   EXPECT_NE(no_address.error().text().find("ip route replace"), std::string::npos);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "of the library";
 }
 
 }  // namespace

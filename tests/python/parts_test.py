@@ -2,10 +2,13 @@
 
 import inspect
 import os
+import socket
 import struct
+import tempfile
 import unittest
+from unittest import mock
 
-from bushd import Trust, aio, arguments, client, codec, messages, motion, requests, session, udpm
+from bushd import NoDaemon, Trust, aio, arguments, client, codec, messages, motion, requests, session, udpm
 from bushd.status import StatusCollector
 
 
@@ -118,6 +121,42 @@ class Datagrams(unittest.TestCase):
         for url in ("file:///x", "udpm://a:b"):
             with self.assertRaises(ValueError):
                 udpm.Url.parse(url)
+
+
+class NoDaemonThere(unittest.TestCase):
+    """Told at once: what is missing, and how to start it."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.path = f"{folder.name}/control"
+        environment = mock.patch.dict(os.environ, BUSHD_CONTROL=self.path)
+        environment.start()
+        self.addCleanup(environment.stop)
+        os.environ.pop("LCM_DEFAULT_URL", None)
+
+    def assert_told(self, begins):
+        for connect in (client.connect, lambda: client.connect(self.path)):
+            with self.assertRaises(NoDaemon) as told:
+                connect()
+            self.assertEqual(
+                str(told.exception),
+                f"{begins}. Start it with 'sudo systemctl start bushd', or 'bushd --config FILE'; for another daemon use "
+                "connect(PATH) ($BUSHD_CONTROL), or connect(lcm=True)")
+
+    def test_without_a_socket(self):
+        self.assert_told(f"no control socket at {self.path}: bushd is not running")
+
+    def test_with_a_socket_that_is_left(self):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as left:
+            left.bind(self.path)
+        self.assert_told(f"nobody listens at the control socket {self.path}: bushd has ended")
+
+    def test_lcm_is_used_if_somebody_asks_for_it(self):
+        os.environ["LCM_DEFAULT_URL"] = "udpm://127.0.0.1:7667"  # no multicast address
+        for lcm in (False, True):
+            with self.assertRaisesRegex(NoDaemon, 'LCM cannot use the URL "udpm://127.0.0.1:7667"'):
+                client.connect(lcm=lcm)
 
 
 class Arguments(unittest.TestCase):

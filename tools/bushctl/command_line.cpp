@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -122,10 +121,8 @@ void Command::run(std::function<int()> action) {
 CommandLine::CommandLine(const std::string& version)
     : app_(std::make_unique<CLI::App>("bushctl: move and watch the motors of a running bushd",
                                       "bushctl")) {
-  const char* url = std::getenv("LCM_DEFAULT_URL");
-  connection_.url = url != nullptr && *url != '\0' ? url : bushd::client::kDefaultUrl;
   app_->footer(
-      "The daemon is reached by its control socket, or by LCM if there is none.\n"
+      "The daemon is reached by its control socket, or by LCM if that is asked for.\n"
       "Exit codes: 0 done, 1 refused or not done (reason on stderr), 2 wrong usage.");
   app_->set_version_flag("--version", version);
   app_->require_subcommand(1);
@@ -144,9 +141,10 @@ void CommandLine::add_connection(CLI::App* app) {
     return std::string();
   };
   app->add_flag("--lcm", connection_.lcm, "Use LCM")->excludes(socket);
-  app->add_option("--url", connection_.url, "Use LCM with this URL")
-      ->check(CLI::Validator(means_lcm, ""))
-      ->capture_default_str();
+  app->add_option("--url", connection_.url,
+                  fmt::format("Use LCM with this URL; without it $LCM_DEFAULT_URL, else {}",
+                              bushd::client::kDefaultUrl))
+      ->check(CLI::Validator(means_lcm, ""));
   app->add_option("--prefix", connection_.prefix, "Use LCM with this prefix of the channels")
       ->check(CLI::Validator(means_lcm, ""))
       ->capture_default_str();

@@ -41,7 +41,7 @@ int usage() {
 }
 
 int run(const std::vector<std::string>& arguments) {
-  // By the control socket if there is one, else by LCM.
+  // By the control socket, unless LCM is asked for.
   ClientOptions options{.program = "example-c++"};
   api::Move move;  // by distances in the motors' units
   if (arguments.size() % 2 != 0) return usage();

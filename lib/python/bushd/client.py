@@ -28,15 +28,16 @@ def connect(
 ) -> Client:
     """A client of the daemon: `with bushd.connect() as client: ...`.
 
-    Without arguments: the control socket of this PC if there is one ($BUSHD_CONTROL, else /run/bushd/control, else
-    $XDG_RUNTIME_DIR/bushd/control), else LCM on this PC.
+    Without arguments: the control socket of this PC ($BUSHD_CONTROL, else /run/bushd/control, else
+    $XDG_RUNTIME_DIR/bushd/control). LCM only where this user has no right to that, or where there is none and
+    $LCM_DEFAULT_URL is set.
 
     socket: path of another control socket.
-    lcm: True, or a URL such as "udpm://239.255.76.67:7667?ttl=1".
+    lcm: True ($LCM_DEFAULT_URL, else on this PC), or a URL such as "udpm://239.255.76.67:7667?ttl=1".
     prefix: of the LCM channels; `[lcm] prefix` in bushd.toml.
     program: begins the name of this client in logs and histories; by default that of the script.
 
-    Raises NoDaemon where there is no daemon at the socket, or no network for LCM.
+    Raises NoDaemon at once where there is no daemon at the socket, or no network for LCM.
     """
 
     async def opens() -> aio.Client:

@@ -53,8 +53,7 @@ class SocketLink:
             self._socket.close()
             if isinstance(error, PermissionError):
                 raise NoDaemon(no_right(path)) from error
-            why = error.strerror or str(error)
-            raise NoDaemon(f"{path}: no bushd at this control socket: {why}. Start `bushd --config FILE`") from error
+            raise NoDaemon(no_daemon(path, error)) from error
         self._socket.setblocking(False)
 
     def fileno(self) -> int:
@@ -153,6 +152,19 @@ class LcmLink:
         self._out.close()
 
 
+def no_daemon(path: str, error: OSError) -> str:
+    """There is no daemon behind this path, as connect() says."""
+    start = (
+        "Start it with 'sudo systemctl start bushd', or 'bushd --config FILE'; for another daemon use "
+        "connect(PATH) ($BUSHD_CONTROL), or connect(lcm=True)"
+    )
+    if isinstance(error, (FileNotFoundError, NotADirectoryError)):
+        return f"no control socket at {path}: bushd is not running. {start}"
+    if isinstance(error, ConnectionRefusedError):
+        return f"nobody listens at the control socket {path}: bushd has ended. {start}"
+    return f"no bushd at the control socket {path}: {error.strerror or error}. {start}"
+
+
 def no_right(path: str) -> str:
     """Who has a right to this socket, and how one becomes one of them."""
     text = f"{path}: this user has no right to the control socket"
@@ -180,17 +192,22 @@ def open_link(path: str | os.PathLike[str] | None, lcm: bool | str, prefix: str)
         raise ValueError("give a socket or LCM, not both")
     if path is not None:
         return SocketLink(os.fspath(path))
+    named_url = os.environ.get("LCM_DEFAULT_URL", "")
     if lcm:
-        return LcmLink(lcm if isinstance(lcm, str) else DEFAULT_URL, prefix)
-    barred = ""  # there is a socket, and this user has no right to it: that is why LCM was tried
+        return LcmLink(lcm if isinstance(lcm, str) else named_url or DEFAULT_URL, prefix)
+    barred = ""  # there is a socket, and this user has no right to it: that is why LCM is tried
+    first: NoDaemon | None = None
     for candidate in default_paths():
         try:
             return SocketLink(candidate)
         except NoDaemon as error:
+            first = first or error
             if isinstance(error.__cause__, PermissionError):
                 barred = barred or f" ({error})"
+    if first is not None and not barred and not named_url:
+        raise first
     try:
-        link = LcmLink(DEFAULT_URL, prefix)
+        link = LcmLink(named_url or DEFAULT_URL, prefix)
     except NoDaemon as error:
         raise NoDaemon(f"{error}{barred}") from error
     link.remedy += barred

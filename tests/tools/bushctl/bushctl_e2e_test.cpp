@@ -10,11 +10,13 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <fstream>
 #include <future>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "client/client.h"
 #include "lcm/wire.h"
 #include "source_path.h"
 #include "tools/bushctl/fake_daemon.h"
@@ -43,6 +45,11 @@ Ran bushctl(const std::vector<std::string>& arguments) {
   Program program(with_program(arguments));
   const int code = program.finish();
   return {code, program.out(), program.err()};
+}
+
+// A program that finds no control socket asks the fake daemon then.
+void use_lcm() {
+  setenv("LCM_DEFAULT_URL", bushd::client::kDefaultUrl, 1);
 }
 
 using Replies = std::vector<api::Reply>;
@@ -214,12 +221,80 @@ TEST(Bushctl, WithoutDaemonSaysSoAndFails) {
   EXPECT_THAT(move.err, HasSubstr("no bushd answers"));
 }
 
+// LCM is not asked, which would take seconds: a fake daemon that hears nothing shows it.
+TEST(Bushctl, WithoutASocketEveryCommandSaysThatBushdIsNotRunning) {
+  unsetenv("LCM_DEFAULT_URL");
+  FakeDaemon daemon;
+  daemon.start();
+  const std::string path = testing::TempDir() + "bushctl_e2e_test.csv";
+  std::ofstream(path) << "theta\n0\n1\n";
+  const std::string rows = testing::TempDir() + "bushctl_e2e_test_rows.csv";
+  std::ofstream(rows) << "time_s, theta\n0, 0\n1, 1\n";
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"status"},
+                                             {"status", "--json"},
+                                             {"where"},
+                                             {"watch"},
+                                             {"health"},
+                                             {"move", "theta", "5"},
+                                             {"move", "theta", "5", "--wait"},
+                                             {"arm", "theta", "5", "--delay-us", "75"},
+                                             {"disarm"},
+                                             {"stop"},
+                                             {"stop", "theta", "--wait"},
+                                             {"estop"},
+                                             {"home", "theta"},
+                                             {"set", "theta", "0"},
+                                             {"compare", "theta", "5", "--width-us", "7"},
+                                             {"path", "run", path},
+                                             {"follow", rows},
+                                             {"jog", "theta", "5"},
+                                             {"jog", "theta", "0"},
+                                             {"pause"},
+                                             {"resume"},
+                                             {"hold"},
+                                             {"release"},
+                                             {"enable"},
+                                             {"disable"},
+                                             {"clear"},
+                                             {"confirm", "theta"},
+                                             {"history", "theta"},
+                                             {"config"},
+                                             {"table", "list"},
+                                             {"table", "reload"},
+                                             {"camac", "1", "0", "0"}}) {
+    const Ran ran = bushctl(arguments);
+    EXPECT_EQ(ran.code, 1) << arguments[0];
+    EXPECT_EQ(ran.out, "") << arguments[0];
+    EXPECT_EQ(ran.err,
+              "bushctl: no control socket at /nonexistent/control: bushd is not running. Start it "
+              "with 'sudo systemctl start bushd', or 'bushd --config FILE'; for another daemon use "
+              "--socket PATH ($BUSHD_CONTROL), or --lcm\n")
+        << arguments[0];
+  }
+  EXPECT_TRUE(daemon.requests().empty());
+  EXPECT_EQ(bushctl({"status", "--lcm"}).code, 0);
+  use_lcm();
+}
+
+// In a network of its own again, without a route. LCM's library would say it in 14 lines.
+TEST(Bushctl, LcmWithoutARouteIsOneSentence) {
+  for (const char* command : {"status", "stop"}) {
+    Program program({"/usr/bin/env", "unshare", "--net", BUSHCTL, "--lcm", command});
+    EXPECT_EQ(program.finish(), 1);
+    EXPECT_EQ(program.err(),
+              "bushctl: LCM cannot use the URL \"udpm://239.255.76.67:7667?ttl=0\": the address is "
+              "wrong or there is no route to it. For this machine only: ip route replace "
+              "239.255.76.67/32 dev lo (as root)\n");
+  }
+}
+
 TEST(Bushctl, ASocketThatIsNamedIsMeant) {
   FakeDaemon daemon;
   daemon.start();
   const Ran ran = bushctl({"status", "--socket", "/nonexistent/control"});
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("no bushd at this control socket"));
+  EXPECT_THAT(ran.err, HasSubstr("no control socket at /nonexistent/control"));
   EXPECT_EQ(bushctl({"status", "--lcm", "--socket", "/x"}).code, 2);
 }
 
@@ -236,7 +311,7 @@ TEST(Bushctl, TakesTheUrlFromTheEnvironmentUnlessGiven) {
   daemon.start();
   EXPECT_THAT(bushctl({"status"}).err, HasSubstr("nonsense"));
   EXPECT_EQ(bushctl({"status", "--url", "udpm://239.255.76.67:7667?ttl=0"}).code, 0);
-  unsetenv("LCM_DEFAULT_URL");
+  use_lcm();
 }
 
 TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
@@ -523,6 +598,7 @@ int main(int argc, char** argv) {
     setenv("BUSHCTL_TEST_IN_NAMESPACE", "yes", 1);
     // A daemon of this machine, if there is one, is not meant.
     setenv("BUSHD_CONTROL", "/nonexistent/control", 1);
+    bushctl::test::use_lcm();
     std::string helper = bushd::test::source_path("tests/tools/with-loopback-multicast");
     again.insert(again.begin(), helper.data());
     execv(helper.c_str(), again.data());

@@ -200,7 +200,7 @@ Observations observe(const Scope& asked) {
   if (config) {
     for (const auto& bus : config->buses) seen.ports.push_back(port_seen(bus.name, bus.port));
   }
-  seen.lcm = lcm_seen(config ? config->lcm.url : scope.client.url);
+  seen.lcm = lcm_seen(bushd::client::lcm_url(config ? config->lcm.url : scope.client.url));
   seen.clock = clock_seen();
   seen.folders = folders_of(config);
   for (const std::string& path : socket_paths(scope.client, config)) {
