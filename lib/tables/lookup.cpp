@@ -66,7 +66,12 @@ std::vector<std::filesystem::path> shipped_directories() {
 #ifdef BUSHD_SOURCE_TABLES
   directories.emplace_back(BUSHD_SOURCE_TABLES);
 #endif
-  directories.emplace_back(BUSHD_INSTALLED_TABLES);
+  // The program tells the prefix: it may be installed anywhere.
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (!error) {
+    directories.push_back((program.parent_path() / BUSHD_TABLES_FROM_PROGRAM).lexically_normal());
+  }
   return directories;
 }
 

@@ -64,6 +64,20 @@ class Layout(unittest.TestCase):
                 with self.subTest(f"{header.relative_to(includes)} includes {named}"):
                     self.assertTrue((includes / "bushd" / named).exists() or (includes / named).exists())
 
+    def test_units_start_programs_of_this_prefix(self):
+        programs = [command for unit in self.prefix.rglob("*.service")
+                    for command in re.findall(r"^Exec(?:Start|Stop)=(\S+)", unit.read_text(), re.MULTILINE)]
+        self.assertEqual(len(programs), 4)
+        for program in programs:
+            with self.subTest(program):
+                self.assertTrue(pathlib.Path(program).is_relative_to(self.prefix))
+                self.assertTrue(os.access(program, os.X_OK))
+
+    def test_programs_find_the_tables_of_this_prefix(self):
+        command = [self.prefix / "bin/bushtab", "show", "none"]
+        ran = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "BUSHD_TABLES_DIR": ""})
+        self.assertIn(f"{self.prefix}/share/bushd/tables", ran.stderr)
+
     def test_the_demonstration_is_a_good_configuration(self):
         ran = subprocess.run([os.environ["BUSHD"], "--check-config", SOURCE / "daemon/system/demo.toml"], capture_output=True, text=True, check=False)
         self.assertEqual(ran.returncode, 0, ran.stderr)
