@@ -27,13 +27,19 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
+// Dark where the reader prefers that. The darkest two colours of curves are brighter there.
+constexpr const char* kDark =
+    "<style>@media(prefers-color-scheme:dark){rect{fill:#0d1117}text{fill:#d6dae0}"
+    "[stroke=\"#404040\"]{stroke:#9da7b3}[stroke=\"#dddddd\"]{stroke:#30363d}"
+    "[stroke=\"#0072b2\"]{stroke:#3b93d4}[stroke=\"#000000\"]{stroke:#ffffff}}</style>\n";
+
 class SvgDrawing : public Drawing {
  public:
   SvgDrawing(int width, int height)
       : svg_(fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" "
                          "viewBox=\"0 0 {0} {1}\" font-family=\"sans-serif\" font-size=\"{2}\">\n"
-                         "<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n",
-                         width, height, kTextSize)) {}
+                         "{3}<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n",
+                         width, height, kTextSize, kDark)) {}
 
   void line(const std::vector<Dot>& dots, const Stroke& stroke) override {
     svg_ +=

@@ -3,62 +3,25 @@
 
 import os
 import pathlib
-import struct
+import re
 import subprocess
+import sys
 import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
-import zlib
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+import png_file
+from contrast import OTHERS, TEXT, contrast, luminance
 
 SVG = "{http://www.w3.org/2000/svg}"
 FIRST_COLOUR = (0x00, 0x72, 0xB2)
 SECOND_COLOUR = (0xD5, 0x5E, 0x00)
+GRID = "#dddddd"  # fainter than what must be seen
 
 
 def hex_colour(colour):
     return "#%02x%02x%02x" % colour
-
-
-def png_pixels(data):
-    """Width, height and the set of colours of an RGB PNG: unpacks and unfilters it."""
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    at, packed = 8, b""
-    while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at : at + 8])
-        body = data[at + 8 : at + 8 + length]
-        assert zlib.crc32(kind + body) == struct.unpack(">I", data[at + 8 + length :][:4])[0]
-        if kind == b"IHDR":
-            width, height, depth, colour_type = struct.unpack(">IIBB", body[:10])
-            assert (depth, colour_type) == (8, 2)
-        elif kind == b"IDAT":
-            packed += body
-        at += 12 + length
-    raw = zlib.decompress(packed)
-    stride = 3 * width
-    above = bytearray(stride)
-    colours = set()
-    for row in range(height):
-        kind = raw[row * (stride + 1)]
-        line = bytearray(raw[row * (stride + 1) + 1 : (row + 1) * (stride + 1)])
-        for i in range(stride):
-            left = line[i - 3] if i >= 3 else 0
-            corner = above[i - 3] if i >= 3 else 0
-            up = above[i]
-            if kind == 1:
-                guess = left
-            elif kind == 2:
-                guess = up
-            elif kind == 3:
-                guess = (left + up) // 2
-            elif kind == 4:
-                slope = left + up - corner
-                guess = min((left, up, corner), key=lambda value: abs(slope - value))
-            else:
-                guess = 0
-            line[i] = (line[i] + guess) & 0xFF
-        colours.update(zip(line[0::3], line[1::3], line[2::3]))
-        above = line
-    return width, height, colours
 
 
 class Pictures(unittest.TestCase):
@@ -78,6 +41,11 @@ class Pictures(unittest.TestCase):
         done = self.bushtab("plot", *tables, "--svg", self.path / "out.svg")
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
         return ElementTree.parse(self.path / "out.svg").getroot()
+
+    def more_tables(self, count):
+        for i in range(count):
+            (self.path / f"t{i}.toml").write_text(f'name = "t{i}"\ntime_unit_ns = {1000 + i}\naccel = [90, 70, 50]\n')
+        return [f"t{i}" for i in range(count)]
 
     def test_svg_has_three_panels_with_units_and_a_legend(self):
         root = self.svg("bushd2-constant", "bushd2-scurve")
@@ -120,6 +88,19 @@ class Pictures(unittest.TestCase):
         (self.path / "flat.toml").write_text('name = "flat"\ntime_unit_ns = 1000\naccel = [50]\n')
         self.assertEqual(len(list(self.svg("flat").iter(SVG + "polyline"))) > 3, True)
 
+    def test_svg_is_dark_where_the_reader_prefers_that_and_seen_either_way(self):
+        root = self.svg("bushd2-constant", *self.more_tables(6))
+        style = root.find(SVG + "style").text
+        dark = re.fullmatch(r"@media\(prefers-color-scheme:dark\)\{(.*)\}", style)[1]
+        sheet, text = (re.search(rf"\b{element}\{{fill:(#\w+)\}}", dark)[1] for element in ("rect", "text"))
+        self.assertLess(luminance(sheet), 0.05)
+        self.assertGreater(contrast(text, sheet), TEXT)
+        colours = {line.get("stroke") for line in root.iter(SVG + "polyline")}
+        self.assertGreaterEqual(len(colours), 9)  # seven curves, axes and grid
+        for colour in colours - {GRID}:
+            on_dark = re.search(rf'\[stroke="{colour}"\]\{{stroke:(#\w+)\}}', dark)
+            self.assertGreater(contrast(on_dark[1] if on_dark else colour, sheet), OTHERS, colour)
+
     def test_svg_of_a_long_table_has_only_what_can_be_seen(self):
         codes = ", ".join(str(40000 - i // 2) for i in range(65000))
         (self.path / "long.toml").write_text(
@@ -137,7 +118,8 @@ class Pictures(unittest.TestCase):
     def test_png_decodes_and_shows_both_tables(self):
         done = self.bushtab("plot", "bushd2-constant", "bushd2-scurve", "--png", self.path / "out.png")
         self.assertEqual((done.returncode, done.stdout), (0, ""))
-        width, height, colours = png_pixels((self.path / "out.png").read_bytes())
+        width, height, rows = png_file.pixels((self.path / "out.png").read_bytes())
+        colours = {colour for row in rows for colour in row}
         root = self.svg("bushd2-constant", "bushd2-scurve")
         self.assertEqual((width, height), (int(root.get("width")), int(root.get("height"))))
         for colour in (FIRST_COLOUR, SECOND_COLOUR, (255, 255, 255), (0, 0, 0)):
