@@ -1,0 +1,180 @@
+"""The Python client as a wheel: what it says of itself, its types, and all of it at work in bare environments.
+
+It takes the Pythons from 3.11 that this PC has (in $PATH, /usr/bin, and pyenv's), one of each version, and says which.
+$BUSHD_WHEEL is the wheel, $BUSHD_BUILD_DIR the build; programs as for client_test.py."""
+
+import base64
+import email
+import glob
+import hashlib
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+import zipfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+TOP = HERE.parents[1]
+BUILD = pathlib.Path(os.environ["BUSHD_BUILD_DIR"])
+WHEEL = pathlib.Path(os.environ["BUSHD_WHEEL"])
+OLDEST, NEWEST = 11, 30  # Python 3.x: of requires-python, and farther than there are any
+ISOLATED = ["-I", "-B"]  # nothing but what is installed
+
+
+def pythons():
+    """By version, a Python that can make environments."""
+    pyenv = os.environ.get("PYENV_ROOT", os.path.expanduser("~/.pyenv"))
+    found = {}
+    for minor in range(OLDEST, NEWEST):
+        name = f"python3.{minor}"
+        for path in (shutil.which(name), f"/usr/bin/{name}", *sorted(glob.glob(f"{pyenv}/versions/3.{minor}.*/bin/{name}"))):
+            ran = path and pathlib.Path(path).exists() and subprocess.run(
+                [path, "-I", "-c", "import ensurepip, sys, venv; print(*sys.version_info[:3], sep='.')"], capture_output=True, text=True, check=False)
+            if ran and ran.stdout.startswith(f"3.{minor}."):
+                found[ran.stdout.strip()] = path
+                break
+    return found
+
+
+def fields(text):
+    """Of a .lcm file: (type, name) of its fields, and its constants."""
+    text = re.sub(r"//[^\n]*", "", text)
+    constants = {}
+    for _, several in re.findall(r"\bconst (\w+) ([^;]+);", text):
+        constants.update((name.strip(), float(value)) for name, value in (one.split("=") for one in several.split(",")))
+    members = re.findall(r"^\s*(\w+)\s+(\w+)(?:\[\w+\])*;", re.sub(r"\bconst [^;]+;", "", text), re.MULTILINE)
+    return [(kind, name) for kind, name in members if kind != "package"], constants
+
+
+class Wheel(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.archive = zipfile.ZipFile(WHEEL)
+        cls.addClassCleanup(cls.archive.close)
+        cls.files = set(cls.archive.namelist())
+
+    def text(self, name):
+        return self.archive.read(name).decode()
+
+    def information(self, name):
+        (path,) = [file for file in self.files if file.endswith(f".dist-info/{name}")]
+        return self.text(path)
+
+    def test_it_has_the_version_of_the_daemon_and_no_dependencies(self):
+        version = re.search(r"^project\(bushd VERSION ([0-9.]+)", (TOP / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
+        said = email.message_from_string(self.information("METADATA"))
+        self.assertEqual((said["Name"], said["Version"], said["Requires-Python"]), ("bushd", version, f">=3.{OLDEST}"))
+        self.assertIsNone(said["Requires-Dist"])
+        self.assertEqual(self.text("bushd/version.py"), f'__version__ = "{version}"\n')
+        self.assertEqual(WHEEL.name, f"bushd-{version}-py3-none-any.whl")
+        self.assertIn("Root-Is-Purelib: true\nTag: py3-none-any\n", self.information("WHEEL"))
+
+    def test_it_has_what_was_built_and_nothing_else(self):
+        package = BUILD / "lib/python/bushd"
+        built = {f"bushd/{path.relative_to(package)}" for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+        self.assertEqual({file for file in self.files if ".dist-info/" not in file}, built)
+        for file in built:
+            self.assertEqual(self.archive.read(file), (package.parent / file).read_bytes(), file)
+        self.assertIn("bushd/py.typed", built)
+
+    def test_what_it_records_is_what_it_has(self):
+        for line in self.information("RECORD").splitlines():
+            name, digest, size = line.rsplit(",", 2)
+            if digest:
+                data = self.archive.read(name)
+                self.assertEqual(digest, "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("="), name)
+                self.assertEqual(int(size), len(data))
+
+    def test_its_types_are_those_of_the_daemon(self):
+        types = {path.stem: path.read_text() for path in (TOP / "lib/lcm/types").glob("*.lcm")}
+        self.assertEqual({name for name in self.files if re.match(r"bushd/messages/\w+_t\.py", name)}, {f"bushd/messages/{name}.py" for name in types})
+        for name, definition in types.items():
+            with self.subTest(name):
+                text = self.text(f"bushd/messages/{name}.py")
+                members, constants = fields(definition)
+                self.assertEqual(re.findall(r'"(\w+)"', re.search(r"__slots__ = \[(.*)\]", text)[1]), [member for _, member in members])
+                self.assertEqual({key: float(value) for key, value in re.findall(r"^    ([A-Z]\w*) = (\S+)$", text, re.MULTILINE)}, constants)
+                # What the daemon was compiled with: lcm-gen makes this number of names, types and dimensions.
+                compiled = (BUILD / f"lib/lcm/generated/bushd/{name}.hpp").read_text()
+                hashed = re.search(r"uint64_t hash = (0x\w+)LL", compiled)[1]
+                self.assertEqual(int(hashed, 16), int(re.search(r"tmphash = \((0x[0-9a-f]+)", text)[1], 16))
+                others = set(re.findall(r"bushd::(\w+)::_computeHash", compiled.split("::_computeHash(const", 1)[1]))
+                self.assertEqual(set(re.findall(r"bushd\.messages\.(\w+)\._get_hash_recursive", text)) - {name}, others - {name})
+
+    def test_it_is_the_same_however_it_is_packed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            command = [TOP / "lib/python/make_wheel", BUILD / "lib/python/pyproject.toml", TOP / "LICENSE", BUILD / "lib/python/bushd", folder]
+            subprocess.run(command, check=True, capture_output=True, umask=0o077, env={**os.environ, "TZ": "Pacific/Auckland", "LC_ALL": "C"})
+            self.assertEqual((pathlib.Path(folder) / WHEEL.name).read_bytes(), WHEEL.read_bytes())
+
+
+class Installed(unittest.TestCase):
+    """In a bare environment of each Python."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.environments = {}
+        for version, python in pythons().items():
+            print(f"Python {version}: {python}", flush=True)
+            place = pathlib.Path(folder.name) / version
+            subprocess.run([python, "-I", "-m", "venv", place], check=True)
+            pip = [place / "bin/python", "-I", "-m", "pip", "--disable-pip-version-check", "--quiet"]
+            subprocess.run([*pip, "install", "--no-index", WHEEL], check=True)
+            cls.environments[version] = place / "bin/python"
+        assert cls.environments, "no Python from 3.11 with venv and ensurepip: python3-venv (tools/setup)"
+
+    def in_each(self, *words, before=()):
+        environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        for version, python in self.environments.items():
+            with self.subTest(python=version):
+                ran = subprocess.run([*before, python, *words], env=environment, capture_output=True, text=True, check=False)
+                self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+                yield version, ran.stdout
+
+    def test_it_is_there_and_needs_nothing(self):
+        program = ("import bushd, importlib.metadata, pathlib; information = importlib.metadata.distribution('bushd'); "
+                   "print(information.version, bushd.__version__, information.requires, (pathlib.Path(bushd.__file__).parent / 'py.typed').exists())")
+        version = WHEEL.name.split("-")[1]
+        for _, said in self.in_each(*ISOLATED, "-W", "error", "-c", program):
+            self.assertEqual(said.split(), [version, version, "None", "True"])
+
+    def test_all_modules_are_without_warnings_of_a_newer_python(self):
+        program = ("import compileall, bushd, pathlib, sys; "
+                   "sys.exit(not compileall.compile_dir(pathlib.Path(bushd.__file__).parent, quiet=1, force=True))")
+        for _, said in self.in_each("-I", "-W", "error", "-c", program):
+            self.assertEqual(said, "")
+
+    def test_without_a_daemon_it_says_so(self):
+        program = "import bushd\ntry:\n    bushd.connect('/nonexistent/control')\nexcept bushd.NoDaemon as error:\n    print(error)"
+        for _, said in self.in_each(*ISOLATED, "-c", program):
+            self.assertIn("bushd is not running", said)
+
+    def test_what_the_client_stands_on(self):
+        for script in ("session_test.py", "parts_test.py"):
+            list(self.in_each(*ISOLATED, HERE / script))
+
+    def test_it_moves_motors_of_the_real_daemon(self):
+        network = [TOP / "tests/tools/with-loopback-multicast"]
+        list(self.in_each("-B", HERE / "client_test.py", "Documentation", before=network))
+
+    @unittest.skipUnless(shutil.which("mypy"), "mypy is not there")
+    def test_checkers_find_its_types(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = pathlib.Path(folder) / "program.py"
+            program.write_text('import bushd\nreveal_type(bushd.connect().move("theta", to=1.0))\n')
+            for version, python in self.environments.items():
+                with self.subTest(python=version):
+                    command = ["mypy", "--strict", "--cache-dir=/dev/null", f"--python-executable={python}", program]
+                    ran = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
+                    self.assertNotIn("error", ran.stdout)
+                    self.assertIn("bushd.model.MoveResult", ran.stdout)
+
+
+if __name__ == "__main__":
+    sys.exit(unittest.main())
