@@ -24,15 +24,12 @@ ARROWS = {"←": (-1, 0), "→": (1, 0), "↑": (0, -1), "↓": (0, 1)}
 EIGHTHS = {"█": (0, 0, 1, 1), "▀": (0, 0, 1, 0.5), "▐": (0.5, 0, 1, 1)}
 EIGHTHS |= {chr(0x2580 + n): (0, 1 - n / 8, 1, 1) for n in range(1, 8)}
 EIGHTHS |= {chr(0x2590 - n): (0, 0, n / 8, 1) for n in range(1, 8)}
+# All fonts have those of Latin-1 (but for the soft hyphen), in the width of the others.
+LETTERS = "[!-~\u00a1-\u00ac\u00ae-\u00ff]"
 
 
 class NoShape(Exception):
     """A character that is neither a letter nor drawn."""
-
-
-def is_letter(character):
-    """All fonts have those of Latin-1, in the width of the others."""
-    return "!" <= character <= "~" or "\u00a1" <= character <= "\u00ff"
 
 
 def number(value):
@@ -78,14 +75,12 @@ def shape(character, x, y):
 def line(text, baseline):
     """The elements of one line."""
     out = []
-    for word in re.finditer(r"\S+", text):
-        # A word, or what is between two shapes.
-        for part in re.finditer("".join(("[", "!-~", "\u00a1-\u00ff", "]+")), word[0]):
-            x = LEFT + COLUMN * (word.start() + part.start())
-            out.append(f'<text x="{number(x)}" y="{baseline}">{html.escape(part[0], quote=False)}</text>')
+    for word in re.finditer(f"{LETTERS}+", text):
+        x = LEFT + COLUMN * word.start()
+        out.append(f'<text x="{number(x)}" y="{baseline}">{html.escape(word[0], quote=False)}</text>')
     paths = {}
     for column, character in enumerate(text):
-        if character != " " and not is_letter(character):
+        if character not in " \u2800" and not re.match(LETTERS, character):
             kind, path = shape(character, LEFT + COLUMN * column, baseline - ABOVE)
             paths[kind] = paths.get(kind, "") + path
     return out + [f'<path class="{kind}" d="{path}"/>' for kind, path in paths.items()]

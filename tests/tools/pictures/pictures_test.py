@@ -7,6 +7,7 @@ import os
 import pathlib
 import random
 import sys
+import unicodedata
 import unittest
 
 SOURCE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"])
@@ -31,8 +32,8 @@ class Drawing(unittest.TestCase):
                 self.assertEqual(read(drawing.picture(command, lines, 60)), (command, lines))
 
     def test_a_character_that_is_not_drawn_is_refused(self):
-        for character in "╭═┅░♥中":
-            with self.assertRaisesRegex(drawing.NoShape, character):
+        for character in "╭═┅░♥中\u00ad":
+            with self.assertRaisesRegex(drawing.NoShape, unicodedata.name(character)):
                 drawing.picture("x", [f"a{character}b"], 10)
 
     def test_an_empty_cell_of_braille_is_a_blank(self):

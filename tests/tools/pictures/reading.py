@@ -53,7 +53,7 @@ def word(grid, element):
     text = element.text or ""
     if set(element.attrib) - {"x", "y", "class"} or len(element):
         raise Wrong(f"{text!r} is more than a word at a place: {sorted(element.attrib)}")
-    if not re.fullmatch("[!-~¡-ÿ]+", text):
+    if not re.fullmatch("[!-~\u00a1-\u00ac\u00ae-\u00ff]+", text):
         raise Wrong(f"{text!r} is not one word of letters that all fonts have")
     column = whole(float(element.get("x")) - LEFT, COLUMN, text)
     row = whole(float(element.get("y")) - BASELINE - TOP, LINE, text)
