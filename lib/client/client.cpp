@@ -72,6 +72,11 @@ struct Opened {
   std::string barred{};
 };
 
+bool is_readable(int fd) {
+  pollfd polled{.fd = fd, .events = POLLIN, .revents = 0};
+  return fd >= 0 && poll(&polled, 1, 0) > 0;
+}
+
 Result<Opened> open_link(const ClientOptions& options) {
   using Way = ClientOptions::Way;
   std::string barred;
@@ -182,17 +187,20 @@ void Client::on_message(const lcm::DaemonMessage& message) {
   }
 }
 
-Result<void> Client::wait(Clock::time_point deadline) {
+Result<void> Client::wait(Clock::time_point deadline, int input_fd) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
-  std::array<pollfd, 2> polled{{{.fd = link_->fd(), .events = POLLIN, .revents = 0},
-                                {.fd = options_.interrupt_fd, .events = POLLIN, .revents = 0}}};
+  std::array<pollfd, 3> polled{{{.fd = link_->fd(), .events = POLLIN, .revents = 0},
+                                {.fd = options_.interrupt_fd, .events = POLLIN, .revents = 0},
+                                {.fd = input_fd, .events = POLLIN, .revents = 0}}};
   const auto ms = std::clamp<std::int64_t>(left.count(), 0, 3'600'000);
   if (poll(polled.data(), polled.size(), static_cast<int>(ms)) > 0 &&
       (polled[1].revents & POLLIN) != 0) {
     interrupted_ = true;
     return fail("interrupted");
   }
-  return link_->handle([this](const lcm::DaemonMessage& message) { on_message(message); });
+  auto handled = link_->handle([this](const lcm::DaemonMessage& message) { on_message(message); });
+  if (!handled) ended_ = true;
+  return handled;
 }
 
 // Only where messages may be lost.
@@ -287,7 +295,7 @@ Result<void> Client::send_when_due(Repeated& repeated, std::chrono::milliseconds
 
 // One that is lost is followed by another.
 Result<void> Client::send_beside(const Meanwhile& meanwhile, Clock::time_point& next) {
-  if (Clock::now() < next) return {};
+  if (Clock::now() < next && !is_readable(meanwhile.beside_fd)) return {};
   next = Clock::now() + meanwhile.beside_every;
   const auto request = meanwhile.beside();
   if (!request) return {};
@@ -323,12 +331,19 @@ Result<api::Reply> Client::await_reply(Repeated request, Until until, const Mean
     const bool beside = meanwhile.beside && waiting_.accepted && !ending;
     if (beside) {
       if (auto sent = send_beside(meanwhile, next_beside); !sent) return fail(sent.error());
+      if (auto end = meanwhile.end ? meanwhile.end() : std::nullopt) {
+        const auto packet = next_packet(*end);
+        if (!packet) return fail(packet.error());
+        ending = Repeated{.packet = *packet};
+        continue;
+      }
     }
     Clock::time_point wake = Clock::time_point::max();  // over a link that loses nothing
     if (link_->loses() || !request.sent) wake = std::max(request.next_send, Clock::now());
     if (beside) wake = std::min(wake, next_beside);
     if (ends && link_->loses()) wake = std::min(wake, ending->next_send);
-    auto waited = wait(waiting_.accepted ? wake : std::min(wake, give_up));
+    auto waited =
+        wait(waiting_.accepted ? wake : std::min(wake, give_up), beside ? meanwhile.beside_fd : -1);
     if (interrupted_ && meanwhile.on_interrupt && !ending) {
       if (const auto end = meanwhile.on_interrupt()) {
         const auto packet = next_packet(*end);

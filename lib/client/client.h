@@ -73,10 +73,14 @@ class Client {
     // Interrupted, after having made interrupt_fd unreadable: the request that is to end the first
     // one, whose result is awaited as before. Without, and at the second time, waiting ends.
     std::function<std::optional<api::Request>()> on_interrupt{};
-    // Once the request is accepted and is not being ended, this often: a request beside it, whose
-    // answer nobody waits for, such as a sign of life.
+    // Once the request is accepted and is not being ended, this often, and at once while
+    // `beside_fd` is readable, which this changes: a request beside it, whose answer nobody waits
+    // for, such as a sign of life.
     std::function<std::optional<api::Request>()> beside{};
     std::chrono::milliseconds beside_every{100};
+    int beside_fd = -1;  // -1: none
+    // Asked after that: the request that is to end the first one, as of an interruption.
+    std::function<std::optional<api::Request>()> end{};
   };
 
   // Sends the request and waits. kAnswered: returns Accepted or Refused (or Completed, when that
@@ -96,6 +100,9 @@ class Client {
   // are in the former.
   Result<Status> next_state(std::chrono::milliseconds timeout);
   Result<Status> next_health(std::chrono::milliseconds timeout);
+
+  // The daemon has ended, or closed the connection: no call succeeds any more.
+  bool ended() const { return ended_; }
 
   // interrupt_fd has become readable during the last one of the calls above, and that ended it.
   bool interrupted() const { return interrupted_; }
@@ -141,8 +148,8 @@ class Client {
   Result<void> send_beside(const Meanwhile& meanwhile, Clock::time_point& next);
   void show_state(const Meanwhile& meanwhile, Clock::time_point& next);
   Result<void> check_alive(Clock::time_point answered) const;
-  // Handles messages until `deadline`, or until there were some. Fails when interrupted.
-  Result<void> wait(Clock::time_point deadline);
+  // Handles messages until `deadline`, or until there were some, or input. Fails when interrupted.
+  Result<void> wait(Clock::time_point deadline, int input_fd = -1);
 
   std::unique_ptr<Link> link_;
   ClientOptions options_;
@@ -153,6 +160,7 @@ class Client {
   std::int64_t number_ = 0;
   Waiting waiting_;
   bool interrupted_ = false;
+  bool ended_ = false;
   bool subscribed_ = false;
 
   StatusCollector collector_;

@@ -369,6 +369,44 @@ TEST_F(ClientTest, SendsRequestsBesideTheOneThatIsAwaited) {
   }
 }
 
+// Whoever presses a key does not wait for the next sign of life.
+TEST_F(ClientTest, InputIsTakenAtOnceAndMayEndTheRequest) {
+  for (const bool loses : {true, false}) {
+    open(loses, std::chrono::minutes(5));
+    requests_.clear();
+    const int input = eventfd(0, EFD_CLOEXEC);
+    std::optional<lcm::RequestId> first;
+    int beside = 0;
+    bool pressed = false;
+    daemon_ = [&] {
+      const auto& request = std::get<api::Request>(requests_.back().content);
+      reply(api::Accepted{});
+      if (!first) first = requests_.back().id;
+      if (const auto* jog = std::get_if<api::Jog>(&request); jog != nullptr && jog->renew) {
+        eventfd_write(input, 1);
+      } else if (std::holds_alternative<api::Stop>(request)) {
+        link_->say(lcm::ReplyMessage{.id = *first, .reply = result(api::Outcome::kStopped)});
+      }
+    };
+    const auto jogged = client_->run(
+        api::Jog{.motor = "theta", .per_s = 1}, Client::Until::kResult,
+        {.beside = [&]() -> std::optional<api::Request> {
+           if (++beside == 1) return api::Jog{.renew = true};
+           eventfd_t count = 0;
+           eventfd_read(input, &count);
+           pressed = true;
+           return std::nullopt;
+         },
+         .beside_every = std::chrono::hours(1),
+         .beside_fd = input,
+         .end = [&] { return pressed ? std::optional<api::Request>(api::Stop{}) : std::nullopt; }});
+    close(input);
+    ASSERT_TRUE(jogged) << jogged.error().text();
+    EXPECT_EQ(std::get<api::Completed>(*jogged).outcome, api::Outcome::kStopped);
+    EXPECT_EQ(beside, 2);
+  }
+}
+
 TEST_F(ClientTest, InterruptedASecondTimeNoLongerWaits) {
   on_interrupt_ = [&]() -> std::optional<api::Request> { return api::Stop{}; };  // readable still
   daemon_ = [this] {
@@ -414,9 +452,11 @@ TEST_F(ClientTest, TheEndOfTheLinkIsTheEndOfTheDaemon) {
     reply(api::Accepted{});
     link_->end();
   };
+  EXPECT_FALSE(client_->ended());
   const auto result = move();
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().text().find("ended"), std::string::npos);
+  EXPECT_TRUE(client_->ended()) << "whoever goes on asking would do so for ever";
 }
 
 TEST_F(ClientTest, AResultBeforeTheEndOfTheLinkCounts) {

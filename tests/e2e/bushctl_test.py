@@ -9,6 +9,9 @@ import unittest
 
 from rig import FAR, MOTORS, TOP, EndToEndTest, program
 
+sys.path.insert(0, str(TOP / "tests/tools/bushtab"))
+from terminal import Terminal
+
 
 class Bushctl(EndToEndTest):
     def test_wait_succeeds_only_for_reached(self):
@@ -203,6 +206,27 @@ class Bushctl(EndToEndTest):
         self.assertEqual(motor["target_steps"], -FAR)
         # The table's cruise: 10 time units of 40 us a step.
         self.assertAlmostEqual(motor["velocity_steps_per_s"], -2500, delta=1)
+
+    def test_watch_and_health_end_with_the_daemon(self):
+        self.bring_up()
+        terminals = [self.enterContext(Terminal([program("BUSHCTL"), *words.split()])) for words in ("watch", "health --watch")]
+        for terminal in terminals:
+            terminal.wait_for("hall", "Ctrl-C ends")
+        self.bushd.end(signal.SIGKILL)
+        for terminal in terminals:
+            self.assertEqual(terminal.end(), 1)
+            self.assertFalse(terminal.screen.alternate)
+            self.assertIn("the daemon has ended", terminal.screen.text())
+
+    def test_what_is_typed_into_watch_is_no_command(self):
+        self.bring_up()
+        shell = self.enterContext(Terminal(["sh", "-c", f"{program('BUSHCTL')} watch; read -r typed; echo got: $typed"]))
+        shell.wait_for("hall", "Ctrl-C ends")
+        shell.send("bushctl move a0 1000\r")
+        self.bushd.end(signal.SIGKILL)
+        shell.wait_for("the daemon has ended")
+        shell.send("that\r")
+        shell.wait_for("got: that")
 
     def test_watch_ends_after_a_count(self):
         self.bring_up()

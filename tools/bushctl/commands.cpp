@@ -8,6 +8,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <initializer_list>
 #include <optional>
 
 #include "base/printable.h"
@@ -20,13 +21,13 @@ namespace {
 namespace api = bushd::api;
 using bushd::client::Client;
 
-int block_signals() {
+// `fd`: of a former call; -1: none.
+int block_signals(int fd, std::initializer_list<int> numbers) {
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
+  for (const int number : numbers) sigaddset(&signals, number);
   sigprocmask(SIG_BLOCK, &signals, nullptr);
-  return signalfd(-1, &signals, SFD_CLOEXEC);
+  return signalfd(fd, &signals, SFD_CLOEXEC);
 }
 
 // The motors that it moves, all of which a stop would end; none of other requests.
@@ -67,8 +68,12 @@ bool as_hoped(const api::Reply& reply, Hope hope) {
 }  // namespace
 
 int signal_descriptor() {
-  static const int fd = block_signals();
+  static const int fd = block_signals(-1, {SIGINT, SIGTERM});
   return fd;
+}
+
+void take_hangup_too() {
+  block_signals(signal_descriptor(), {SIGINT, SIGTERM, SIGHUP});
 }
 
 bool take_interrupt() {

@@ -62,6 +62,8 @@ int with_client(const Connection& connection,
 int signal_descriptor();
 // SIGINT or SIGTERM has come since; once, and then it is forgotten.
 bool take_interrupt();
+// From now on SIGHUP is one of these.
+void take_hangup_too();
 
 enum class Hope { kReached, kDone };  // what the result is when all is well
 

@@ -27,13 +27,6 @@ bool is_terminal() {
   return isatty(STDERR_FILENO) != 0 && kind != nullptr && std::string_view(kind) != "dumb";
 }
 
-// With the last column left free, where some terminals would go on to the next line.
-std::size_t columns_of_terminal() {
-  winsize size{};
-  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
-  return (known ? size.ws_col : 80u) - 1u;
-}
-
 // At the speed that it has now; nothing while that tells nothing.
 std::optional<double> seconds_left(const api::MotorState& motor) {
   const double way = static_cast<double>(motor.target_steps - motor.position_steps);
@@ -50,6 +43,12 @@ std::string bar(double part, std::size_t columns) {
 }
 
 }  // namespace
+
+std::size_t columns_of_terminal(int fd) {
+  winsize size{};
+  const bool known = ioctl(fd, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
+  return (known ? size.ws_col : 80u) - 1u;
+}
 
 Progress::Progress(const api::MotorNames& motors)
     : terminal_(is_terminal()), next_line_(Clock::now() + kBetweenLines) {
@@ -88,7 +87,7 @@ void Progress::show(const Status& status) {
   const std::string line = text(status, terminal_ ? kBarColumns : 0);
   if (line.empty()) return;
   if (terminal_) {
-    fmt::print(stderr, "\r{:.{}}\x1b[K", line, columns_of_terminal());
+    fmt::print(stderr, "\r{:.{}}\x1b[K", line, columns_of_terminal(STDERR_FILENO));
     shown_ = true;
   } else if (Clock::now() >= next_line_) {
     fmt::print(stderr, "bushctl: {}\n", line);

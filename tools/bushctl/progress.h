@@ -12,6 +12,9 @@
 
 namespace bushctl {
 
+// Of this terminal, with the last one left free, where some would go on to the next line.
+std::size_t columns_of_terminal(int fd);
+
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;

@@ -257,6 +257,30 @@ std::string way_text(const Status& status, std::size_t mcu, std::size_t index) {
                      position_text(motor, motor.target_steps, motor.user_target, scale));
 }
 
+std::string stand_text(const Status& status, std::size_t mcu, std::size_t index) {
+  const api::MotorState& motor = status.states[mcu].snapshot.motors[index];
+  const auto description = description_of(status.descriptions.at(mcu).snapshot, index, motor.name);
+  std::string text = fmt::format(
+      "{}, {}", position_text(motor, motor.position_steps, motor.user, description.scale),
+      moving_word(motor, "moving at ", "at rest"));
+  if (motor.moving && !motor.paused) text += speed_text(motor, description.scale);
+  return text;
+}
+
+std::string bounds_text(const Status& status, std::size_t mcu, std::size_t index) {
+  const api::MotorState& motor = status.states[mcu].snapshot.motors[index];
+  const auto description = description_of(status.descriptions.at(mcu).snapshot, index, motor.name);
+  const auto coordinates = units::Coordinates::make(description.scale);
+  std::string text = "no soft limits";
+  if (description.soft_limits && coordinates) {
+    const units::SoftLimits limits = coordinates->on_user_scale(*description.soft_limits);
+    text = fmt::format("{:g} .. {:g}", limits.low, limits.high);
+  }
+  if (motor.trust != api::Trust::kKnown) text += fmt::format(" | {}", word(motor.trust));
+  if (const std::string notes = notes_text(motor); !notes.empty()) text += " | " + notes;
+  return text;
+}
+
 std::string json(const Status& status) {
   nlohmann::json out = {{"motors", nlohmann::json::array()},
                         {"mcus", nlohmann::json::array()},

@@ -1,9 +1,12 @@
 // Lines drawn anew again and again, on the terminal's second screen, so that the first is there
-// again afterwards.
+// again afterwards. Keys have no meaning meanwhile, and nobody reads them later: what is typed here
+// is no command for the shell.
 #pragma once
 
 #include <string>
 #include <vector>
+
+#include "raw_terminal.h"
 
 namespace bushctl {
 
@@ -22,6 +25,7 @@ class Screen {
  private:
   void draw(const std::string& notice) const;
 
+  RawTerminal terminal_;
   std::string elsewhere_;
   std::vector<std::string> lines_;
 };

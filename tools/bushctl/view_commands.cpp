@@ -69,7 +69,10 @@ int show_health(Client& client, const HealthOptions& options) {
     if (health && !screen) print(*health, options.json);
     if (health && options.count > 0 && ++shown >= options.count) return kDone;
     if (!health && client.interrupted()) return kDone;
-    if (!health && !screen) return failure(client, health.error());
+    if (!health && (client.ended() || !screen)) {
+      screen.reset();
+      return failure(client, health.error());
+    }
     if (!health) screen->notice("no health from bushd; what is shown is old");
     health = client.next_health(milliseconds(options.timeout_s));
   }

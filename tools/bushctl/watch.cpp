@@ -94,7 +94,8 @@ int watch(bushd::client::Client& client, const WatchOptions& options) {
       if (options.count > 0 && ++shown >= options.count) return kDone;
     } else if (client.interrupted()) {
       return kDone;
-    } else if (!view->silent()) {
+    } else if (client.ended() || !view->silent()) {
+      view.reset();
       return failure(client, status.error());
     }
     status = client.next_state(options.timeout);

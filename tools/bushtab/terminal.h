@@ -32,6 +32,8 @@ class Terminal {
   // Waits. kInterrupted: Ctrl-C. kGone: the terminal is, or somebody wants the program to end; the
   // signals that say so then stay blocked.
   Input wait();
+  // wait() would not wait.
+  bool key_waits() const { return !waiting_.empty(); }
 
  private:
   Terminal();
