@@ -12,4 +12,6 @@ get_filename_component(source_dir ${CMAKE_CURRENT_LIST_DIR}/.. ABSOLUTE)
 set(debug_flags "-gdwarf-2 -gno-record-gcc-switches \"-fdebug-prefix-map=${source_dir}=.\" \"-fdebug-prefix-map=${CMAKE_BINARY_DIR}=.\"")
 # A switch made into a table would have it in RAM.
 set(CMAKE_C_FLAGS_INIT "-mmcu=${BUSHD_AVR_CHIP} -ffunction-sections -fdata-sections -fno-tree-switch-conversion ${debug_flags}")
+# Labels within functions would be symbols, which disassemblers take for functions.
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,--discard-locals")
 set(CMAKE_ASM_FLAGS_INIT "-mmcu=${BUSHD_AVR_CHIP} ${debug_flags}")

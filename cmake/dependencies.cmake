@@ -33,6 +33,7 @@ if(BUSHD_TESTS)
   # The images for ATmega2560, and the simulator that runs them in tests and bushsim. It is under the GPL: what is linked
   # with it is for trying only, not for giving away under another licence.
   pkg_check_modules(SIMAVR IMPORTED_TARGET simavr)
+  pkg_check_modules(LIBDW IMPORTED_TARGET libdw)
   find_program(AVR_GCC avr-gcc)
   # The same for LM3S6965.
   find_program(ARM_GCC arm-none-eabi-gcc)

@@ -38,7 +38,7 @@ if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_check(atmega1284p_stack_is_bounded LABEL slow NEEDS atmega1284p_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega1284p avr-objdump ${ATMEGA1284P_IMAGES}-500000.elf)
 else()
-  message(STATUS "The image for ATmega2560 is not tested: it needs gcc-avr and libsimavr-dev (tools/setup)")
+  message(STATUS "The image for ATmega2560 is not tested: it needs gcc-avr, libsimavr-dev and libdw-dev (tools/setup)")
 endif()
 
 if(ARM_GCC AND QEMU_SYSTEM_ARM)

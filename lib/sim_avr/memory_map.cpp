@@ -1,7 +1,6 @@
 #include "sim_avr/memory_map.h"
 
-#include <fcntl.h>
-#include <unistd.h>
+#include <elfutils/libdw.h>
 
 #include <cstdio>
 #include <memory>
@@ -17,8 +16,7 @@ constexpr std::uint64_t kRamEnd = kRam + 0x10000;
 }  // namespace
 
 AvrMemoryMap::AvrMemoryMap(const std::string& image, const std::string& owners) : MemoryMap(image) {
-  read_units();
-  read_symbols();
+  read_image();
   assign_writers(owners);
   for (std::size_t i = 0; i < objects().size(); ++i) {
     const Object& object = objects()[i];
@@ -29,20 +27,41 @@ AvrMemoryMap::AvrMemoryMap(const std::string& image, const std::string& owners) 
   }
 }
 
-// Rows are `FILE LINE 0xADDRESS`, below the compilation unit that they are of.
-void AvrMemoryMap::read_units() {
-  Unit unit = kNoUnit;
-  for_lines("avr-objdump --dwarf=decodedline " + quoted(image()), [&](const std::string& line) {
-    if (line.starts_with("CU: ")) {
-      unit = unit_of(line.substr(4, line.find_last_not_of(": \r") - 3));
-      return;
+void AvrMemoryMap::read_image() {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(image().c_str(), "re"),
+                                                             std::fclose);
+  if (!file) throw std::runtime_error(image() + ": cannot be read");
+  elf_version(EV_CURRENT);
+  const std::unique_ptr<Elf, int (*)(Elf*)> elf(
+      elf_begin(::fileno(file.get()), ELF_C_READ, nullptr), elf_end);
+  read_units(elf.get());
+  read_symbols(elf.get());
+}
+
+// Those of a compilation unit are of its source file, headers that it includes as well.
+void AvrMemoryMap::read_units(Elf* elf) {
+  const std::unique_ptr<Dwarf, int (*)(Dwarf*)> dwarf(dwarf_begin_elf(elf, DWARF_C_READ, nullptr),
+                                                      dwarf_end);
+  Dwarf_CU* compiled = nullptr;
+  Dwarf_Die die;
+  while (dwarf &&
+         dwarf_get_units(dwarf.get(), compiled, &compiled, nullptr, nullptr, &die, nullptr) == 0) {
+    Dwarf_Lines* lines = nullptr;
+    std::size_t count = 0;
+    const char* const file = dwarf_diename(&die);
+    if (file == nullptr || dwarf_getsrclines(&die, &lines, &count) != 0) continue;
+    const Unit unit = unit_of(file);
+    for (std::size_t i = 0; i < count; ++i) {
+      Dwarf_Line* const line = dwarf_onesrcline(lines, i);
+      Dwarf_Addr address = 0;
+      bool behind = false;
+      dwarf_lineaddr(line, &address);
+      dwarf_lineendsequence(line, &behind);
+      if (behind) continue;
+      if (unit_at_.size() <= address / 2) unit_at_.resize(address / 2 + 1, kNoUnit);
+      unit_at_[address / 2] = unit;
     }
-    const std::size_t hex = line.rfind("0x");
-    if (unit == kNoUnit || hex == std::string::npos) return;
-    const std::size_t word = std::stoul(line.substr(hex), nullptr, 16) / 2;
-    if (unit_at_.size() <= word) unit_at_.resize(word + 1, kNoUnit);
-    unit_at_[word] = unit;
-  });
+  }
   if (units() == 1) throw std::runtime_error(image() + ": has no line numbers");
 }
 
@@ -64,26 +83,21 @@ void AvrMemoryMap::take_symbol(const std::string& name, const GElf_Sym& symbol,
   if (GELF_ST_BIND(symbol.st_info) == STB_LOCAL) defined_in_[name] = source;
 }
 
-void AvrMemoryMap::read_symbols() {
-  elf_version(EV_CURRENT);
-  const int file = ::open(image().c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throw std::runtime_error(image() + ": cannot be read");
-  const std::unique_ptr<Elf, int (*)(Elf*)> elf(elf_begin(file, ELF_C_READ, nullptr), elf_end);
+void AvrMemoryMap::read_symbols(Elf* elf) {
   std::set<std::size_t> code;
   std::string source;
-  for (Elf_Scn* section = nullptr; (section = elf_nextscn(elf.get(), section)) != nullptr;) {
+  for (Elf_Scn* section = nullptr; (section = elf_nextscn(elf, section)) != nullptr;) {
     GElf_Shdr header;
     if (gelf_getshdr(section, &header) == nullptr || header.sh_type != SHT_SYMTAB) continue;
     Elf_Data* const data = elf_getdata(section, nullptr);
     GElf_Sym symbol;
     for (int i = 0; gelf_getsym(data, i, &symbol) != nullptr; ++i) {
-      const std::string name = elf_strptr(elf.get(), header.sh_link, symbol.st_name);
+      const std::string name = elf_strptr(elf, header.sh_link, symbol.st_name);
       if (GELF_ST_TYPE(symbol.st_info) == STT_FILE) source = name;
       if (symbol.st_value < kRam && symbol.st_shndx != SHN_ABS) code.insert(symbol.st_value / 2);
       take_symbol(name, symbol, source);
     }
   }
-  ::close(file);
   fill_units(code);
   if (variables_end_ == 0 || stack_top_ == 0) {
     throw std::runtime_error(image() + ": does not tell where its variables and its stack end");

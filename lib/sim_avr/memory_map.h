@@ -1,5 +1,5 @@
 // What lies where in the RAM of an image for AVR, and who may write there (sim/memory_map.h), from
-// the ELF's symbols and line numbers (avr-objdump).
+// the ELF's symbols and line numbers.
 #pragma once
 
 #include <gelf.h>
@@ -38,9 +38,10 @@ class AvrMemoryMap : public MemoryMap {
   std::string place_of(std::uint32_t pc) const;
 
  private:
-  void read_units();
+  void read_image();
+  void read_units(Elf* elf);
   void fill_units(const std::set<std::size_t>& symbols);
-  void read_symbols();
+  void read_symbols(Elf* elf);
   void take_symbol(const std::string& name, const GElf_Sym& symbol, const std::string& source);
   void assign_writers(const std::string& owners);
 

@@ -47,7 +47,7 @@ namespace {
 Result<std::string> missing_for(const std::string& chip) {
   if (chip == "atmega2560" || chip == "atmega1284p") {
 #ifndef BUSHSIM_AVR
-    return "simavr (libsimavr-dev, libelf-dev)";
+    return "simavr (libsimavr-dev, libdw-dev)";
 #endif
     return "";
   }
