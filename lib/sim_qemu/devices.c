@@ -52,8 +52,7 @@ void flash_set(uint32_t address, uint32_t word) {
     store_violation(address);
   }
   flash.words[(address - WRITTEN) / 4] = word;
-  address_space_write_rom(&address_space_memory, address, MEMTXATTRS_UNSPECIFIED, &word,
-                          sizeof word);
+  address_space_write_rom(&address_space_memory, address, NO_ATTRIBUTES, &word, sizeof word);
 }
 
 void flash_wear(void) {
@@ -212,6 +211,6 @@ void devices_init(void) {
   cover(&reset_cause.region, RESET_CAUSE_AT, 4, &kCause);
   timer_init_full(&watchdog.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_watchdog, NULL);
   memset(flash.words, 0xFF, sizeof flash.words);
-  address_space_write_rom(&address_space_memory, WRITTEN, MEMTXATTRS_UNSPECIFIED, flash.words,
+  address_space_write_rom(&address_space_memory, WRITTEN, NO_ATTRIBUTES, flash.words,
                           sizeof flash.words);
 }

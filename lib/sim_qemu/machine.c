@@ -12,18 +12,22 @@
  */
 #include "sim_qemu/machine.h"
 
+#include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "sim_qemu/watch.h"
 
+/* Of the interface that QEMU declares: what is used of it is in all. 7.2 takes up to 1, 10.0 from 2
+ * on. */
 __attribute__((visibility("default"))) const int qemu_plugin_version = QEMU_PLUGIN_VERSION;
 __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t id,
                                                                const qemu_info_t* info, int argc,
                                                                char** argv);
 
-#define TIMER_1 "/machine/unattached/device[4]" /* begins ticks */
+#define TIMER_1 0x40031000u /* begins ticks */
 #define TIMER_IMR 0x18u
 #define EVENTS 1024
 
@@ -97,7 +101,7 @@ void store_violation(uint32_t address) {
 
 uint32_t register_of(MemoryRegion* region, hwaddr address) {
   uint64_t data = 0;
-  memory_region_dispatch_read(region, address, &data, MO_32, MEMTXATTRS_UNSPECIFIED);
+  memory_region_dispatch_read(region, address, &data, MO_32, NO_ATTRIBUTES);
   return (uint32_t)data;
 }
 
@@ -106,9 +110,13 @@ void cover(MemoryRegion* region, hwaddr at, uint64_t size, const MemoryRegionOps
   memory_region_add_subregion_overlap(get_system_memory(), at, region, 1);
 }
 
-Object* find(const char* path, const char* type) {
-  Object* found = object_resolve_path(path, NULL);
-  if (found == NULL || strcmp(object_get_typename(found), type) != 0) give_up();
+MemoryRegion* find(hwaddr at, const char* type) {
+  MemoryRegion* const found = memory_region_find(get_system_memory(), at, 4).region;
+  Object* const device = found == NULL ? NULL : memory_region_owner(found);
+  if (device == NULL || strcmp(object_get_typename(device), type) != 0) {
+    fprintf(stderr, "QEMU's board has no %s at 0x%" PRIx64 "\n", type, at);
+    give_up();
+  }
   return found;
 }
 
@@ -146,7 +154,7 @@ static void obey(void) {
         reset_cause_set(command.value);
         break;
       case LOCKSTEP_STOP_TICKS:
-        memory_region_dispatch_write(tick_timer, TIMER_IMR, 0, MO_32, MEMTXATTRS_UNSPECIFIED);
+        memory_region_dispatch_write(tick_timer, TIMER_IMR, 0, MO_32, NO_ATTRIBUTES);
         break;
       case LOCKSTEP_KEPT_RAM:
         cpu_physical_memory_rw(RAM, &command.value, sizeof command.value, true);
@@ -173,7 +181,7 @@ static void obey(void) {
         watch_from(command.address);
         break;
       case LOCKSTEP_POKE:
-        address_space_write_rom(&address_space_memory, command.address, MEMTXATTRS_UNSPECIFIED,
+        address_space_write_rom(&address_space_memory, command.address, NO_ATTRIBUTES,
                                 &command.value, 2);
         break;
       default:
@@ -202,7 +210,7 @@ static void on_machine_done(Notifier* notifier, void* data) {
   pins_init();
   uart_init();
   devices_init();
-  tick_timer = sysbus_mmio_get_region(find(TIMER_1, "stellaris-gptm"), 0);
+  tick_timer = find(TIMER_1, "stellaris-gptm");
   timer_init_full(&lockstep.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_time, NULL);
   obey();
   timer_mod(&lockstep.timer, 0);

@@ -22,7 +22,8 @@ void store_violation(uint32_t address);
 
 /* machine.c: QEMU's devices. `size` bytes at `at` are those of `ops` from now on. */
 void cover(MemoryRegion* region, hwaddr at, uint64_t size, const MemoryRegionOps* ops);
-Object* find(const char* path, const char* type);
+/* The registers of QEMU's device of that type at `at`; before anything covers them. */
+MemoryRegion* find(hwaddr at, const char* type);
 uint32_t register_of(MemoryRegion* region, hwaddr address);
 
 /* uart.c */

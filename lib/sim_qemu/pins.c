@@ -1,13 +1,12 @@
 /* Pins, and the shift registers behind them: 74HC595 for directions, 74HC165 for inputs. */
 #include "sim_qemu/machine.h"
 
-/* QEMU's names for them, in the order in which the board makes them. */
-#define GPIO_A "/machine/unattached/device[8]"
-#define GPIO_B "/machine/unattached/device[9]"
-#define GPIO_C "/machine/unattached/device[10]"
-#define GPIO_D "/machine/unattached/device[11]"
-#define GPIO_E "/machine/unattached/device[12]"
-#define GPIO_F "/machine/unattached/device[13]"
+#define GPIO_A 0x40004000u
+#define GPIO_B 0x40005000u
+#define GPIO_C 0x40006000u
+#define GPIO_D 0x40007000u
+#define GPIO_E 0x40024000u
+#define GPIO_F 0x40025000u
 
 #define SYSTEM_INPUTS 4
 static qemu_irq system_input[SYSTEM_INPUTS];
@@ -100,8 +99,8 @@ static void on_input_load(void* opaque, int n, int level) {
   show_input();
 }
 
-static DeviceState* gpio(const char* path) {
-  return (DeviceState*)find(path, "pl061_luminary");
+static DeviceState* gpio(hwaddr at) {
+  return (DeviceState*)memory_region_owner(find(at, "pl061_luminary"));
 }
 
 static void wire(DeviceState* port, int pin, void (*handler)(void*, int, int), int n) {

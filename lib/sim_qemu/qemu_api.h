@@ -1,6 +1,6 @@
-/* What the machine uses of QEMU 7.2, whose headers are not in any package: declared here by hand.
- * Structs that are only handed through are opaque; where QEMU wants memory for one, there is more
- * than it needs. */
+/* What the machine uses of QEMU, as far as 7.2 (Debian 12) and 10.0 (Debian 13) have it in common.
+ * Its headers are not in any package: declared here by hand. Structs that are only handed through
+ * are opaque; where QEMU wants memory for one, there is more than it needs. */
 #ifndef BUSHD_LIB_SIM_QEMU_QEMU_API_H
 #define BUSHD_LIB_SIM_QEMU_QEMU_API_H
 
@@ -11,7 +11,6 @@
 /* Plugins. */
 typedef uint64_t qemu_plugin_id_t;
 typedef struct qemu_info_t qemu_info_t;
-#define QEMU_PLUGIN_VERSION 1
 typedef uint32_t qemu_plugin_meminfo_t;
 struct qemu_plugin_tb;
 struct qemu_plugin_insn;
@@ -22,7 +21,6 @@ void qemu_plugin_register_vcpu_tb_trans_cb(qemu_plugin_id_t id,
                                                             struct qemu_plugin_tb* block));
 size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb* block);
 struct qemu_plugin_insn* qemu_plugin_tb_get_insn(const struct qemu_plugin_tb* block, size_t i);
-const void* qemu_plugin_insn_data(const struct qemu_plugin_insn* instruction);
 size_t qemu_plugin_insn_size(const struct qemu_plugin_insn* instruction);
 uint64_t qemu_plugin_insn_vaddr(const struct qemu_plugin_insn* instruction);
 void qemu_plugin_register_vcpu_insn_exec_cb(struct qemu_plugin_insn* instruction,
@@ -39,7 +37,6 @@ bool qemu_plugin_mem_is_store(qemu_plugin_meminfo_t info);
 typedef struct Object Object;
 typedef struct DeviceState DeviceState;
 typedef struct IRQState* qemu_irq;
-Object* object_resolve_path(const char* path, bool* ambiguous);
 const char* object_get_typename(const Object* object);
 qemu_irq qemu_allocate_irq(void (*handler)(void* opaque, int n, int level), void* opaque, int n);
 void qemu_set_irq(qemu_irq irq, int level);
@@ -72,9 +69,9 @@ void qemu_chr_be_write(Chardev* chardev, const uint8_t* bytes, int size);
 typedef uint64_t hwaddr;
 typedef struct AddressSpace AddressSpace;
 typedef struct MemTxAttrs {
-  unsigned bits;
+  uint64_t bits; /* 7.2 takes the lower half */
 } MemTxAttrs;
-#define MEMTXATTRS_UNSPECIFIED ((MemTxAttrs){1})
+#define NO_ATTRIBUTES ((MemTxAttrs){0})
 #define MO_32 2
 #define DEVICE_LITTLE_ENDIAN 2
 typedef struct MemoryRegion {
@@ -97,9 +94,15 @@ typedef struct MemoryRegionOps {
     bool unaligned;
   } impl;
 } MemoryRegionOps;
+typedef struct MemoryRegionSection {
+  uint64_t size[2];
+  MemoryRegion* region;
+  uint64_t space[13];
+} MemoryRegionSection;
 extern AddressSpace address_space_memory;
 MemoryRegion* get_system_memory(void);
-MemoryRegion* sysbus_mmio_get_region(Object* device, int n);
+MemoryRegionSection memory_region_find(MemoryRegion* region, hwaddr address, uint64_t size);
+Object* memory_region_owner(MemoryRegion* region);
 void memory_region_init_io(MemoryRegion* region, Object* owner, const MemoryRegionOps* ops,
                            void* opaque, const char* name, uint64_t size);
 void memory_region_add_subregion_overlap(MemoryRegion* region, hwaddr offset, MemoryRegion* sub,

@@ -1,7 +1,7 @@
 #include "sim_qemu/qemu_mcu.h"
 
-#include <fcntl.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -18,7 +19,6 @@ namespace {
 
 // As firmware/ports/lm3s6965/journal.h has it.
 constexpr std::uint32_t kJournal = 0x3F800;
-constexpr const char* kEnded = "QEMU has ended: is qemu-system-arm 7.2 installed?";
 constexpr std::uint32_t kBlank = 0xFFFFFFFF;
 constexpr std::uint32_t kKindAddress = 4;
 constexpr std::uint32_t kKindBootNumber = 5;
@@ -37,11 +37,11 @@ std::uint32_t record_of(std::uint32_t kind, std::uint32_t value) {
 }
 
 // In the child, between fork and exec.
-[[noreturn]] void become_qemu(const char* image, int socket, const char* plugin, pid_t parent) {
+[[noreturn]] void become_qemu(const char* image, int socket, int complaints, const char* plugin,
+                              pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
-  const int silence = ::open("/dev/null", O_WRONLY);
-  ::dup2(silence, STDERR_FILENO);
+  ::dup2(complaints, STDERR_FILENO);
   sigset_t none;
   ::sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -50,6 +50,7 @@ std::uint32_t record_of(std::uint32_t kind, std::uint32_t value) {
            "-display", "none", "-monitor", "none", "-icount", "shift=4,sleep=off,align=off",
            "-chardev", "null,id=line", "-serial", "chardev:line", "-plugin", plugin, "-kernel",
            image, static_cast<char*>(nullptr));
+  ::perror("qemu-system-arm");
   ::_exit(127);
 }
 
@@ -102,9 +103,13 @@ void QemuMcu::start(std::uint32_t reset_cause) {
     throw std::system_error(errno, std::generic_category(), "a socket for QEMU");
   }
   const std::string plugin = std::string(BUSHD_QEMU_MACHINE) + ",fd=0" + (map_ ? ",watch=on" : "");
+  complaints_ = ::memfd_create("complaints", MFD_CLOEXEC);
+  if (complaints_ < 0) throw std::system_error(errno, std::generic_category(), "memfd_create");
   const pid_t parent = ::getpid();
   process_ = ::fork();
-  if (process_ == 0) become_qemu(options_.image.c_str(), ends[1], plugin.c_str(), parent);
+  if (process_ == 0) {
+    become_qemu(options_.image.c_str(), ends[1], complaints_, plugin.c_str(), parent);
+  }
   ::close(ends[1]);
   socket_ = ends[0];
   if (process_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
@@ -134,9 +139,21 @@ void QemuMcu::violated(const lockstep_message& event) const {
                            map_->thing_at(event.address));
 }
 
+// Of itself.
+void QemuMcu::has_ended() const {
+  siginfo_t how{};
+  ::waitid(P_PID, static_cast<id_t>(process_), &how, WEXITED | WNOWAIT);
+  std::array<char, 1000> said;
+  const ssize_t size = std::max<ssize_t>(0, ::pread(complaints_, said.data(), said.size(), 0));
+  throw std::runtime_error("QEMU has ended with " + std::to_string(how.si_status) + ": " +
+                           std::string(said.data(), static_cast<std::size_t>(size)));
+}
+
 void QemuMcu::end() {
-  if (socket_ >= 0) ::close(socket_);
-  socket_ = -1;
+  for (int* const file : {&socket_, &complaints_}) {
+    if (*file >= 0) ::close(*file);
+    *file = -1;
+  }
   if (process_ <= 0) return;
   ::kill(process_, SIGKILL);
   while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {
@@ -175,7 +192,7 @@ void QemuMcu::send_orders() {
   while (left > 0) {
     const ssize_t sent = ::send(socket_, out, left, MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) throw std::runtime_error(kEnded);
+    if (sent <= 0) has_ended();
     out += sent;
     left -= static_cast<std::size_t>(sent);
   }
@@ -192,7 +209,7 @@ bool QemuMcu::run() {
     auto* const in = reinterpret_cast<char*>(events.data());
     const ssize_t got = ::recv(socket_, in + have, sizeof events - have, 0);
     if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) throw std::runtime_error(kEnded);
+    if (got <= 0) has_ended();
     have += static_cast<std::size_t>(got);
     const std::size_t count = have / sizeof events[0];
     for (std::size_t i = 0; i < count; ++i) {

@@ -94,6 +94,7 @@ class QemuMcu final : public Mcu {
 
   void order_watch();
   [[noreturn]] void violated(const lockstep_message& event) const;
+  [[noreturn]] void has_ended() const;
 
   QemuOptions options_;
   std::shared_ptr<const QemuMemoryMap> map_;
@@ -102,6 +103,7 @@ class QemuMcu final : public Mcu {
   EdgeSink* sink_;
   pid_t process_ = -1;
   int socket_ = -1;
+  int complaints_ = -1;                           // a file with what QEMU writes to stderr
   std::vector<lockstep_message> orders_;          // not yet sent
   std::map<std::uint32_t, std::uint32_t> flash_;  // words that are not blank
   std::uint32_t kept_ram_ = 0;                    // over a watchdog reset

@@ -1,8 +1,7 @@
 /* The UART is QEMU's; BUSY, how long a byte takes, and when one comes are added on the way. */
 #include "sim_qemu/machine.h"
 
-#define TIMER_2 "/machine/unattached/device[5]" /* starts and paces what is sent */
-#define UART_0 "/machine/unattached/device[16]"
+#define TIMER_2 0x40032000u /* starts and paces what is sent */
 #define UART_0_AT 0x4000C000u
 #define TIMER_CTL 0xCu
 #define PAGE 0x1000u /* of registers */
@@ -66,7 +65,7 @@ static void uart_write(void* opaque, hwaddr address, uint64_t data, unsigned siz
     uart.busy_until_ns = (uart.busy_until_ns > now_ns ? uart.busy_until_ns : now_ns) + byte_ns;
     byte_sent((uint8_t)data);
   }
-  memory_region_dispatch_write(uart.real, address, data, MO_32, MEMTXATTRS_UNSPECIFIED);
+  memory_region_dispatch_write(uart.real, address, data, MO_32, NO_ATTRIBUTES);
 }
 
 void uart_init(void) {
@@ -74,7 +73,7 @@ void uart_init(void) {
       .read = uart_read, .write = uart_write, .endianness = DEVICE_LITTLE_ENDIAN};
   uart.line = qemu_chr_find("line");
   if (uart.line == NULL) give_up();
-  uart.real = sysbus_mmio_get_region(find(UART_0, "pl011_luminary"), 0);
-  uart.timer = sysbus_mmio_get_region(find(TIMER_2, "stellaris-gptm"), 0);
+  uart.real = find(UART_0_AT, "pl011_luminary");
+  uart.timer = find(TIMER_2, "stellaris-gptm");
   cover(&uart.region, UART_0_AT, PAGE, &kUart);
 }

@@ -119,8 +119,10 @@ static void on_translation(qemu_plugin_id_t id, struct qemu_plugin_tb* block) {
     if (pc == watch.from) {
       qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_start, QEMU_PLUGIN_CB_NO_REGS, NULL);
     }
-    const uint32_t target =
-        target_of(pc, qemu_plugin_insn_data(instruction), qemu_plugin_insn_size(instruction));
+    uint8_t bytes[4] = {0};
+    const size_t size = qemu_plugin_insn_size(instruction);
+    cpu_physical_memory_rw(pc, bytes, size, false);
+    const uint32_t target = target_of(pc, bytes, size);
     if (target != 0 && unit_at(pc) != NOBODY && unit_at(target) == NOBODY) {
       qemu_plugin_register_vcpu_insn_exec_cb(instruction, on_library_call, QEMU_PLUGIN_CB_NO_REGS,
                                              by);

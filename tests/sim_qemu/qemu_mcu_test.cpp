@@ -1,7 +1,10 @@
 #include "sim_qemu/qemu_mcu.h"
 
+#include <gmock/gmock.h>
+
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 #include <string>
 
 #include "engine/message.h"
@@ -9,6 +12,21 @@
 
 namespace bushd::sim {
 namespace {
+
+TEST(QemuThatEnds, SaysWhy) {
+  struct Nobody : Mcu::Driver {
+    void transmit(std::size_t, TimeNs, const std::uint8_t*, std::size_t) override {}
+  } nobody;
+  QemuOptions options;
+  options.image = "/nowhere.elf";
+  QemuMcu mcu(options, 0, nobody, nullptr);
+  try {
+    mcu.advance(1'000'000);
+    ADD_FAILURE() << "it runs";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("/nowhere.elf"));
+  }
+}
 
 class QemuImage : public QemuAlone {
  protected:
