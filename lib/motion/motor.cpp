@@ -128,7 +128,8 @@ void Motor::position_is_known() {
 }
 
 void Motor::position_is_restored(std::string reason) {
-  position_is_known();
+  confirmed_ = true;
+  uncertain_reason_.reset();
   restored_reason_ = std::move(reason);
 }
 

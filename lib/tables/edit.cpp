@@ -150,7 +150,7 @@ void append_delay(Codes& codes, double square) {
 // speeds rise by 1 / stretch of what they did over the same path, so no acceleration is greater
 // than 1 / stretch of the greatest before, but for the rounding of codes.
 Result<Codes> stretched(const Codes& codes, double stretch) {
-  if (codes.size() == 1) return codes;
+  if (codes.size() == 1) return Codes{codes.front()};
   const Curve curve = curve_of(codes, stretch);
   const auto too_many = [&] {
     return fail(fmt::format("a side would have {:.0f} codes; allowed: 1..{}",
