@@ -14,7 +14,7 @@ TOP = pathlib.Path(__file__).resolve().parent.parent
 BIN = TOP / "build" / "release" / "bin"
 RUNS = TOP / "build" / "demo"
 CHIPS = {  # image, and what runs it
-    "atmega2560": ("avr-image/firmware/ports/atmega2560/bushd-atmega2560-500000.elf", "an ATmega2560 in simavr"),
+    "atmega2560": ("avr/firmware/ports/atmega2560/bushd-atmega2560-500000.elf", "an ATmega2560 in simavr"),
 }
 RUNS_KEPT = 3
 
@@ -37,6 +37,10 @@ sys.dont_write_bytecode = True
 
 class Failure(Exception):
     pass
+
+
+def program(name):
+    return os.environ.get(name.upper(), BIN / name)
 
 
 def group_of(motor):
@@ -131,7 +135,7 @@ class Demo:
 
     def start(self, name, *arguments):
         with open(self.file(f"{name}.log"), "wb") as log:
-            command = [BIN / name, *map(str, arguments)]
+            command = [program(name), *map(str, arguments)]
             self._processes[name] = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
 
     def still_run(self):
@@ -157,7 +161,7 @@ class Demo:
             process.wait()
 
     def bushctl(self, *arguments):
-        command = [BIN / "bushctl", *arguments, "--url", self._options.url]
+        command = [program("bushctl"), *arguments, "--url", self._options.url]
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def status(self):
@@ -176,7 +180,7 @@ class Demo:
         config.write_text(configuration(self._options, port), encoding="utf-8")
         mcu = []
         if self._options.mcu in CHIPS:
-            image = TOP / "build" / "release" / CHIPS[self._options.mcu][0]
+            image = TOP / "build" / CHIPS[self._options.mcu][0]
             mcu = ["--mcu", f"2={self._options.mcu}:{image}"]
         self.start("bushsim", "--config", config, "--link", port, "--trace", self.file("trace.vcd"), *mcu)
         self.wait_until("bushsim to offer its port", port.is_symlink)
