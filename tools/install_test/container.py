@@ -1,4 +1,4 @@
-"""A Debian 12 in a container: made once, booted with systemd, its network a loopback device only."""
+"""A Debian in a container: made once, booted with systemd, its network a loopback device only."""
 
 import os
 import pathlib
@@ -9,9 +9,8 @@ import subprocess
 import tempfile
 import time
 
-TOP = pathlib.Path(__file__).resolve().parents[2]
-WORK = TOP / "build" / "test-install"
-PACKAGES = TOP / "build" / "packages"
+from install_test.debian import TOP, Failed, folder_of, make_debian, release_of_this_pc, sh
+
 NAMES = ["bushd", "bushd-sim", "bushd-firmware", "libbushd-dev", "python3-bushd"]
 BASE_PACKAGES = "systemd,systemd-sysv,dbus,udev,kmod,iproute2,procps,passwd"
 # For clients that are compiled, and what a lab PC has.
@@ -19,16 +18,13 @@ TOOLS = ["cmake", "g++", "logrotate", "ninja-build", "pkg-config"]
 GIVE_UP_S = 60
 
 
-class Failed(Exception):
-    pass
+class Site:
+    """Which Debian, where its packages of bushd are, and where it is made and run."""
 
-
-def sh(*command, **options):
-    """A command of this PC, that must succeed."""
-    ran = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False, **options)
-    if ran.returncode != 0:
-        raise Failed(f"{shlex.join(map(str, command))}: {ran.stdout}{ran.stderr}")
-    return ran.stdout
+    def __init__(self, release=None):
+        self.release = release or release_of_this_pc()
+        self.work = folder_of(release) / "test-install" if release else TOP / "build" / "test-install"
+        self.packages = folder_of(release) / "packages" if release else TOP / "build" / "packages"
 
 
 def wait_until(what, holds, give_up_s=GIVE_UP_S):
@@ -42,15 +38,15 @@ def wait_until(what, holds, give_up_s=GIVE_UP_S):
         time.sleep(0.1)
 
 
-def packages():
+def packages(site):
     """The newest file of each package that was built."""
     found = {}
     for name in NAMES:
-        files = sorted(PACKAGES.glob(f"{name}_*.deb"))
+        files = sorted(site.packages.glob(f"{name}_*.deb"))
         if files:
             found[name] = files[-1]
     if "bushd" not in found:
-        raise Failed(f"there are no packages in {PACKAGES}: run tools/package")
+        raise Failed(f"there are no packages in {site.packages}: run tools/package")
     return found
 
 
@@ -65,43 +61,20 @@ def dependencies(files):
     return sorted(needed)
 
 
-def mirror():
-    """From where this PC has its packages; none named: debootstrap knows one."""
-    for file in [pathlib.Path("/etc/apt/sources.list"), *pathlib.Path("/etc/apt/sources.list.d").glob("*")]:
-        text = file.read_text() if file.is_file() else ""
-        found = re.search(r"^deb (?:\[.*?\] )?(\S*debian\S*)", text, re.MULTILINE) or re.search(r"^URIs: (\S*debian\S*)", text, re.MULTILINE)
-        if found:
-            return [found[1]]
-    return []
-
-
 def in_root(root, *command):
     environment = ["env", "DEBIAN_FRONTEND=noninteractive", "PATH=/usr/sbin:/usr/bin:/sbin:/bin"]
     return sh("chroot", root, *environment, *command)
 
 
-def make_debian():
-    """A Debian 12 that boots, made once. Only what is complete gets its name."""
-    debian = WORK / "debian"
-    if not debian.exists():
-        print("test-install: making a Debian 12 (once)", flush=True)
-        WORK.mkdir(parents=True, exist_ok=True)
-        making = WORK / "debian.making"
-        shutil.rmtree(making, ignore_errors=True)
-        sh("debootstrap", "--variant=minbase", f"--include={BASE_PACKAGES}", "bookworm", making, *mirror())
-        making.rename(debian)
-    return debian
-
-
-def make_base(files):
+def make_base(site, files):
     """The Debian with what the packages and their clients need, as the container has no network."""
-    base = WORK / "base"
-    made = WORK / "base.made"
+    base = site.work / "base"
+    made = site.work / "base.made"
     wanted = sorted([*dependencies(files), *TOOLS])
     text = "\n".join(wanted) + "\n"
     if made.exists() and made.read_text() == text:
         return base
-    debian = make_debian()
+    debian = make_debian(site.work / "debian", site.release, BASE_PACKAGES)
     print(f"test-install: adding {len(wanted)} packages of Debian (once)", flush=True)
     made.unlink(missing_ok=True)
     shutil.rmtree(base, ignore_errors=True)
@@ -115,9 +88,9 @@ def make_base(files):
 
 
 class Container:
-    def __init__(self, base, name):
+    def __init__(self, site, base, name):
         self.name = name
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="run-", dir=WORK))
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="run-", dir=site.work))
         self.root = self.folder / "root"
         for part in ("upper", "work", "root"):
             (self.folder / part).mkdir()
@@ -131,7 +104,7 @@ class Container:
         with open(self.folder / "console.log", "ab") as console:
             command = ["systemd-nspawn", "--quiet", "--register=no", "--keep-unit", f"--machine={self.name}"]
             command += ["--private-network", f"--directory={self.root}", "--boot"]
-            # Debian 12 has one hierarchy of cgroups, whatever this PC has: the unit's filters need it.
+            # It has one hierarchy of cgroups, whatever this PC has: the unit's filters need it.
             environment = {**os.environ, "SYSTEMD_NSPAWN_UNIFIED_HIERARCHY": "1"}
             self.nspawn = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=console, stderr=console)
         self.pid1 = wait_until("PID 1 of the container", self._leader)
