@@ -433,6 +433,7 @@ bool Arrays::follow(std::int64_t now_us, Array& array) {
                                            " does not follow the array any more"});
   }
   moves_.stop(now_us, on);
+  for (const MotorId id : on) installation_[id].is_stopped_by_others();
   return any;
 }
 

@@ -347,6 +347,7 @@ void Lines::end(std::int64_t now_us, std::uint64_t number, const Line& line,
               {api::Outcome::kStopped, "ramped down along the line, because " + cause});
   }
   moves_.stop(now_us, motors);
+  for (const MotorId id : motors) installation_[id].is_stopped_by_others();
 }
 
 // All stand where their runs have led. Those that have been stopped earlier than others, since

@@ -104,7 +104,10 @@ std::int64_t Motor::target_steps() const {
 
 void Motor::stop(std::optional<std::string> ended_by) {
   pause_ = rests_in_pause() ? Pause::kOver : Pause::kNo;
-  if (moves()) axis_.stop();
+  if (moves()) {
+    moving_now().by_others = false;
+    axis_.stop();
+  }
   if (auto* armed = std::get_if<Armed>(&activity_)) {
     armed->stops = true;
     if (ended_by) armed->ended_by = std::move(ended_by);
@@ -306,7 +309,8 @@ void Motor::follow_end_of_line(const Report& report, std::vector<Event>& events)
   OnLine& now = std::get<OnLine>(activity_);
   const bool there = axis_.line_planned_end() == axis_.line_target();
   if (there && now.last_run && !now.stands) {
-    const bool settles = !axis_.stopping() && report.tick < axis_.over_tick() + setup_.settle_ticks;
+    const bool stops = axis_.stopping() && !now.by_others;
+    const bool settles = !stops && report.tick < axis_.over_tick() + setup_.settle_ticks;
     if (!settles) events.emplace_back(reached());
   } else if (is_paused()) {
     const bool stood = std::exchange(now.stands, true);
@@ -330,7 +334,8 @@ void Motor::follow_end_of_run(const Report& report, std::vector<Event>& events) 
   if (axis_.ran_out()) {
     events.emplace_back(ran_out());
   } else if (there && further_.empty()) {
-    const bool settles = !axis_.stopping() && report.tick < axis_.end_tick() + setup_.settle_ticks;
+    const bool stops = axis_.stopping() && !moving_now().by_others;
+    const bool settles = !stops && report.tick < axis_.end_tick() + setup_.settle_ticks;
     if (!settles) events.emplace_back(reached());
   } else if (stands_paused()) {
     // Until it is resumed.

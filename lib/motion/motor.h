@@ -52,6 +52,7 @@ struct Moving {
   bool position_mismatch = false;  // counted otherwise than planned; it is being stopped
   int limit = 0;                   // +1, -1: its limit switch at this end stops it
   std::uint8_t faults = 0;         // with which its MCU runs it down
+  bool by_others = false;  // is stopped since others on its way have ended: nobody has asked for it
 };
 struct Homing {};  // by its MCU, or it waits for its turn
 // Moves on a line with others. Whoever leads the line begins its runs, all at the same ticks.
@@ -227,6 +228,8 @@ class Motor {
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by`: why, if nobody has asked for it.
   void stop(std::optional<std::string> ended_by = {});
+  // Of one that moves and was stopped: nobody has asked for that. At its target it settles.
+  void is_stopped_by_others() { moving_now().by_others = true; }
   // The plan is not yet what was requested, and can be changed.
   bool needs_change() const { return moves() && axis_.needs_change(); }
   // Whether the plan is another one now from this tick on.

@@ -313,6 +313,56 @@ TEST(Lines, ALimitSwitchOfOneEndsTheOthersAlongTheLine) {
   expect_end_at_a_limit({6000, -6000, 6000, 301}, "m01");  // by the MCUs
 }
 
+struct NearlyArrived {
+  explicit NearlyArrived(const std::string& settle)
+      : lab(with_keys(
+            with_keys(hall(2, 2), "m03", "limit = \"positive\"\nlimit_action = \"immediate\"\n"),
+            "m01", settle)) {
+    lab.connect();
+  }
+  // The other one meets its switch so many steps before the end.
+  std::int64_t move(bool path, std::int64_t left) {
+    const auto move =
+        path ? lab.send(api::MovePath{.motors = two, .rows = 1, .positions = {2000, 2000}})
+             : lab.send(line_to(two, {2000, 2000}));
+    lab.run_until([&] { return lab.shaft_steps("m01") >= 2000 - left; });
+    lab.bus(0).mcu(1).set_inputs({0b001, 0});
+    lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; }, 0.5);
+    return move;
+  }
+  const std::vector<std::string> two{"m01", "m03"};
+  StreamedLab lab;
+};
+
+TEST(Lines, OneThatArrivesSettlesThoughAnotherHasEnded) {
+  for (const bool path : {false, true}) {
+    int alone = 0;
+    for (std::int64_t left = 1; left < 8; ++left) {
+      SCOPED_TRACE(testing::Message() << (path ? "path" : "line") << ", " << left << " steps");
+      NearlyArrived nearly("settle_ms = 400\n");
+      const auto move = nearly.move(path, left);
+      const std::int64_t arrived_us = nearly.lab.now_us();
+      const Answer result = nearly.lab.wait(move);
+      if (result.motor_results != std::vector<std::string>{"reached", "limit"}) continue;
+      ++alone;
+      EXPECT_GE(nearly.lab.now_us() - arrived_us, 400'000);
+    }
+    EXPECT_GE(alone, 1);
+  }
+}
+
+// A stop ends that, too.
+TEST(Lines, OneThatSettlesThoughAnotherHasEndedIsStopped) {
+  NearlyArrived nearly("settle_ms = 5000\n");
+  const auto move = nearly.move(false, 3);
+  nearly.lab.run_for(0.5);
+  EXPECT_FALSE(nearly.lab.has_result(move));
+  const std::int64_t asked_us = nearly.lab.now_us();
+  nearly.lab.wait(nearly.lab.send(Ask::kStop, {"m01"}));
+  EXPECT_TRUE(nearly.lab.has_result(move));
+  EXPECT_LT(nearly.lab.now_us() - asked_us, 1'000'000) << "a poll, and not the rest of the 5 s";
+}
+
 // Frames are lost: what is told of the line is where its motors stand.
 TEST(Lines, WhatIsToldIsTrueOnABadLine) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
