@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -17,6 +18,7 @@ namespace bushd::client {
 namespace {
 
 constexpr int kSendWithinMs = 3000;
+constexpr timeval kConnectWithin{.tv_sec = 3, .tv_usec = 0};
 constexpr int kPacketsAtOnce = 256;
 
 // Who has a right to this socket, and how one becomes one of them.
@@ -48,6 +50,13 @@ std::string no_daemon(const std::string& path, int error) {
   if (error == ECONNREFUSED) {
     return fmt::format("nobody listens at the control socket {}: bushd has ended. {}", path,
                        kStart);
+  }
+  if (error == EAGAIN) {
+    return fmt::format(
+        "bushd takes no connection at {}: it hangs, or others take all of its time; its log may "
+        "tell "
+        "why",
+        path);
   }
   return fmt::format("no bushd at the control socket {}: {}. {}", path, std::strerror(error),
                      kStart);
@@ -113,6 +122,8 @@ Result<std::unique_ptr<Link>> open_socket(const std::string& path) {
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   if (fd < 0) return fail(std::string("no socket: ") + std::strerror(errno));
   auto link = std::make_unique<SocketLink>(fd, path);
+  // connect() waits for room among those that a daemon has not taken yet.
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &kConnectWithin, sizeof kConnectWithin);
   address.sun_family = AF_UNIX;
   std::memcpy(address.sun_path, path.c_str(), path.size());
   if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {

@@ -37,14 +37,14 @@ class OpenTest : public testing::Test {
     unsetenv("LCM_DEFAULT_URL");
   }
 
-  // Of type `type` at path_; closed again, and its file stays.
-  void leave_socket(int type) {
-    const int fd = ::socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
+  // At path_, where its file stays.
+  int bound_socket() const {
+    const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::strncpy(address.sun_path, path_.c_str(), sizeof address.sun_path - 1);
-    ASSERT_EQ(::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-    ::close(fd);
+    EXPECT_EQ(::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    return fd;
   }
 
   static std::string error_of(const ClientOptions& options) {
@@ -71,10 +71,20 @@ TEST_F(OpenTest, WithoutASocketBushdIsNotRunning) {
 }
 
 TEST_F(OpenTest, ASocketThatIsLeftIsNoDaemon) {
-  leave_socket(SOCK_SEQPACKET);
+  ::close(bound_socket());
   EXPECT_THAT(error_of({}),
               AllOf(HasSubstr("nobody listens at the control socket " + path_.string()),
                     HasSubstr("bushd has ended"), HasSubstr("systemctl start bushd")));
+}
+
+TEST_F(OpenTest, ADaemonThatHangsIsNotWaitedForForEver) {
+  const int listener = bound_socket();
+  ASSERT_EQ(::listen(listener, 0), 0);
+  const auto first = Client::open({});  // has the only place among those who wait
+  ASSERT_TRUE(first) << first.error().text();
+  EXPECT_THAT(error_of({}), AllOf(HasSubstr("bushd takes no connection at " + path_.string()),
+                                  HasSubstr("its log")));
+  ::close(listener);
 }
 
 TEST_F(OpenTest, LcmIsUsedIfSomebodyAsksForIt) {

@@ -155,12 +155,17 @@ class Keys(EndToEndTest):
         self.assertLess(self.assert_made_what_is_counted(), 400)
 
     def test_letting_go_stops(self):
-        panel = self.open("--speed", "300")
+        panel = self.open("--speed", "300", "--lcm")
         panel.send(RIGHT)
         self.moves_on()
         panel.send(RIGHT)  # the terminal has begun to repeat, and does so no more
         panel.wait_for("a0: done, stands at ", "ended by its client")
         self.rests()
+        # A daemon that stands still says nothing, and what is shown would be old.
+        self.bushd.send(signal.SIGSTOP)
+        panel.wait_for("a0 no state from bushd")
+        self.bushd.send(signal.SIGCONT)
+        panel.wait(lambda screen: "no state from bushd" not in screen)
 
     def test_begins_slowly_by_the_table(self):
         panel = self.open()

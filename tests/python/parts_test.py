@@ -152,6 +152,14 @@ class NoDaemonThere(unittest.TestCase):
             left.bind(self.path)
         self.assert_told(f"nobody listens at the control socket {self.path}: bushd has ended")
 
+    def test_a_daemon_that_hangs(self):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as first:
+            listener.bind(self.path)
+            listener.listen(0)
+            first.connect(self.path)  # has the only place among those who wait
+            with self.assertRaisesRegex(NoDaemon, f"bushd takes no connection at {self.path}: it hangs"):
+                client.connect()
+
     def test_lcm_is_used_if_somebody_asks_for_it(self):
         os.environ["LCM_DEFAULT_URL"] = "udpm://127.0.0.1:7667"  # no multicast address
         for lcm in (False, True):

@@ -26,6 +26,8 @@ constexpr std::chrono::milliseconds kStatusWithin{4000};
 // How late it is noticed at most that a key was let go, or that a sign of life is due.
 constexpr std::chrono::milliseconds kLook{50};
 
+// States come twice a second at least.
+constexpr std::chrono::seconds kSilent{3};
 constexpr const char* kClearLine = "\r\x1b[K";
 
 JogKeys::Time now() {
@@ -51,7 +53,7 @@ JogPanel::JogPanel(Client& client, JogPanelOptions options)
 int JogPanel::run() {
   if (!find_motor()) return kFailed;
   write(fmt::format(
-      "{}: left and right jog until another key stops, a held one until it is let go\n"
+      "{}: left and right jog until another key stops, or a held one is let go\n"
       "up and down move by a step; + and - double and halve the speed, * and / the step\n"
       "q or Ctrl-C ends\n",
       bushd::printable(options_.motor)));
@@ -119,7 +121,9 @@ void JogPanel::wait_at_rest() {
                                 {.fd = signal_descriptor(), .events = POLLIN, .revents = 0},
                                 {.fd = client_.link().fd(), .events = POLLIN, .revents = 0}}};
   const bool key_waits = keys_.wake() != JogKeys::Time::max();
-  poll(polled.data(), polled.size(), key_waits ? static_cast<int>(kLook.count()) : -1);
+  const auto most = key_waits ? kLook : std::chrono::milliseconds(kSilent);
+  if (poll(polled.data(), polled.size(), static_cast<int>(most.count())) == 0 && is_silent())
+    draw();
 }
 
 void JogPanel::hear_daemon() {
@@ -163,13 +167,16 @@ api::Jog JogPanel::jog_at(double speed) const {
           .keepalive_ms = options_.keepalive_ms};
 }
 
+std::chrono::milliseconds JogPanel::renewal() const {
+  return std::chrono::milliseconds(options_.keepalive_ms / 3);
+}
+
 void JogPanel::jog() {
   const double sign = keys_.course() == Course::kRight ? 1 : -1;
-  const auto renewal = std::chrono::milliseconds(options_.keepalive_ms / 3);
   renewed_at_ = Clock::now();
   run_one(jog_at(sign * amounts_.speed), jog_at(0), [&]() -> std::optional<api::Request> {
     const bool changed = change_speed();
-    if (!changed && Clock::now() < renewed_at_ + renewal) return std::nullopt;
+    if (!changed && Clock::now() < renewed_at_ + renewal()) return std::nullopt;
     renewed_at_ = Clock::now();
     if (changed) return jog_at(sign * amounts_.speed);
     return api::Jog{.motor = options_.motor, .renew = true};
@@ -191,9 +198,10 @@ void JogPanel::run_one(const api::Request& request, const api::Request& ending,
   Client::Meanwhile meanwhile;
   meanwhile.on_state = [&](const Status& status) { take(status); };
   meanwhile.beside_fd = RawTerminal::fd();
-  meanwhile.beside_every = kLook;
+  meanwhile.beside_every = std::min(kLook, renewal());
   meanwhile.beside = [&]() -> std::optional<api::Request> {
     read_keys();
+    if (is_silent()) draw();
     return keys_.course() == Course::kStopping ? std::nullopt : beside();
   };
   meanwhile.end = [&] {
@@ -228,7 +236,13 @@ void JogPanel::has_ended(const bushd::Result<api::Reply>& reply) {
   for (const std::string& line : lines(*reply)) say(line + ": " + bushd::printable(why));
 }
 
+// What is shown is old then.
+bool JogPanel::is_silent() const {
+  return Clock::now() > heard_at_ + kSilent;
+}
+
 void JogPanel::take(const Status& status) {
+  heard_at_ = Clock::now();
   for (std::size_t i = 0; i < status.states.size(); ++i) {
     const auto& motors = status.states[i].snapshot.motors;
     for (std::size_t m = 0; m < motors.size(); ++m) {
@@ -243,7 +257,8 @@ void JogPanel::take(const Status& status) {
 void JogPanel::draw() {
   const std::string line =
       fmt::format("{} {} | speed {:.4g} {}/s, step {:.4g} | {}", bushd::printable(options_.motor),
-                  stands_, amounts_.speed, bushd::printable(amounts_.unit), amounts_.step, bounds_);
+                  is_silent() ? "no state from bushd" : stands_, amounts_.speed,
+                  bushd::printable(amounts_.unit), amounts_.step, bounds_);
   write(fmt::format("\r{:.{}}\x1b[K", line, columns_of_terminal(STDOUT_FILENO)));
 }
 

@@ -51,8 +51,10 @@ class JogPanel {
                const std::function<std::optional<bushd::api::Request>()>& beside);
   void has_ended(const bushd::Result<bushd::api::Reply>& reply);
   bushd::api::Jog jog_at(double speed) const;
+  std::chrono::milliseconds renewal() const;
 
   void take(const Status& status);
+  bool is_silent() const;
   void draw();
   void say(const std::string& text);
 
@@ -62,6 +64,7 @@ class JogPanel {
   JogAmounts amounts_;
   std::string stands_;  // where the motor does
   std::string bounds_;  // its limits, and what else is to be known
+  Clock::time_point heard_at_{};
   std::optional<RawTerminal> terminal_;
   Clock::time_point renewed_at_{};
   bool over_ = false;

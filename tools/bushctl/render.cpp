@@ -262,7 +262,7 @@ std::string stand_text(const Status& status, std::size_t mcu, std::size_t index)
   const auto description = description_of(status.descriptions.at(mcu).snapshot, index, motor.name);
   std::string text = fmt::format(
       "{}, {}", position_text(motor, motor.position_steps, motor.user, description.scale),
-      moving_word(motor, "moving at ", "at rest"));
+      moving_word(motor, "", "at rest"));
   if (motor.moving && !motor.paused) text += speed_text(motor, description.scale);
   return text;
 }

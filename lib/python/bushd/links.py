@@ -18,6 +18,7 @@ DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 DEFAULT_PREFIX = "BUSHD"
 MAX_CHANNEL = 63  # on the control socket
 PACKETS_AT_ONCE = 256
+CONNECT_WITHIN_S = 3
 
 
 class LinkEnded(Exception):
@@ -47,6 +48,8 @@ class SocketLink:
         self._path = path
         self.remedy = f"bushd does not answer at {path}; its log may tell why"
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        # connect() waits for room among those that a daemon has not taken yet.
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("@ll", CONNECT_WITHIN_S, 0))
         try:
             self._socket.connect(path)
         except OSError as error:
@@ -162,6 +165,8 @@ def no_daemon(path: str, error: OSError) -> str:
         return f"no control socket at {path}: bushd is not running. {start}"
     if isinstance(error, ConnectionRefusedError):
         return f"nobody listens at the control socket {path}: bushd has ended. {start}"
+    if isinstance(error, BlockingIOError):
+        return f"bushd takes no connection at {path}: it hangs, or others take all of its time; its log may tell why"
     return f"no bushd at the control socket {path}: {error.strerror or error}. {start}"
 
 

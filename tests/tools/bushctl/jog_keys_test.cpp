@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -200,6 +201,40 @@ TEST_F(JogKeysTest, EverySplitOfABurstMeansTheSame) {
     EXPECT_EQ(keys.take_speed_change(), 1) << at;
     EXPECT_EQ(keys.take_step_change(), 1) << at;
     EXPECT_EQ(keys.wake(), now_ + JogKeys::kLetGo) << at;
+  }
+}
+
+// Whatever a terminal sends, in whatever pieces: what was read with a stop moves nothing, a course
+// ends only by rests(), and after q nothing begins.
+TEST_F(JogKeysTest, AnyBytesKeepTheRules) {
+  const std::vector<std::string> pieces = {"\x1b",   "[",      "O",      "A",       "C",    "D",
+                                           "\x1b[C", "\x1bOD", "\x1b[A", "\x1b[5~", "+",    "-",
+                                           "*",      "/",      " ",      "1;",      "\xff", "\x1a"};
+  for (unsigned seed = 1; seed <= 300; ++seed) {
+    std::mt19937 random(seed);
+    JogKeys keys;
+    Time now{0};
+    Course before = Course::kRest;
+    const auto quits_at = random() % 200;
+    for (std::size_t i = 0; i < 200; ++i) {
+      now += milliseconds(random() % 700);
+      std::string bytes;
+      for (auto n = random() % 4; n > 0; --n) bytes += pieces[random() % pieces.size()];
+      const bool stops = random() % 8 == 0;
+      // Not a byte of a sequence that has not come whole.
+      if (stops) keys.read(now += JogKeys::kEscape, "");
+      keys.read(now, stops ? " " + bytes : bytes);
+      if (i == quits_at) keys.quit();
+      const Course course = keys.course();
+      const bool rests_or_stops = course == Course::kRest || course == Course::kStopping;
+      EXPECT_TRUE(!stops || rests_or_stops) << "seed " << seed;
+      EXPECT_TRUE(i < quits_at || rests_or_stops) << "seed " << seed;
+      EXPECT_TRUE(before == Course::kRest || course == before || course == Course::kStopping)
+          << "seed " << seed;
+      if (random() % 4 == 0) keys.rests(now, random() % 2 == 0);
+      before = keys.course();
+      keys.take_suspension();
+    }
   }
 }
 

@@ -87,6 +87,19 @@ TEST(Render, SpeedsAreInTheMotorsUnit) {
   EXPECT_THAT(motor_line(stage_at(0, 0), 0, 0), HasSubstr("velocity 0.25 mm/s moving"));
 }
 
+TEST(Render, SaysHowAMotorStandsAndWhatBoundsIt) {
+  auto status = stage_at(2, -800);
+  EXPECT_EQ(stand_text(status, 0, 0), "2.00 mm, 0.25 mm/s");
+  EXPECT_EQ(bounds_text(status, 0, 0), "-10 .. 30");
+  api::MotorState& motor = status.states[0].snapshot.motors[0];
+  motor.moving = false;
+  motor.trust = api::Trust::kUncertain;
+  motor.inhibited.positive = true;
+  status.descriptions[0].snapshot.motors[0].soft_limits.reset();
+  EXPECT_EQ(stand_text(status, 0, 0), "2.00 mm, at rest");
+  EXPECT_EQ(bounds_text(status, 0, 0), "no soft limits | uncertain | limit positive");
+}
+
 TEST(Render, TellsOfPositionsThatWereRoundedToAStep) {
   const api::Move move{
       .kind = api::Move::Kind::kAbsolute,
