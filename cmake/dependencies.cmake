@@ -1,4 +1,4 @@
-# Everything here is a Debian 12 package; tools/setup installs them by name.
+# Everything here is a package of Debian 12 and 13; tools/setup installs them by name.
 find_package(PkgConfig REQUIRED)
 
 find_package(fmt REQUIRED)

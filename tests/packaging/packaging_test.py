@@ -47,7 +47,7 @@ class Layout(unittest.TestCase):
             if file.name == "bushd-firmware.install":
                 continue
             for line in file.read_text().split():
-                yield line.removeprefix("usr/").replace("lib/*/", "lib/")
+                yield line.removeprefix("usr/").replace("lib/*/", "lib/").replace("${env:SYSTEM_LIBDIR}", "lib")
 
     def test_packages_take_what_is_there_and_leave_nothing(self):
         taken = set()
