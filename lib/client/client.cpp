@@ -93,6 +93,8 @@ Result<Opened> open_link(const ClientOptions& options) {
   }
   auto link = open_lcm(lcm_url(options.url), options.prefix);
   if (link) return Opened{.link = std::move(*link), .barred = std::move(barred)};
+  // Who has not asked for LCM has the socket in mind.
+  if (!barred.empty() && named_url(options.url).empty()) return fail(std::move(barred));
   Error error = link.error();
   if (!barred.empty()) error.message += " (LCM was tried because " + barred + ")";
   return fail(std::move(error));

@@ -67,6 +67,7 @@ int JogPanel::run() {
     change_speed();
     if (keys_.take_suspension()) suspend();
     over_ = over_ || keys_.quits();
+    if (over_) break;
     const Course course = keys_.course();
     if (course == Course::kLeft || course == Course::kRight) jog();
     if (course == Course::kUp || course == Course::kDown) make_step();

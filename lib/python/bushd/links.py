@@ -200,20 +200,23 @@ def open_link(path: str | os.PathLike[str] | None, lcm: bool | str, prefix: str)
     named_url = os.environ.get("LCM_DEFAULT_URL", "")
     if lcm:
         return LcmLink(lcm if isinstance(lcm, str) else named_url or DEFAULT_URL, prefix)
-    barred = ""  # there is a socket, and this user has no right to it: that is why LCM is tried
     first: NoDaemon | None = None
+    barred: NoDaemon | None = None  # there is a socket, and this user has no right to it: that is why LCM is tried
     for candidate in default_paths():
         try:
             return SocketLink(candidate)
         except NoDaemon as error:
             first = first or error
             if isinstance(error.__cause__, PermissionError):
-                barred = barred or f" ({error})"
-    if first is not None and not barred and not named_url:
+                barred = barred or error
+    if first is not None and barred is None and not named_url:
         raise first
+    why = f" ({barred})" if barred is not None else ""
     try:
         link = LcmLink(named_url or DEFAULT_URL, prefix)
     except NoDaemon as error:
-        raise NoDaemon(f"{error}{barred}") from error
-    link.remedy += barred
+        if barred is not None and not named_url:  # who has not asked for LCM has the socket in mind
+            raise barred from error
+        raise NoDaemon(f"{error}{why}") from error
+    link.remedy += why
     return link
