@@ -36,7 +36,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       state_(installation_, pseudo_axes_, outputs),
       line_tables_(installation_, lines_),
       departures_(
-          installation_, interlocks_, kept_, idle_drivers_, line_tables_,
+          installation_, interlocks_, open_moves_, kept_, idle_drivers_, line_tables_,
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
             carry_out(now_us, asker, request);
           },
@@ -44,7 +44,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
-      camac_(installation_, interlocks_, tables_, travels_, kept_, outputs,
+      camac_(installation_, interlocks_, open_moves_, tables_, travels_, kept_, outputs,
              [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
                this->request(now_us, logged(asker, request, outputs_), request);
              }),
@@ -107,12 +107,22 @@ void Core::pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus&
   supervisor_.handle_events(now_us, installation_[bus]);
 }
 
-void Core::request(std::int64_t now, const api::Asker& asker, const api::Request& as_asked) {
+void Core::request(std::int64_t now, const api::Asker& as_counted, const api::Request& as_asked) {
   const auto of_motors = pseudo_axes_.of_motors(as_asked);
-  if (!of_motors) return asker.answer(api::Refused{of_motors.error().text()});
+  if (!of_motors) return as_counted.answer(api::Refused{of_motors.error().text()});
   const api::Request& request = *of_motors ? **of_motors : as_asked;
-  // Whoever stops motors stops those as well that are about to begin.
-  camac_.stopped(departures_.cancel_by(request));
+  Precedence& precedence = open_moves_.precedence();
+  const bool ends = api::ends_motion(request);
+  api::Asker asker = as_counted;
+  if (asker.after_stops == api::Asker::kNotCounted) {
+    asker.after_stops = ends ? precedence.counted().count() : precedence.stops();
+  }
+  if (ends) {
+    precedence.note(asker, request);
+    end_overtaken(now);
+  } else if (const auto by = precedence.overtaken(asker, request)) {
+    return open_moves_.not_begun(asker, *by);
+  }
   if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);
 }
 
@@ -187,9 +197,15 @@ std::int64_t Core::next_wake_us() const {
 void Core::shut_down(std::int64_t now_us) {
   installation_.shutting_down = true;
   const std::vector<MotorId> all = *installation_.find_or_all({});
-  departures_.cancel(all);
-  open_moves_.stopped_by(all, "the daemon, which ends");
+  const std::string by = "the daemon, which ends";
+  open_moves_.precedence().note_all(by);
+  end_overtaken(now_us);
+  open_moves_.stopped_by(all, by);
   stops_.stop(now_us, all);
+}
+
+void Core::end_overtaken(std::int64_t now_us) {
+  for (Service* service : services_) service->end_overtaken(now_us);
 }
 
 }  // namespace bushd::daemon

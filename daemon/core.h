@@ -57,7 +57,9 @@ class Core {
   // To be called soon after the output that ordered it.
   void pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus& status);
 
+  // An asker who has not been counted (Asker::after_stops) is counted here.
   void request(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
+  StopCount& counted_stops() { return open_moves_.precedence().counted(); }
 
   // Publishes the state as it is now, whether due or not.
   void publish_state(std::int64_t now_us) { state_.publish_all(now_us); }
@@ -95,6 +97,7 @@ class Core {
   std::int64_t rest_by_us(std::int64_t now_us) const { return moves_.rest_by_us(now_us); }
 
  private:
+  void end_overtaken(std::int64_t now_us);
   void carry_out(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
 
   Outputs& outputs_;

@@ -40,7 +40,7 @@ void EventLoop::move_log(const std::string& json_line) {
 // Anybody may stop, as often as he likes and by any name: no session is needed.
 api::Asker EventLoop::with_log(const api::Asker& asker, const api::Request& request) {
   const bool too_many =
-      api::is_stop(request) && !stop_limit_.take(now_us(), std::string(api::name_of(request)));
+      api::ends_motion(request) && !stop_limit_.take(now_us(), std::string(api::name_of(request)));
   return too_many ? asker : logged(asker, request, *this);
 }
 

@@ -8,6 +8,8 @@
 namespace bushd::daemon {
 namespace {
 
+constexpr std::size_t kMostUnknownNames = 4;  // that an answer tells; there may be any number
+
 std::string shortened(const std::string& text) {
   return text.substr(0, 64);
 }
@@ -247,6 +249,37 @@ Result<std::vector<MotorId>> Installation::find_with_groups(const api::MotorName
     }
   }
   return std::vector<MotorId>(found.begin(), found.end());
+}
+
+Installation::Known Installation::find_known(const api::MotorNames& names, bool groups) const {
+  Known known;
+  if (names.empty()) {
+    for (const MotorId motor : motors()) known.motors.push_back(motor);
+    return known;
+  }
+  std::set<MotorId> seen;
+  std::set<std::string> unknown;
+  for (const std::string& name : names) {
+    const auto found = groups ? find_with_groups({name})
+                              : find(name).map([](MotorId motor) { return std::vector{motor}; });
+    if (!found) {
+      if (!unknown.insert(name).second || unknown.size() > kMostUnknownNames) continue;
+      known.unknown += (known.unknown.empty() ? "" : "; ") + found.error().text();
+      continue;
+    }
+    for (const MotorId motor : *found) {
+      if (seen.insert(motor).second) known.motors.push_back(motor);
+    }
+  }
+  return known;
+}
+
+std::string Installation::not_online(const std::vector<MotorId>& motors) const {
+  std::string names;
+  for (const McuId mcu : mcus_of(motors)) {
+    if (!mcus_[mcu].online()) names += " " + mcus_[mcu].name();
+  }
+  return names;
 }
 
 motion::Axis Installation::new_axis(MotorId id) const {

@@ -226,6 +226,15 @@ class Installation {
   Result<std::vector<MotorId>> find_or_all(const api::MotorNames& names) const;  // none named: all
   // Motors, or those of groups, each once; none named: all.
   Result<std::vector<MotorId>> find_with_groups(const api::MotorNames& names) const;
+  // Likewise, as far as there are such motors, or groups where these may be named: for what ends
+  // motion, which does what it can. None named: all.
+  struct Known {
+    std::vector<MotorId> motors{};
+    std::string unknown{};  // what is said of the other names; "": there are none
+  };
+  Known find_known(const api::MotorNames& names, bool groups) const;
+  // The MCUs of these motors that are not online: " hall:1 hall:2". "": none.
+  std::string not_online(const std::vector<MotorId>& motors) const;
 
   const Tables& tables() const { return tables_; }
   const tables::TablePtr& table_of(MotorId id) const { return tables_[config_[id].group]; }

@@ -9,26 +9,26 @@ namespace {
 
 // Decoded in less than a millisecond.
 constexpr std::size_t kBytesAtOnce = 64 * 1024;
+constexpr api::Sessions::Limits kWithoutSession{
+    .sessions = 256, .idle_sessions = 1, .bytes_per_session = 64 * 1024, .bytes = 1024 * 1024};
 
 }  // namespace
 
 // One request's way back: all hear it, who asked knows it by session and number.
 class LcmFront::LcmSession : public api::Session {
  public:
-  LcmSession(LcmFront& front, lcm::RequestId id, bool record)
+  LcmSession(LcmFront& front, lcm::RequestId id, Book book)
       : Session(api::Transport::kLcm, id.client_id, true),
         front_(front),
         id_(std::move(id)),
-        record_(record) {}
+        book_(book) {}
 
-  void answer(std::int64_t, const api::Reply& reply) override {
-    front_.answer(id_, record_, reply);
-  }
+  void answer(std::int64_t, const api::Reply& reply) override { front_.answer(id_, book_, reply); }
 
  private:
   LcmFront& front_;
   lcm::RequestId id_;
-  bool record_;
+  Book book_;
 };
 
 LcmFront::LcmFront(Setup setup, Reception& reception, Publishing& publishing,
@@ -37,7 +37,8 @@ LcmFront::LcmFront(Setup setup, Reception& reception, Publishing& publishing,
       reception_(reception),
       publishing_(publishing),
       unix_us_(std::move(unix_us)),
-      sessions_(setup_.seed) {}
+      sessions_(setup_.seed),
+      without_session_(setup_.seed, kWithoutSession) {}
 
 Result<void> LcmFront::subscribe() {
   const auto listening = setup_.transport.subscribe_bytes(
@@ -46,11 +47,13 @@ Result<void> LcmFront::subscribe() {
   if (!setup_.commands) return {};
   for (const std::string_view channel : lcm::client_channels()) {
     if (channel == "SUBSCRIBE") continue;  // all hear everything here
-    lcm::Transport& transport =
-        setup_.stops != nullptr && lcm::is_stop_channel(channel) ? *setup_.stops : setup_.transport;
-    const auto subscribed = transport.subscribe_bytes(
-        setup_.prefix + "_" + std::string(channel),
-        [this, channel](lcm::Payload payload) { on_message(channel, payload); });
+    const bool apart = setup_.stops != nullptr && lcm::is_urgent_channel(channel);
+    lcm::Transport& transport = apart ? *setup_.stops : setup_.transport;
+    const auto subscribed =
+        transport.subscribe_bytes(setup_.prefix + "_" + std::string(channel),
+                                  [this, channel, &transport](lcm::Payload payload) {
+                                    on_message(channel, payload, transport.received_utime_us());
+                                  });
     if (!subscribed) return subscribed;
   }
   return {};
@@ -65,14 +68,14 @@ std::uint64_t LcmFront::dropped() const {
   return dropped_;
 }
 
-void LcmFront::on_message(std::string_view channel, lcm::Payload payload) {
+void LcmFront::on_message(std::string_view channel, lcm::Payload payload, std::int64_t utime_us) {
   const auto message = lcm::decode_client_message(channel, payload);
   if (!message || !api::is_client_id(message->id.client_id)) {
     ++dropped_;
     return;
   }
-  if (const auto* request = std::get_if<api::Request>(&message->content)) {
-    on_request(message->id, *request, payload.size());
+  if (std::holds_alternative<api::Request>(message->content)) {
+    on_request(*message, payload.size(), utime_us);
   } else if (const auto* hello = std::get_if<lcm::Hello>(&message->content)) {
     const lcm::Welcome welcome{.hello = *hello,
                                .run = setup_.run,
@@ -80,7 +83,7 @@ void LcmFront::on_message(std::string_view channel, lcm::Payload payload) {
     if (const auto packet = lcm::encode(unix_us_(), welcome)) publish(*packet);
   } else if (std::holds_alternative<lcm::GetStatus>(message->content)) {
     publishing_.publish_newest();
-    answer(message->id, false,
+    answer(message->id, {},
            api::Completed{.outcome = api::Outcome::kDone, .reason = "published", .detail = {}});
   }
 }
@@ -94,18 +97,41 @@ void LcmFront::on_description(lcm::Payload payload) {
   other_bus_ = printable(of->snapshot.bus);
 }
 
-void LcmFront::on_request(const lcm::RequestId& id, const api::Request& request,
-                          std::size_t bytes) {
-  const auto ruling = sessions_.rule(id.session, id.client_id, id.number, request);
-  if (ruling.reply) answer(id, false, *ruling.reply);
-  if (!ruling.carry_out) return;
-  reception_.take(
-      {.session = std::make_shared<LcmSession>(*this, id, ruling.record), .number = id.number},
-      request, bytes);
+// A repetition says the same time as the first one did. A client without a clock is taken at its
+// word each time: better a stop too many.
+LcmFront::Book LcmFront::book_without_session(const lcm::ClientMessage& message) {
+  const auto& request = std::get<api::Request>(message.content);
+  if (message.utime_us == 0 || !api::ends_motion(request)) return {};
+  return {&without_session_, without_session_.open(message.id.client_id, message.utime_us)};
 }
 
-void LcmFront::answer(const lcm::RequestId& id, bool record, const api::Reply& reply) {
-  if (record) sessions_.record(id.session, id.number, reply);
+void LcmFront::on_request(const lcm::ClientMessage& message, std::size_t bytes,
+                          std::int64_t utime_us) {
+  const lcm::RequestId& id = message.id;
+  const auto& request = std::get<api::Request>(message.content);
+  Book book{&sessions_, id.session};
+  auto ruling = sessions_.rule(id.session, id.client_id, id.number, request, reception_.stops());
+  if (ruling.carry_out && !ruling.record) {
+    book = book_without_session(message);
+    if (book.sessions != nullptr) {
+      ruling =
+          book.sessions->rule(book.session, id.client_id, id.number, request, reception_.stops());
+    }
+  }
+  if (ruling.reply) answer(id, {}, *ruling.reply);
+  if (!ruling.carry_out) return;
+  constexpr std::int64_t kNsPerUs = 1000;
+  const std::int64_t came_ns = utime_us * kNsPerUs;
+  reception_.take(
+      {.session = std::make_shared<LcmSession>(*this, id, ruling.record ? book : Book{}),
+       .number = id.number,
+       .after_stops = ruling.after_stops},
+      request, bytes,
+      Arrival{.earliest_ns = came_ns, .latest_ns = came_ns + kNsPerUs - 1, .stream = id.session});
+}
+
+void LcmFront::answer(const lcm::RequestId& id, const Book& book, const api::Reply& reply) {
+  if (book.sessions != nullptr) book.sessions->record(book.session, id.number, reply);
   auto packets = lcm::encode(unix_us_(), id, reply);
   if (!packets) packets = lcm::encode(unix_us_(), id, api::Refused{packets.error().text()});
   if (!packets) return;

@@ -17,7 +17,8 @@ class LcmFront : public Listener {
  public:
   struct Setup {
     lcm::Transport& transport;
-    // For stops alone, with nothing else before them; null: `transport` takes those too.
+    // For channels of what ends motion, with nothing else before it; null: `transport` takes those
+    // too.
     lcm::Transport* stops = nullptr;
     std::string prefix;
     bool commands = true;    // false: publishes only
@@ -42,10 +43,17 @@ class LcmFront : public Listener {
  private:
   class LcmSession;
 
-  void on_message(std::string_view channel, lcm::Payload payload);
+  // `utime_us`: when it came.
+  void on_message(std::string_view channel, lcm::Payload payload, std::int64_t utime_us);
   void on_description(lcm::Payload payload);
-  void on_request(const lcm::RequestId& id, const api::Request& request, std::size_t bytes);
-  void answer(const lcm::RequestId& id, bool record, const api::Reply& reply);
+  void on_request(const lcm::ClientMessage& message, std::size_t bytes, std::int64_t utime_us);
+  // Where the answers to a request are kept, and under which session; null: nowhere.
+  struct Book {
+    api::Sessions* sessions = nullptr;
+    std::int64_t session = 0;
+  };
+  Book book_without_session(const lcm::ClientMessage& message);
+  void answer(const lcm::RequestId& id, const Book& book, const api::Reply& reply);
   void publish(const lcm::Packet& packet);
 
   Setup setup_;
@@ -53,6 +61,9 @@ class LcmFront : public Listener {
   Publishing& publishing_;
   std::function<std::int64_t()> unix_us_;
   api::Sessions sessions_;
+  // Of requests that end motion and have no session: by who sent them and when, so that one that is
+  // repeated ends nothing that was asked for since.
+  api::Sessions without_session_;
   std::uint64_t dropped_ = 0;
   std::string trouble_;
   std::uint64_t others_heard_ = 0;

@@ -99,8 +99,11 @@ bushd::Result<Lcm> open_lcm(const bushd::config::Lcm& config, bool has_control) 
   if (!all) return bushd::fail(all.error());
   Lcm lcm{.all = std::move(*all), .stops = nullptr};
   if (!config.commands || !config.url.starts_with("udpm://")) return lcm;
-  auto stops =
-      Transport::open(config.url, {config.prefix + "_STOP", config.prefix + "_EMERGENCY_STOP"});
+  std::vector<std::string> channels;
+  for (const std::string_view channel : bushd::lcm::urgent_channels()) {
+    channels.push_back(config.prefix + "_" + std::string(channel));
+  }
+  auto stops = Transport::open(config.url, channels);
   if (!stops) return bushd::fail(stops.error());
   lcm.stops = std::move(*stops);
   return lcm;

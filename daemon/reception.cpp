@@ -1,5 +1,6 @@
 #include "daemon/reception.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace bushd::daemon {
@@ -9,11 +10,19 @@ bool Reception::takes_more(const Client& client, std::size_t bytes) const {
          client.bytes + bytes <= limits_.bytes_per_client;
 }
 
-void Reception::take(api::Asker asker, api::Request request, std::size_t bytes) {
+void Reception::take(api::Asker asker, api::Request request, std::size_t bytes,
+                     const std::optional<Arrival>& arrival) {
   if (!asker.session->may_command()) {
     return asker.answer(api::Refused{"this client may not command; it may only listen"});
   }
-  if (api::is_stop(request)) return carry_out_(asker, request);
+  if (api::ends_motion(request)) {
+    asker.after_stops = counted_.count();
+    if (arrival) arrivals_.stopped(*arrival, asker.after_stops);
+    return carry_out_(asker, request);
+  }
+  const std::uint64_t stops = counted_.stops();
+  asker.after_stops =
+      std::min(asker.after_stops, arrival ? arrivals_.after_stops(*arrival, stops) : stops);
   if (requests_ >= limits_.requests || bytes_ + bytes > limits_.bytes) {
     return asker.answer(
         api::Refused{"the daemon has " + std::to_string(requests_) +

@@ -1,6 +1,6 @@
-// Requests on their way from the front ends to the core: stops at once, the others in turn, one
-// client after the other. How many may wait is bounded, per client and in all; what is too many is
-// refused.
+// Requests on their way from the front ends to the core: what ends motion at once, the others in
+// turn, one client after the other. How many may wait is bounded, per client and in all; what is
+// too many is refused. Each is told after how many stops it arrived (precedence.h).
 #pragma once
 
 #include <cstddef>
@@ -8,10 +8,13 @@
 #include <deque>
 #include <functional>
 #include <list>
+#include <optional>
 #include <string>
 #include <unordered_map>
 
 #include "api/session.h"
+#include "daemon/arrivals.h"
+#include "daemon/stop_count.h"
 
 namespace bushd::daemon {
 
@@ -29,13 +32,19 @@ class Reception {
   };
   using CarryOut = std::function<void(const api::Asker&, const api::Request&)>;
 
-  explicit Reception(CarryOut carry_out) : Reception(std::move(carry_out), Limits()) {}
-  Reception(CarryOut carry_out, Limits limits)
-      : limits_(limits), carry_out_(std::move(carry_out)) {}
+  // Both outlive it.
+  Reception(StopCount& counted, CarryOut carry_out)
+      : Reception(counted, std::move(carry_out), Limits()) {}
+  Reception(StopCount& counted, CarryOut carry_out, Limits limits)
+      : limits_(limits), counted_(counted), carry_out_(std::move(carry_out)) {}
 
-  // Carries out a stop before it returns. Others wait, or are refused. `bytes`: of its message.
-  // Precondition: the asker has a session.
-  void take(api::Asker asker, api::Request request, std::size_t bytes);
+  // Carries out what ends motion before it returns. Others wait, or are refused. `bytes`: of its
+  // message; `arrival`: when that came, where it may have been read after later ones. An asker who
+  // is counted already has not arrived after more stops than that. Precondition: the asker has a
+  // session.
+  void take(api::Asker asker, api::Request request, std::size_t bytes,
+            const std::optional<Arrival>& arrival = {});
+  std::uint64_t stops() const { return counted_.stops(); }
 
   bool idle() const { return turns_.empty(); }
   // Carries out the next one, if there is one.
@@ -58,6 +67,8 @@ class Reception {
   bool takes_more(const Client& client, std::size_t bytes) const;
 
   Limits limits_;
+  StopCount& counted_;
+  Arrivals arrivals_;
   CarryOut carry_out_;
   std::unordered_map<std::string, Client> clients_;  // that have something waiting
   std::list<std::string> turns_;                     // the next one first

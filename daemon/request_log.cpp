@@ -32,7 +32,7 @@ bool is_logged(const api::Request& request) {
   if (follow != nullptr) return follow->part == api::Follow::Part::kRun;
   const auto* jog = std::get_if<api::Jog>(&request);
   if (jog != nullptr) return !jog->renew;
-  return api::is_stop(request) || !api::is_repeatable(request);
+  return api::ends_motion(request) || !api::is_repeatable(request);
 }
 
 const char* word(api::Transport transport) {
@@ -68,7 +68,7 @@ std::string line_of(std::int64_t unix_us, const api::Session& session, std::int6
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-// Stands for the session of one request until that is accepted or refused.
+// Stands for the session of one request until that is answered.
 class Logged : public api::Session {
  public:
   Logged(std::shared_ptr<api::Session> session, const api::Request& request, Outputs& outputs)
@@ -79,7 +79,10 @@ class Logged : public api::Session {
         outputs_(outputs) {}
 
   void answer(std::int64_t number, const api::Reply& reply) override {
-    if (std::holds_alternative<api::Accepted>(reply)) {
+    // A stop may be over when it is answered. What a stop has ended before it began is not logged.
+    const bool over = std::holds_alternative<api::Completed>(reply) && api::ends_motion(request_);
+    const bool accepted = std::holds_alternative<api::Accepted>(reply);
+    if ((accepted || over) && !std::exchange(written_, true)) {
       outputs_.move_log(line_of(outputs_.wall_clock_us(), *this, number, request_));
     }
     session_->answer(number, reply);
@@ -90,6 +93,7 @@ class Logged : public api::Session {
   std::shared_ptr<api::Session> session_;
   api::Request request_;
   Outputs& outputs_;
+  bool written_ = false;
 };
 
 }  // namespace
@@ -97,7 +101,8 @@ class Logged : public api::Session {
 api::Asker logged(const api::Asker& asker, const api::Request& request, Outputs& outputs) {
   if (!is_logged(request)) return asker;
   return {.session = std::make_shared<Logged>(asker.session, request, outputs),
-          .number = asker.number};
+          .number = asker.number,
+          .after_stops = asker.after_stops};
 }
 
 }  // namespace bushd::daemon

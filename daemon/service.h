@@ -19,6 +19,9 @@ class Service {
   virtual void reports(std::int64_t /*now_us*/, Mcu&) {}
   // An online MCU has refused a request of this type.
   virtual void refuses(Mcu&, std::uint8_t /*type*/, std::uint8_t /*status*/) {}
+  // A stop has arrived (precedence.h): of what waits here that ends which arrived before it and has
+  // not begun.
+  virtual void end_overtaken(std::int64_t /*now_us*/) {}
   // After every input, and at the latest when the core has asked to be woken.
   virtual void step(std::int64_t /*now_us*/) {}
 };

@@ -31,21 +31,23 @@ SocketFront::SocketFront(control::Server& server, std::int64_t run, Reception& r
       reception_(reception),
       publishing_(publishing),
       unix_us_(std::move(unix_us)) {
-  server_.set_handlers({.opened =
-                            [this](Connection connection, const api::Credentials& credentials) {
-                              clients_.emplace(connection, Client{.credentials = credentials});
-                            },
-                        .packet = [this](Connection connection,
-                                         control::View packet) { on_packet(connection, packet); },
-                        .is_urgent = lcm::is_stop_channel,
-                        .closed = [this](Connection connection) { on_closed(connection); }});
+  server_.set_handlers(
+      {.opened =
+           [this](Connection connection, const api::Credentials& credentials) {
+             clients_.emplace(connection, Client{.credentials = credentials});
+           },
+       .packet = [this](Connection connection, control::View packet,
+                        const control::Server::Sent& sent) { on_packet(connection, packet, sent); },
+       .is_urgent = lcm::is_urgent_channel,
+       .closed = [this](Connection connection) { on_closed(connection); }});
 }
 
 SocketFront::~SocketFront() {
   server_.set_handlers({});
 }
 
-void SocketFront::on_packet(Connection connection, control::View packet) {
+void SocketFront::on_packet(Connection connection, control::View packet,
+                            const control::Server::Sent& sent) {
   const auto message = lcm::decode_client_message(packet.channel, packet.payload);
   Client& client = clients_.at(connection);
   if (!message) return server_.reject(connection);
@@ -63,7 +65,10 @@ void SocketFront::on_packet(Connection connection, control::View packet) {
            api::Completed{.outcome = api::Outcome::kDone, .reason = "told", .detail = {}});
   } else {
     reception_.take({.session = client.session, .number = id.number},
-                    std::get<api::Request>(message->content), packet.payload.size());
+                    std::get<api::Request>(message->content), packet.payload.size(),
+                    Arrival{.earliest_ns = sent.earliest_ns,
+                            .latest_ns = sent.latest_ns,
+                            .stream = -static_cast<std::int64_t>(connection)});
   }
 }
 

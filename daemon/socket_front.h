@@ -33,7 +33,7 @@ class SocketFront : public Listener {
     std::shared_ptr<SocketSession> session{};  // from its first message with a name on
   };
 
-  void on_packet(Connection connection, control::View packet);
+  void on_packet(Connection connection, control::View packet, const control::Server::Sent& sent);
   void on_closed(Connection connection);
   void on_hello(Connection connection, const lcm::Hello& hello);
   bool known(Connection connection, Client& client, const std::string& client_id);

@@ -35,6 +35,25 @@ void Arrays::request(std::int64_t now_us, const api::Asker& asker, const api::Fo
   take_rows(now_us, asker, request);
 }
 
+std::optional<Precedence::Overtaken> Arrays::overtaken(const api::Asker& asker,
+                                                       const Array& array) const {
+  const std::uint64_t after = array.followed ? asker.after_stops : array.after_stops;
+  return open_.precedence().overtaken(after, array.motors());
+}
+
+void Arrays::end_overtaken(std::int64_t) {
+  std::erase_if(jobs_, [this](const Job& job) {
+    Array& array = *job.array;
+    const auto by = overtaken(job.asker, array);
+    if (!by) return false;
+    array.waits = false;
+    array.spoilt = true;
+    array.dropped = array.rows.closed();
+    open_.not_begun(job.asker, *by);
+    return true;
+  });
+}
+
 std::list<Arrays::Array>::iterator Arrays::find(const api::Asker& asker, std::int64_t number) {
   return std::ranges::find_if(arrays_, [&](const Array& array) {
     return array.number == number && array.client == client_of(asker);
@@ -183,11 +202,20 @@ Result<void> Arrays::take(Array& array, const api::Follow& request) const {
 
 void Arrays::take_rows(std::int64_t now_us, const api::Asker& asker, const api::Follow& request) {
   auto array = find(asker, request.array);
+  if (array != arrays_.end() && array->dropped) {
+    arrays_.erase(array);
+    array = arrays_.end();
+  }
   const bool is_new = array == arrays_.end();
   if (is_new) {
     auto begun = begin(asker, request);
     if (!begun) return asker.answer(api::Refused{begun.error().text()});
     array = *begun;
+    array->after_stops = asker.after_stops;
+  }
+  if (const auto by = overtaken(asker, *array)) {
+    array->dropped = request.part == api::Follow::Part::kLastRows;
+    return open_.not_begun(asker, *by);
   }
   auto taken = may_go_on(*array, request);
   if (taken) taken = has_time(now_us, *array);
@@ -373,6 +401,11 @@ void Arrays::run(std::int64_t now_us, const api::Asker& asker, const api::Follow
     return asker.answer(api::Refused{"no such array is loaded; tell its rows first"});
   }
   Array& array = *found;
+  const auto by = array.followed ? std::nullopt : overtaken(asker, array);
+  if (by) {
+    arrays_.erase(found);
+    return open_.not_begun(asker, *by);
+  }
   if (const auto may = may_run(array); !may) return asker.answer(api::Refused{may.error().text()});
   asker.answer(api::Accepted{});
   array.followed = std::make_shared<Trajectory>(array.rows);

@@ -39,6 +39,7 @@ class Arrays final : public Service {
   void work();
   std::uint64_t units() const { return units_; }
 
+  void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
  private:
@@ -59,6 +60,8 @@ class Arrays final : public Service {
     std::unique_ptr<motion::TrajectoryCheck> check;
     bool waits = false;  // for a check
     bool spoilt = false;
+    std::uint64_t after_stops = 0;  // as Asker::after_stops, of its first rows
+    bool dropped = false;           // a stop has ended it, and its last rows were told that
     // From when it runs: the rows that have been checked.
     std::shared_ptr<motion::Trajectory> followed;
     std::uint64_t logged = 0;
@@ -75,6 +78,8 @@ class Arrays final : public Service {
     int tries = 0;
   };
 
+  // A stop ends an array that does not run yet, with all parts that are still to come.
+  std::optional<Precedence::Overtaken> overtaken(const api::Asker& asker, const Array& array) const;
   std::list<Array>::iterator find(const api::Asker& asker, std::int64_t number);
   Result<std::list<Array>::iterator> begin(const api::Asker& asker, const api::Follow& request);
   Result<void> may_go_on(const Array& array, const api::Follow& request) const;

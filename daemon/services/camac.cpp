@@ -60,7 +60,7 @@ class Camac::Station {
   explicit Station(std::string name) : kept_as(std::move(name)) {}
   virtual camac::MotionModule& module() = 0;
   virtual void step(std::int64_t now_us) = 0;
-  virtual void stopped(const std::vector<MotorId>& motors) = 0;
+  virtual void end_overtaken() = 0;
 
   const std::string kept_as;
 };
@@ -72,7 +72,7 @@ class Camac::Bushd1Station final : public Station {
       : Station(std::move(place)), shutter_(std::forward<Args>(args)...) {}
   camac::MotionModule& module() override { return module_; }
   void step(std::int64_t now_us) override { shutter_.follow(now_us, module_); }
-  void stopped(const std::vector<MotorId>& motors) override { shutter_.stopped(motors); }
+  void end_overtaken() override { shutter_.end_overtaken(); }
 
  private:
   CamacShutter shutter_;
@@ -89,15 +89,16 @@ class Camac::Bushd2Station final : public Station {
   camac::MotionModule& module() override { return module_; }
   // Who does not answer is told by the core: his move ends.
   void step(std::int64_t now_us) override { motors_.step(now_us, module_); }
-  void stopped(const std::vector<MotorId>& motors) override { motors_.stopped(motors); }
+  void end_overtaken() override { motors_.end_overtaken(); }
 
  private:
   CamacMotors motors_;
   camac::Bushd2 module_;
 };
 
-Camac::Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
-             Travels& travels, KeptPositions& kept, Outputs& outputs, const AskCore& ask)
+Camac::Camac(Installation& installation, const Interlocks& interlocks, const OpenMoves& open_moves,
+             TablesInService& tables, Travels& travels, KeptPositions& kept, Outputs& outputs,
+             const AskCore& ask)
     : kept_(kept), outputs_(outputs) {
   for (const config::Crate& configured : installation.config().crates) {
     Crate crate{.number = configured.number};
@@ -107,12 +108,13 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, TablesInS
           "camac/" + std::to_string(configured.number) + "/" + std::to_string(module.station);
       std::unique_ptr<Station> station;
       if (module.type == config::CamacModule::Type::kBushd1) {
-        station =
-            std::make_unique<Bushd1Station>(kept_as, name, module.motors.front(), installation,
-                                            interlocks, tables, travels, outputs, ask);
+        station = std::make_unique<Bushd1Station>(kept_as, name, module.motors.front(),
+                                                  installation, interlocks, open_moves.precedence(),
+                                                  turn_, tables, travels, outputs, ask);
       } else {
         station = std::make_unique<Bushd2Station>(kept_as, module.f_start_hz, name, module,
-                                                  installation, interlocks, tables, outputs, ask);
+                                                  installation, interlocks, open_moves.precedence(),
+                                                  turn_, tables, outputs, ask);
       }
       crate.crate.insert(module.station, station->module());
       crate.stations.push_back(std::move(station));
@@ -133,9 +135,11 @@ void Camac::request(std::int64_t now_us, const api::Asker& asker, const api::Cam
     return asker.answer(api::Refused{good.error().text()});
   }
   asker.answer(api::Accepted{});
+  turn_.after_stops = asker.after_stops;
   api::CamacResult result{.block = camac::transfer(now_us, crate->crate, request.block)};
   result.requests = crate->crate.requests();
   crate->told &= result.requests;  // what is raised again before the next step is told again
+  for (const auto& station : crate->stations) station->end_overtaken();
   keep_memories(*crate);
   asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                               .reason = std::to_string(result.block.tally) + " words",
@@ -150,10 +154,9 @@ void Camac::keep_memories(const Crate& crate) {
   }
 }
 
-void Camac::stopped(const std::vector<MotorId>& motors) {
-  if (motors.empty()) return;
+void Camac::end_overtaken(std::int64_t) {
   for (const Crate& crate : crates_) {
-    for (const auto& station : crate.stations) station->stopped(motors);
+    for (const auto& station : crate.stations) station->end_overtaken();
   }
 }
 

@@ -13,6 +13,7 @@
 #include "daemon/service.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/kept_positions.h"
+#include "daemon/services/open_moves.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
 
@@ -21,16 +22,16 @@ namespace bushd::daemon {
 class Camac final : public Service {
  public:
   // `ask` is called from step() only.
-  Camac(Installation& installation, const Interlocks& interlocks, TablesInService& tables,
-        Travels& travels, KeptPositions& kept, Outputs& outputs, const AskCore& ask);
+  Camac(Installation& installation, const Interlocks& interlocks, const OpenMoves& open_moves,
+        TablesInService& tables, Travels& travels, KeptPositions& kept, Outputs& outputs,
+        const AskCore& ask);
   ~Camac() override;
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request);
-  // By somebody's request. What a module has begun and is not yet asked of them does not begin.
-  void stopped(const std::vector<MotorId>& motors);
   // The store is in use: memories are as they were kept.
   void take_kept();
 
+  void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
  private:
@@ -50,6 +51,7 @@ class Camac final : public Service {
 
   KeptPositions& kept_;
   Outputs& outputs_;
+  CamacTurn turn_;
   std::vector<Crate> crates_;
 };
 

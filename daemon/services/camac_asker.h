@@ -16,6 +16,12 @@ namespace bushd::daemon {
 using AskCore =
     std::function<void(std::int64_t now_us, const api::Asker& asker, const api::Request& request)>;
 
+// After how many stops (precedence.h) what modules are told now has arrived: they begin motion by
+// it.
+struct CamacTurn {
+  std::uint64_t after_stops = 0;
+};
+
 // A module as a client: one request at a time, whose last answer is kept until it is looked at.
 class CamacSession final : public api::Session {
  public:

@@ -92,7 +92,8 @@ bool CamacMotors::move(const Program& program) {
     warn(id, motor.name() + ": " + may.error().text());
     return false;
   }
-  motion_ = Motion{.motor = id, .program = program, .table = *table};
+  motion_ =
+      Motion{.motor = id, .program = program, .table = *table, .after_stops = turn_.after_stops};
   return true;
 }
 
@@ -100,9 +101,9 @@ void CamacMotors::stop(int) {
   if (motion_) motion_->to_stop = true;
 }
 
-void CamacMotors::stopped(const std::vector<MotorId>& motors) {
+void CamacMotors::end_overtaken() {
   if (!motion_ || motion_->stage == Motion::Stage::kMoves) return;
-  if (std::ranges::find(motors, motion_->motor) != motors.end()) motion_->to_stop = true;
+  if (precedence_.overtaken(motion_->after_stops, {motion_->motor})) motion_->to_stop = true;
 }
 
 void CamacMotors::step(std::int64_t now_us, Bushd2& module) {

@@ -13,6 +13,7 @@
 #include "camac/bushd2.h"
 #include "daemon/interlocks.h"
 #include "daemon/outputs.h"
+#include "daemon/precedence.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/tables_in_service.h"
 
@@ -30,11 +31,14 @@ class CamacMotors final : public camac::Motors {
  public:
   // `name` is that of the module: "camac-1-5".
   CamacMotors(std::string name, const config::CamacModule& module, Installation& installation,
-              const Interlocks& interlocks, TablesInService& tables, Outputs& outputs, AskCore ask)
+              const Interlocks& interlocks, const Precedence& precedence, const CamacTurn& turn,
+              TablesInService& tables, Outputs& outputs, AskCore ask)
       : name_(std::move(name)),
         config_(module),
         installation_(installation),
         interlocks_(interlocks),
+        precedence_(precedence),
+        turn_(turn),
         tables_(tables),
         outputs_(outputs),
         ask_(std::move(ask)),
@@ -44,8 +48,9 @@ class CamacMotors final : public camac::Motors {
   bool move(const camac::Program& program) override;
   void stop(int motor) override;
 
-  // By somebody else. A motion that has not begun does not begin.
-  void stopped(const std::vector<MotorId>& motors);
+  // A motion that has been begun before a stop of its motor, and is not yet asked of it, does not
+  // begin.
+  void end_overtaken();
 
   // Does what is due, and tells the module what has become of its motion.
   void step(std::int64_t now_us, camac::Bushd2& module);
@@ -60,10 +65,16 @@ class CamacMotors final : public camac::Motors {
     std::int64_t from_steps = 0;
     std::uint32_t told = 0;  // of its steps
     bool to_stop = false;
-    bool stopping = false;  // it was asked to
+    bool stopping = false;          // it was asked to
+    std::uint64_t after_stops = 0;  // as Asker::after_stops
   };
 
-  api::Asker asker() { return {.session = session_, .number = session_->next_number()}; }
+  // Precondition: there is a motion.
+  api::Asker asker() {
+    return {.session = session_,
+            .number = session_->next_number(),
+            .after_stops = motion_->after_stops};
+  }
   void begin(std::int64_t now_us, camac::Bushd2& module);
   bool streams() const;
   void follow_table(std::int64_t now_us, camac::Bushd2& module);
@@ -77,6 +88,8 @@ class CamacMotors final : public camac::Motors {
   const config::CamacModule& config_;
   Installation& installation_;
   const Interlocks& interlocks_;
+  const Precedence& precedence_;
+  const CamacTurn& turn_;
   TablesInService& tables_;
   Outputs& outputs_;
   AskCore ask_;

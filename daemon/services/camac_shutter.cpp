@@ -66,6 +66,7 @@ Result<void> CamacShutter::may_begin(std::int64_t steps) const {
 bool CamacShutter::takes(Motion motion, const Result<void>& may) {
   if (!may) return refuse(may.error().text());
   motion_ = std::move(motion);
+  motion_->after_stops = turn_.after_stops;
   return true;
 }
 
@@ -100,9 +101,9 @@ void CamacShutter::stop() {
   if (motion_) motion_->to_stop = true;
 }
 
-void CamacShutter::stopped(const std::vector<MotorId>& motors) {
+void CamacShutter::end_overtaken() {
   if (!motion_ || motion_->stage == Motion::Stage::kGoes) return;
-  if (std::ranges::find(motors, motor_) == motors.end()) return;
+  if (!precedence_.overtaken(motion_->after_stops, {motor_})) return;
   motion_->to_stop = motion_->begins_no_more = true;
 }
 

@@ -12,6 +12,7 @@
 #include "camac/bushd1.h"
 #include "daemon/interlocks.h"
 #include "daemon/outputs.h"
+#include "daemon/precedence.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
@@ -24,12 +25,14 @@ Result<tables::TablePtr> table_of_travel(const camac::Travel& travel, const std:
 class CamacShutter final : public camac::Shutter {
  public:
   CamacShutter(const std::string& name, MotorId motor, Installation& installation,
-               const Interlocks& interlocks, TablesInService& tables, Travels& travels,
-               Outputs& outputs, AskCore ask)
+               const Interlocks& interlocks, const Precedence& precedence, const CamacTurn& turn,
+               TablesInService& tables, Travels& travels, Outputs& outputs, AskCore ask)
       : name_(name),
         motor_(motor),
         installation_(installation),
         interlocks_(interlocks),
+        precedence_(precedence),
+        turn_(turn),
         tables_(tables),
         travels_(travels),
         outputs_(outputs),
@@ -41,8 +44,9 @@ class CamacShutter final : public camac::Shutter {
   bool travel(const camac::Travel& travel) override;
   void stop() override;
 
-  // By somebody else. A motion that has not begun does not begin.
-  void stopped(const std::vector<MotorId>& motors);
+  // A motion that has been begun before a stop of the motor, and is not yet asked of it, does not
+  // begin.
+  void end_overtaken();
 
   // Does what is due, and tells the module what has become of it.
   void follow(std::int64_t now_us, camac::Bushd1& module);
@@ -57,8 +61,9 @@ class CamacShutter final : public camac::Shutter {
     tables::TablePtr table{};
     Stage stage = Stage::kBegins;
     bool to_stop = false;
-    bool begins_no_more = false;  // by another's stop
-    bool stopping = false;        // it was asked to
+    bool begins_no_more = false;    // by another's stop
+    bool stopping = false;          // it was asked to
+    std::uint64_t after_stops = 0;  // as Asker::after_stops
     // Of a travel, as the module knows it.
     bool returns = false;
     std::int64_t from_steps = 0;  // of the run
@@ -78,7 +83,12 @@ class CamacShutter final : public camac::Shutter {
   bool refuse(const std::string& why);
   Result<void> may_begin(std::int64_t steps) const;
   bool takes(Motion motion, const Result<void>& may);
-  api::Asker asker() { return {.session = session_, .number = session_->next_number()}; }
+  // Precondition: there is a motion.
+  api::Asker asker() {
+    return {.session = session_,
+            .number = session_->next_number(),
+            .after_stops = motion_->after_stops};
+  }
   void begin(std::int64_t now_us);
   void follow_table(camac::Bushd1& module);
   void ask_mcu();
@@ -94,6 +104,8 @@ class CamacShutter final : public camac::Shutter {
   const MotorId motor_;
   Installation& installation_;
   const Interlocks& interlocks_;
+  const Precedence& precedence_;
+  const CamacTurn& turn_;
   TablesInService& tables_;
   Travels& travels_;
   Outputs& outputs_;

@@ -103,9 +103,13 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
   return true;
 }
 
-void Departures::refuse(Held& held, const std::string& reason) {
+void Departures::waits_no_more(Held& held) {
   line_tables_.end(held.table);
   for (const MotorId motor : held.motors) kept_.not_wanted(motor);
+}
+
+void Departures::refuse(Held& held, const std::string& reason) {
+  waits_no_more(held);
   held.asker.answer(api::Refused{reason});
 }
 
@@ -117,39 +121,16 @@ bool Departures::is_let_go(std::int64_t now_us, const Held& held) {
          (held.asker.session && held.asker.session->gone());
 }
 
-void Departures::cancel_if(const std::function<bool(const Held&)>& concerned) {
-  std::erase_if(held_, [&](Held& held) {
-    if (!concerned(held)) return false;
-    refuse(held, "stopped before it was carried out; nothing has moved");
+void Departures::end_overtaken(std::int64_t) {
+  std::erase_if(held_, [this](Held& held) {
+    // It moves nothing; but with the daemon it ends too.
+    const bool sets = std::holds_alternative<api::SetPosition>(held.request);
+    if (sets && !installation_.shutting_down) return false;
+    const auto by = open_moves_.precedence().overtaken(held.asker.after_stops, held.motors);
+    if (!by) return false;
+    waits_no_more(held);
+    open_moves_.not_begun(held.asker, *by);
     return true;
-  });
-}
-
-void Departures::cancel(const std::vector<MotorId>& motors) {
-  cancel_if([&](const Held& held) { return has_common(held.motors, motors); });
-}
-
-std::vector<MotorId> Departures::cancel_by(const api::Request& request) {
-  if (const auto* jog = std::get_if<api::Jog>(&request)) {
-    const auto motor = installation_.find(jog->motor);
-    if (motor && jog->per_s == 0 && !jog->renew) cancel_jogs(*motor);
-    return {};
-  }
-  const auto motors = std::visit(
-      Overloaded{[&](const api::Stop& r) { return installation_.find_or_all(r.motors); },
-                 [&](const api::Disarm& r) { return installation_.find_or_all(r.motors); },
-                 [&](const api::Pause& r) { return installation_.find_with_groups(r.motors); },
-                 [&](const api::EmergencyStop&) { return installation_.find_or_all({}); },
-                 [](const auto&) -> Result<std::vector<MotorId>> { return {}; }},
-      request);
-  if (!motors) return {};
-  cancel(*motors);
-  return *motors;
-}
-
-void Departures::cancel_jogs(MotorId motor) {
-  cancel_if([motor](const Held& held) {
-    return std::holds_alternative<api::Jog>(held.request) && held.motors.front() == motor;
   });
 }
 

@@ -15,6 +15,7 @@
 #include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/line_tables.h"
+#include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
 
@@ -22,11 +23,12 @@ class Departures final : public Service {
  public:
   using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
   // `busy`: what was carried out before is still being begun; all that is held waits for it.
-  Departures(const Installation& installation, const Interlocks& interlocks, KeptPositions& kept,
-             IdleDrivers& idle_drivers, LineTables& line_tables, CarryOut carry_out,
-             std::function<bool()> busy)
+  Departures(const Installation& installation, const Interlocks& interlocks,
+             const OpenMoves& open_moves, KeptPositions& kept, IdleDrivers& idle_drivers,
+             LineTables& line_tables, CarryOut carry_out, std::function<bool()> busy)
       : installation_(installation),
         interlocks_(interlocks),
+        open_moves_(open_moves),
         kept_(kept),
         idle_drivers_(idle_drivers),
         line_tables_(line_tables),
@@ -35,14 +37,10 @@ class Departures final : public Service {
 
   // Whether the request is kept here. It is carried out, or refused, in a later step.
   bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
-  // Refuses those whose motors this request stops, if it is one that stops motors. Returns these
-  // motors.
-  std::vector<MotorId> cancel_by(const api::Request& request);
-  // Refuses those of these motors: they are being stopped.
-  void cancel(const std::vector<MotorId>& motors);
   bool empty() const { return held_.empty(); }
   bool holds(MotorId motor) const { return any_held({motor}); }
 
+  void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
  private:
@@ -61,12 +59,12 @@ class Departures final : public Service {
   std::optional<std::vector<MotorId>> motors_of(const api::Request& request) const;
   bool any_held(const std::vector<MotorId>& motors) const;
   Result<bool> make_ready(std::int64_t now_us, Held& held);
+  void waits_no_more(Held& held);
   void refuse(Held& held, const std::string& reason);
-  void cancel_jogs(MotorId motor);
-  void cancel_if(const std::function<bool(const Held&)>& concerned);
 
   const Installation& installation_;
   const Interlocks& interlocks_;
+  const OpenMoves& open_moves_;
   KeptPositions& kept_;
   IdleDrivers& idle_drivers_;
   LineTables& line_tables_;

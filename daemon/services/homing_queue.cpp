@@ -10,6 +10,7 @@ namespace {
 
 using api::Outcome;
 
+constexpr const char* kNotItsTurn = "stopped before it was its turn to be homed";
 constexpr std::uint32_t kMoreSlowSteps = 1000;  // than a ramp has
 
 struct HomingEnd {
@@ -86,7 +87,8 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
   open_.open(asker, *motors, OpenMoves::Purpose::kHome);
   if (request.all) sequence_.emplace();
   for (const MotorId motor : *motors) {
-    Task task{.motor = motor, .floor = *floor_of(motor, request.speed)};
+    Task task{
+        .motor = motor, .floor = *floor_of(motor, request.speed), .after_stops = asker.after_stops};
     if (!request.all) {
       add(std::move(task));
     } else {
@@ -182,7 +184,8 @@ void HomingQueue::add(Task task) {
 // one ends as well that was held while it waited for its turn.
 void HomingQueue::begin(Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
-  if (kept_.keeps() || !idle_drivers_.none() || installation_[task.motor].is_held()) return;
+  const bool ends = installation_[task.motor].is_held() || !task.ended_by.empty();
+  if (kept_.keeps() || !idle_drivers_.none() || ends) return;
   task.phase = Phase::kHoming;
   mcu.home(message_for(task));
 }
@@ -211,6 +214,7 @@ void HomingQueue::ask(std::int64_t now_us, Mcu& mcu) {
   if (installation_[task.motor].is_held()) {
     return end(mcu, Outcome::kStopped, "it was held before it was its turn to be homed");
   }
+  if (!task.ended_by.empty()) return end(mcu, Outcome::kStopped, std::string(task.ended_by));
   const auto ready = kept_.make_ready(now_us, task.motor);
   const bool powered = idle_drivers_.make_ready(now_us, mcu.id);
   if (ready && !(*ready && powered)) return;
@@ -372,9 +376,42 @@ bool HomingQueue::end_if_waiting(MotorId id, const std::string& because) {
   return true;
 }
 
+HomingQueue::Task* HomingQueue::task_of(MotorId id) {
+  const auto in = [id](std::deque<Task>& tasks) -> Task* {
+    const auto found = std::ranges::find(tasks, id, &Task::motor);
+    return found != tasks.end() ? &*found : nullptr;
+  };
+  Task* task = in(queues_[installation_.config()[id].mcu]);
+  return task == nullptr && sequence_ ? in(sequence_->later) : task;
+}
+
+bool HomingQueue::is_of_sequence(MotorId id) const {
+  if (!sequence_) return false;
+  return std::ranges::find(sequence_->now, id) != sequence_->now.end() ||
+         std::ranges::find(sequence_->later, id, &Task::motor) != sequence_->later.end();
+}
+
+// Of all motors those that are being homed go on, if only others are paused or held: these end when
+// it is their turn.
+void HomingQueue::end_overtaken(std::int64_t) {
+  for (const MotorId id : installation_.motors()) {
+    if (!installation_[id].is<motion::Homing>()) continue;
+    Task* task = task_of(id);
+    if (task == nullptr || task->phase == Phase::kHoming) continue;
+    const auto by = open_.precedence().overtaken(task->after_stops, {id});
+    if (!by) continue;
+    open_.stopped_by({id}, by->by);
+    if (task->phase == Phase::kWaiting && is_of_sequence(id)) {
+      task->ended_by = kNotItsTurn;
+    } else {
+      end_if_waiting(id, kNotItsTurn);
+    }
+  }
+}
+
 void HomingQueue::end_waiting() {
   for (const MotorId motor : installation_.motors()) {
-    end_if_waiting(motor, "stopped before it was its turn to be homed");
+    end_if_waiting(motor, kNotItsTurn);
   }
 }
 
@@ -388,7 +425,7 @@ void HomingQueue::give_up(Task& task, const std::string& because) {
 
 void HomingQueue::stop(MotorId id) {
   if (!installation_[id].is<motion::Homing>()) return;
-  if (end_if_waiting(id, "stopped before it was its turn to be homed")) return;
+  if (end_if_waiting(id, kNotItsTurn)) return;
   for (Task& task : queues_[installation_.config()[id].mcu]) {
     if (task.motor == id) give_up(task, "homing was stopped on request");
   }
@@ -406,7 +443,7 @@ void HomingQueue::goes_online(Mcu& mcu) {
       outputs_.log(LogLevel::kWarning, id, motor.name() + " is not homed: " + may.error().text());
       continue;
     }
-    add({.motor = id, .floor = *floor});
+    add({.motor = id, .floor = *floor, .after_stops = open_.precedence().stops()});
   }
 }
 

@@ -37,6 +37,7 @@ class HomingQueue final : public Service {
   void goes_offline(Mcu& mcu, const std::string& cause) override;
   void reports(std::int64_t now_us, Mcu& mcu) override;
   void refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) override;
+  void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
  private:
@@ -50,8 +51,9 @@ class HomingQueue final : public Service {
     MotorId motor;
     std::uint16_t floor;  // of the fast approach
     Phase phase = Phase::kWaiting;
-    std::string ended_by{};  // it was asked to end, because of that
+    std::string ended_by{};  // it was asked to end, because of that; waiting: when it is its turn
     std::int64_t then_steps = 0;
+    std::uint64_t after_stops = 0;  // as Asker::after_stops
   };
   // Of one MCU: all but the first wait.
   using Queue = std::deque<Task>;
@@ -73,6 +75,8 @@ class HomingQueue final : public Service {
   void found(Mcu& mcu);
   void move_on(std::int64_t now_us, Mcu& mcu);
   void follow_moving_on(Mcu& mcu);
+  Task* task_of(MotorId motor);
+  bool is_of_sequence(MotorId motor) const;
   bool end_if_waiting(MotorId motor, const std::string& because);
   void give_up(Task& task, const std::string& because);
   // The first of the queue.

@@ -62,6 +62,7 @@ class Lines final : public Service {
   bool plans() const;
   void work();
 
+  void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
  private:
@@ -110,6 +111,7 @@ class Lines final : public Service {
     std::vector<End> low;
     std::vector<End> high;
     std::vector<units::Scale> scales;  // of each motor at the first point; the same for all
+    std::uint64_t after_stops = 0;     // as Asker::after_stops, of the first part
     std::int32_t rows = 0;
     int direction = 0;  // of a motor with speeds
   };
@@ -145,7 +147,8 @@ class Lines final : public Service {
   void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                  const std::vector<std::size_t>& indices, std::uint32_t to);
 
-  Result<Incoming> begin_points(const api::MovePath& request) const;
+  std::optional<Precedence::Overtaken> overtaken(const Incoming& path) const;
+  Result<Incoming> begin_points(const api::Asker& asker, const api::MovePath& request) const;
   Result<void> same_scales(const Incoming& incoming) const;
   Result<void> add_points(Incoming& incoming, const api::MovePath& request) const;
   Result<std::uint16_t> floor_to(Incoming& incoming, std::int64_t point, double speed) const;

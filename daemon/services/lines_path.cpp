@@ -72,12 +72,18 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
   auto incoming = incoming_.find(client);
   Result<void> good;
   if (incoming == incoming_.end()) {
-    auto begun = begin_points(request);
+    auto begun = begin_points(asker, request);
     if (begun) {
       incoming = incoming_.emplace(client, std::move(*begun)).first;
     } else {
       good = fail(begun.error());
     }
+  }
+  // A stop since its first points has ended all of it: those that come still, too.
+  const auto by = good && !request.dry_run ? overtaken(incoming->second) : std::nullopt;
+  if (by) {
+    if (*last) incoming_.erase(incoming);
+    return open_.not_begun(asker, *by);
   }
   if (good) good = same_scales(incoming->second);
   if (good) good = add_points(incoming->second, request);
@@ -106,10 +112,25 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
   incoming_.erase(incoming);
 }
 
-Result<Lines::Incoming> Lines::begin_points(const api::MovePath& request) const {
+std::optional<Precedence::Overtaken> Lines::overtaken(const Incoming& path) const {
+  return open_.precedence().overtaken(path.after_stops, path.line.motors);
+}
+
+void Lines::end_overtaken(std::int64_t) {
+  std::erase_if(coming_, [this](const Coming& coming) {
+    const auto by = coming.dry_run ? std::nullopt : overtaken(coming.path);
+    if (by) open_.not_begun(coming.asker, *by);
+    return by.has_value();
+  });
+}
+
+Result<Lines::Incoming> Lines::begin_points(const api::Asker& asker,
+                                            const api::MovePath& request) const {
   Incoming incoming;
+  incoming.after_stops = asker.after_stops;
   Line& line = incoming.line;
   line.motors = *installation_.find(request.motors);
+  if (!request.dry_run && overtaken(incoming)) return incoming;
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
   std::vector<motion::Path::Motor> motors;

@@ -151,6 +151,15 @@ void Moves::begin_next() {
   begin(next);
 }
 
+void Moves::end_overtaken(std::int64_t) {
+  for (const MotorId id : std::set<MotorId>(unbegun_)) {
+    const auto by = open_.precedence().overtaken(open_.asker_of(id)->after_stops, {id});
+    if (!by) continue;
+    open_.stopped_by({id}, by->by);
+    cancel(id, "stopped before it began");
+  }
+}
+
 // Nobody has been told of it, nor does the log of moves know of it.
 void Moves::cancel(MotorId motor, const std::string& reason) {
   end(motor, *installation_[motor].end(api::Outcome::kStopped, reason));

@@ -88,6 +88,7 @@ class Moves final : public Service {
   std::int64_t rest_by_us(std::int64_t now_us) const;
 
   void goes_offline(Mcu& mcu, const std::string& cause) override;
+  void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
  private:

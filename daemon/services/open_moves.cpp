@@ -101,24 +101,44 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& why, bo
   std::vector<api::MotorResult> results;
   for (std::size_t i = 0; i < finished->motors.size(); ++i) {
     const motion::MotorOutcome& part = finished->motors[i];
-    const units::Coordinates& coordinates = installation_[part.motor].coordinates();
-    results.push_back({.motor = installation_[part.motor].name(),
-                       .outcome = part.outcome,
-                       .position_steps = part.position_steps,
-                       .user = coordinates.user_of(part.position_steps),
-                       .dial = coordinates.dial_of(part.position_steps),
-                       .unit = coordinates.unit(),
-                       .precision = coordinates.precision(),
-                       .table = open.mapped().tables[i],
-                       .who = text_of(open.mapped().asker),
-                       .legs = open.mapped().plans[part.motor].legs,
-                       .most_steps_per_s = open.mapped().plans[part.motor].most_steps_per_s});
+    results.push_back(
+        result_of(part.motor, part.outcome, part.position_steps, open.mapped().asker));
+    results.back().table = open.mapped().tables[i];
+    results.back().legs = open.mapped().plans[part.motor].legs;
+    results.back().most_steps_per_s = open.mapped().plans[part.motor].most_steps_per_s;
   }
   const auto& conclusion = open.mapped().conclusion;
   open.mapped().asker.answer(
       api::Completed{.outcome = finished->outcome,
                      .reason = finished->reason + (conclusion ? conclusion() : std::string()),
                      .detail = std::move(results)});
+}
+
+api::MotorResult OpenMoves::result_of(MotorId id, api::Outcome outcome, std::int64_t position_steps,
+                                      const api::Asker& asker) const {
+  const units::Coordinates& coordinates = installation_[id].coordinates();
+  return {.motor = installation_[id].name(),
+          .outcome = outcome,
+          .position_steps = position_steps,
+          .user = coordinates.user_of(position_steps),
+          .dial = coordinates.dial_of(position_steps),
+          .unit = coordinates.unit(),
+          .precision = coordinates.precision(),
+          .table = api::ref_to(*installation_.table_of(id)),
+          .who = text_of(asker)};
+}
+
+void OpenMoves::not_begun(const api::Asker& asker, const Precedence::Overtaken& overtaken) const {
+  std::vector<api::MotorResult> results;
+  for (const MotorId motor : overtaken.of) {
+    results.push_back(
+        result_of(motor, api::Outcome::kStopped, installation_[motor].position_steps(), asker));
+  }
+  asker.answer(api::Completed{.outcome = api::Outcome::kStopped,
+                              .reason = installation_[overtaken.motor].name() + ": stopped by " +
+                                        overtaken.by +
+                                        " before this was carried out; nothing has moved",
+                              .detail = std::move(results)});
 }
 
 const api::Asker* OpenMoves::asker_of(MotorId motor) const {

@@ -13,6 +13,7 @@
 
 #include "api/session.h"
 #include "daemon/installation.h"
+#include "daemon/precedence.h"
 #include "motion/move_book.h"
 
 namespace bushd::daemon {
@@ -22,7 +23,8 @@ std::string text_of(const api::Asker& asker);
 
 class OpenMoves {
  public:
-  explicit OpenMoves(Installation& installation) : installation_(installation) {}
+  explicit OpenMoves(Installation& installation)
+      : installation_(installation), precedence_(installation) {}
 
   enum class Purpose { kMove, kHome, kArm, kJog, kLine, kTravel, kFollow };
 
@@ -64,6 +66,13 @@ class OpenMoves {
   // This motor moves on, for somebody else.
   void not_stopped(MotorId motor) { stopped_by_.erase(motor); }
 
+  // Which requests have been ended before they had a motor under way.
+  Precedence& precedence() { return precedence_; }
+  const Precedence& precedence() const { return precedence_; }
+  // Answers a request that a stop has ended before it was carried out: it was never accepted. Its
+  // motors may be under way for others.
+  void not_begun(const api::Asker& asker, const Precedence::Overtaken& overtaken) const;
+
   bool empty() const { return book_.empty(); }
   bool together(MotorId a, MotorId b) const { return book_.move_of(a) == book_.move_of(b); }
   // Whose request it is; null if none.
@@ -87,8 +96,11 @@ class OpenMoves {
   };
 
   void tell(MotorId motor, api::Outcome outcome, const std::string& reason) const;
+  api::MotorResult result_of(MotorId motor, api::Outcome outcome, std::int64_t position_steps,
+                             const api::Asker& asker) const;
 
   Installation& installation_;
+  Precedence precedence_;
   Listener listener_;
   motion::MoveBook book_;
   std::unordered_map<std::uint64_t, Open> open_;  // by number in book_

@@ -1,5 +1,6 @@
 #include "daemon/services/pauses.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace bushd::daemon {
@@ -20,35 +21,82 @@ Pauses::Pauses(Installation& installation, Interlocks& interlocks, Moves& moves,
   });
 }
 
+// What it does, which a pause leaves alone; "": nothing, or a motion that it pauses or ends.
+std::string Pauses::left_alone(MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  if (motor.is<motion::Homing>()) return "being homed";
+  if (motor.is<motion::Armed>()) return "waiting for the trigger";
+  if (motor.is<motion::Travelling>()) return "travelling by its MCU";
+  if (motor.is<motion::Local>()) return "moved by local inputs";
+  if (motor.follows()) return "following an array";
+  return {};
+}
+
+// It has come to its target, where it has yet to stand for its settling time. On a line motors come
+// there one before the other, and pause together.
+bool Pauses::settles(MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  return !motor.is<motion::OnLine>() && !motor.is_paused() &&
+         motor.position_steps() == motor.target_steps() &&
+         installation_.mcu_of(id).view().tick >= motor.axis().end_tick();
+}
+
 void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pause& request) {
-  const auto motors = installation_.find_with_groups(request.motors);
-  if (!motors) return asker.answer(api::Refused{motors.error().text()});
-  for (const MotorId motor : *motors) {
-    if (!installation_[motor].follows()) continue;
+  auto [named, unknown] = installation_.find_known(request.motors, true);
+  if (named.empty()) return asker.answer(api::Refused{unknown});
+  named = installation_.with_lines(std::move(named));
+  const auto follows = [this](MotorId id) { return installation_[id].follows(); };
+  const auto moves = [this](MotorId id) { return installation_[id].moves(); };
+  const auto array = std::ranges::find_if(named, follows);
+  if (array != named.end() &&
+      std::ranges::count_if(named, moves) == std::ranges::count_if(named, follows)) {
     return asker.answer(api::Refused{
-        installation_[motor].name() +
+        installation_[*array].name() +
         " follows an array, whose times go on: stop it, and follow the rest of the rows from "
         "where its motors stand"});
   }
   asker.answer(api::Accepted{});
-  std::vector<MotorId> moving;
+  Pausing pausing{.asker = asker};
+  if (!unknown.empty()) pausing.not_done(api::Outcome::kFault, unknown);
+  const std::string mcus = installation_.not_online(named);
+  if (!mcus.empty()) {
+    const bool may_move = !request.motors.empty() || std::ranges::any_of(named, [this](MotorId id) {
+      return installation_[id].lost_in_motion();
+    });
+    pausing.not_done(may_move ? api::Outcome::kLink : api::Outcome::kDone,
+                     "not online, so it is unknown whether they stand:" + mcus);
+  }
+  std::vector<MotorId> to_pause;
   std::vector<MotorId> jogs;
-  for (const MotorId motor : installation_.with_lines(*motors)) {
-    if (!installation_[motor].moves()) continue;
-    const bool jogs_on = open_.jogs(motor);
-    if (jogs_on) {
+  for (const MotorId motor : named) {
+    if (const std::string does = left_alone(motor); !does.empty()) {
+      pausing.left[does].push_back(motor);
+      if (installation_[motor].follows()) pausing.outcome = api::Outcome::kFault;
+      continue;
+    }
+    if (!moves(motor)) continue;
+    if (open_.jogs(motor)) {
       open_.say(motor, api::Outcome::kStopped,
                 {api::Outcome::kStopped, "ended, because " + text_of(asker) + " paused it"});
+      jogs.push_back(motor);
+    } else if (settles(motor)) {
+      pausing.left["at their targets"].push_back(motor);
+      continue;
+    } else if (!installation_[motor].axis().stopping() || installation_[motor].is_paused()) {
+      to_pause.push_back(motor);
+    } else {
+      pausing.left["being stopped"].push_back(motor);
+      pausing.stopping.insert(motor);
     }
-    (jogs_on ? jogs : moving).push_back(motor);
+    pausing.motors.emplace(motor, installation_[motor].target_steps());
   }
-  moves_.pause(now_us, moving);
+  moves_.pause(now_us, to_pause);
   moves_.stop(now_us, jogs);
   if (open_pauses_.size() >= kMaxOpen) {
     open_pauses_.front().asker.answer(api::done("carried out; its end is not waited for"));
     open_pauses_.pop_front();
   }
-  open_pauses_.push_back({.asker = asker, .motors = moving, .paused = moving.size()});
+  open_pauses_.push_back(std::move(pausing));
 }
 
 void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Resume& request) {
@@ -71,31 +119,80 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Re
   asker.answer(api::done("resumed: " + count_text(paused.size())));
 }
 
-void Pauses::request(std::int64_t, const api::Asker& asker, const api::Hold& request) {
-  hold(asker, request.motors, true);
+// Those that wait for the trigger would begin by it: they wait no more.
+void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Hold& request) {
+  const auto [motors, unknown] = installation_.find_known(request.motors, true);
+  if (motors.empty()) return asker.answer(api::Refused{unknown});
+  asker.answer(api::Accepted{});
+  std::vector<MotorId> armed;
+  for (const MotorId motor : motors) {
+    installation_[motor].hold(true);
+    if (installation_[motor].is<motion::Armed>()) armed.push_back(motor);
+  }
+  open_.stopped_by(armed, text_of(asker));
+  moves_.stop(now_us, armed);
+  installation_.changed = true;
+  const std::string held = "held: " + count_text(motors.size());
+  asker.answer(unknown.empty() ? api::done(held)
+                               : api::Completed{.outcome = api::Outcome::kFault,
+                                                .reason = held + "; " + unknown,
+                                                .detail = {}});
 }
 
 void Pauses::request(std::int64_t, const api::Asker& asker, const api::Release& request) {
-  hold(asker, request.motors, false);
-}
-
-void Pauses::hold(const api::Asker& asker, const api::MotorNames& names, bool held) {
-  const auto motors = installation_.find_with_groups(names);
+  const auto motors = installation_.find_with_groups(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
-  for (const MotorId motor : *motors) installation_[motor].hold(held);
+  for (const MotorId motor : *motors) installation_[motor].hold(false);
   installation_.changed = true;
-  asker.answer(api::done((held ? "held: " : "released: ") + count_text(motors->size())));
+  asker.answer(api::done("released: " + count_text(motors->size())));
+}
+
+void Pauses::Pausing::not_done(api::Outcome how, const std::string& what) {
+  outcome = std::max(outcome, how);
+  problems += "; " + what;
+}
+
+// Whether a motor's part of it is over, and how.
+bool Pauses::has_ended(Pausing& pausing, MotorId id, std::int64_t target) const {
+  const motion::Motor& motor = installation_[id];
+  if (motor.stands_paused()) {
+    ++pausing.paused;
+    return true;
+  }
+  if (motor.is_paused() || (motor.moves() && motor.axis().stopping())) return false;
+  if (pausing.stopping.contains(id)) return true;
+  const char* how = motor.moves()                      ? "going on by a later request"
+                    : motor.position_steps() == target ? "at their targets"
+                                                       : "stopped";
+  pausing.left[how].push_back(id);
+  return true;
+}
+
+std::string Pauses::text_of_left(const Pausing& pausing) const {
+  constexpr std::size_t kMostNamed = 8;
+  std::string text;
+  for (const auto& [what, motors] : pausing.left) {
+    text += "; not paused, " + what + ":";
+    for (std::size_t i = 0; i < std::min(motors.size(), kMostNamed); ++i) {
+      text += " " + installation_[motors[i]].name();
+    }
+    if (motors.size() > kMostNamed) {
+      text += " and " + std::to_string(motors.size() - kMostNamed) + " more";
+    }
+  }
+  return text;
 }
 
 void Pauses::step(std::int64_t) {
   std::erase_if(open_pauses_, [this](Pausing& pausing) {
-    std::erase_if(pausing.motors, [this](MotorId id) {
-      const motion::Motor& motor = installation_[id];
-      return !motor.is_paused() || motor.stands_paused();
-    });
+    std::erase_if(pausing.motors,
+                  [&](const auto& motor) { return has_ended(pausing, motor.first, motor.second); });
     if (!pausing.motors.empty()) return false;
-    pausing.asker.answer(api::done("paused: " + count_text(pausing.paused)));
+    pausing.asker.answer(api::Completed{.outcome = pausing.outcome,
+                                        .reason = "paused: " + count_text(pausing.paused) +
+                                                  text_of_left(pausing) + pausing.problems,
+                                        .detail = {}});
     return true;
   });
 }

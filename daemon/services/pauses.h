@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <list>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,10 +34,19 @@ class Pauses final : public Service {
  private:
   struct Pausing {
     api::Asker asker;
-    std::vector<MotorId> motors;  // that do not stand yet
-    std::size_t paused;           // how many it was
+    std::map<MotorId, std::int64_t> motors{};            // that do not stand yet, and their targets
+    std::set<MotorId> stopping{};                        // of these: for good
+    std::size_t paused = 0;                              // how many stand paused
+    std::map<std::string, std::vector<MotorId>> left{};  // the others, by what they do
+    std::string problems{};
+    api::Outcome outcome = api::Outcome::kDone;
+
+    void not_done(api::Outcome how, const std::string& what);
   };
-  void hold(const api::Asker& asker, const api::MotorNames& names, bool held);
+  std::string left_alone(MotorId motor) const;
+  bool settles(MotorId motor) const;
+  bool has_ended(Pausing& pausing, MotorId motor, std::int64_t target) const;
+  std::string text_of_left(const Pausing& pausing) const;
 
   Installation& installation_;
   Interlocks& interlocks_;

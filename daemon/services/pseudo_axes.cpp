@@ -139,6 +139,7 @@ Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& re
                                  return std::move(*asked);
                                },
                                [&](const api::Stop& r) { return named(r); },
+                               [&](const api::Disarm& r) { return named(r); },
                                [&](const api::Pause& r) { return named(r); },
                                [&](const api::Resume& r) { return named(r); },
                                [&](const api::Hold& r) { return named(r); },

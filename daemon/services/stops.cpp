@@ -1,17 +1,23 @@
 #include "daemon/services/stops.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace bushd::daemon {
 
 void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Stop& request) {
-  auto motors = installation_.find_or_all(request.motors);
-  if (!motors) return asker.answer(api::Refused{motors.error().text()});
-  asker.answer(api::Accepted{});
-  *motors = installation_.with_lines(std::move(*motors));
-  open_moves_.stopped_by(*motors, text_of(asker));
-  std::erase_if(*motors, [this](MotorId motor) { return !can_be_stopped(motor); });
-  stop(now_us, *motors);
+  auto [motors, unknown] = installation_.find_known(request.motors, false);
+  if (motors.empty()) return asker.answer(api::Refused{unknown});
+  motors = installation_.with_lines(std::move(motors));
+  const bool in_part = !unknown.empty() || may_run_on(motors, !request.motors.empty());
+  if (!in_part) asker.answer(api::Accepted{});
+  open_moves_.stopped_by(motors, text_of(asker));
+  Stopping stopping{.asker = asker, .done = "done" + not_online_text(motors)};
+  std::vector<MotorId> moving = motors;
+  std::erase_if(moving, [this](MotorId motor) { return !can_be_stopped(motor); });
+  stop(now_us, moving);
+  if (in_part) return asker.answer(result_in_part(motors, unknown, !moving.empty()));
+  stopping.motors = std::move(moving);
   if (open_.size() >= kMaxOpen) {
     open_.front().asker.answer(api::Completed{
         .outcome = api::Outcome::kStopped,
@@ -19,7 +25,32 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
         .detail = {}});
     open_.pop_front();
   }
-  open_.push_back({.asker = asker, .motors = std::move(*motors)});
+  open_.push_back(std::move(stopping));
+}
+
+// Of all motors, those count that were lost while they moved: racks may be without power for years.
+bool Stops::may_run_on(const std::vector<MotorId>& motors, bool named) const {
+  const auto is_online = [this](MotorId id) { return installation_.mcu_of(id).online(); };
+  if (named || std::ranges::none_of(motors, is_online)) {
+    return !std::ranges::all_of(motors, is_online);
+  }
+  return std::ranges::any_of(motors,
+                             [this](MotorId id) { return installation_[id].lost_in_motion(); });
+}
+
+std::string Stops::not_online_text(const std::vector<MotorId>& motors) const {
+  const std::string mcus = installation_.not_online(motors);
+  return mcus.empty() ? "" : "; not online, so it is unknown whether they stand:" + mcus;
+}
+
+// It is told at once: who does not wait for the end of a stop is to know it, too.
+api::Completed Stops::result_in_part(const std::vector<MotorId>& motors, const std::string& unknown,
+                                     bool any_moves) const {
+  return {
+      .outcome = unknown.empty() ? api::Outcome::kLink : api::Outcome::kFault,
+      .reason = std::string(any_moves ? "what moves is being stopped" : "what is online stands") +
+                not_online_text(motors) + (unknown.empty() ? "" : "; " + unknown),
+      .detail = {}};
 }
 
 void Stops::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
@@ -40,7 +71,15 @@ void Stops::follow() {
   std::erase_if(open_, [this](Stopping& stopping) {
     std::erase_if(stopping.motors, [&](MotorId id) {
       const motion::Motor& motor = installation_[id];
-      if (!can_be_stopped(id)) return true;
+      const Mcu& mcu = installation_.mcu_of(id);
+      if (!can_be_stopped(id)) {
+        if (mcu.online()) return true;
+        stopping.outcome = api::Outcome::kLink;
+        stopping.done =
+            "MCU " + mcu.name() +
+            " was lost meanwhile, so it is unknown whether its motors stand: " + mcu.view().detail;
+        return true;
+      }
       if (!motor.moves() || motor.axis().stopping()) return false;
       const api::Asker* by = open_moves_.asker_of(id);
       stopping.done = motor.name() + " was given a new target" +
@@ -50,7 +89,7 @@ void Stops::follow() {
     if (!stopping.motors.empty()) return false;
     installation_.changed = true;
     stopping.asker.answer(
-        api::Completed{.outcome = api::Outcome::kDone, .reason = stopping.done, .detail = {}});
+        api::Completed{.outcome = stopping.outcome, .reason = stopping.done, .detail = {}});
     return true;
   });
 }

@@ -36,10 +36,15 @@ class Stops final : public Service {
  private:
   struct Stopping {
     api::Asker asker;
-    std::vector<MotorId> motors;  // that do not stand yet
-    std::string done = "done";    // the reason, when all stand
+    std::vector<MotorId> motors{};  // that do not stand yet
+    std::string done = "done";      // the reason, when all stand
+    api::Outcome outcome = api::Outcome::kDone;
   };
   bool can_be_stopped(MotorId motor) const;
+  bool may_run_on(const std::vector<MotorId>& motors, bool named) const;
+  std::string not_online_text(const std::vector<MotorId>& motors) const;
+  api::Completed result_in_part(const std::vector<MotorId>& motors, const std::string& unknown,
+                                bool any_moves) const;
   void follow();
 
   Installation& installation_;

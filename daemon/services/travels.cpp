@@ -119,6 +119,18 @@ void Travels::ask(std::int64_t now_us, Mcu& mcu) {
   task.number = mcu.travel(task.message);
 }
 
+void Travels::end_overtaken(std::int64_t) {
+  for (const McuId id : installation_.mcus()) {
+    const auto& task = tasks_[id];
+    if (!task || task->number) continue;
+    const MotorId motor = task->motor;
+    const auto by = open_.precedence().overtaken(open_.asker_of(motor)->after_stops, {motor});
+    if (!by) continue;
+    open_.stopped_by({motor}, by->by);
+    end(installation_[id], Outcome::kStopped, "it was stopped before it began");
+  }
+}
+
 void Travels::stop(MotorId id) {
   Mcu& mcu = installation_.mcu_of(id);
   auto& task = tasks_[mcu.id];

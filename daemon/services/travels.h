@@ -32,6 +32,7 @@ class Travels final : public Service {
   void goes_offline(Mcu& mcu, const std::string& cause) override;
   void reports(std::int64_t now_us, Mcu& mcu) override;
   void refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) override;
+  void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
  private:

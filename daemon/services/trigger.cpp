@@ -90,14 +90,23 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
 }
 
 void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
-  auto motors = installation_.find_or_all(request.motors);
-  if (!motors) return asker.answer(api::Refused{motors.error().text()});
-  asker.answer(api::Accepted{});
-  std::erase_if(*motors,
+  auto [motors, unknown] = installation_.find_known(request.motors, false);
+  if (motors.empty()) return asker.answer(api::Refused{unknown});
+  std::erase_if(motors,
                 [this](MotorId motor) { return !installation_[motor].is<motion::Armed>(); });
-  open_moves_.stopped_by(*motors, text_of(asker));
-  for (const McuId mcu : installation_.mcus_of(*motors)) installation_[mcu].disarm();
-  open_.push_back({.asker = asker, .motors = std::move(*motors)});
+  open_moves_.stopped_by(motors, text_of(asker));
+  for (const McuId mcu : installation_.mcus_of(motors)) installation_[mcu].disarm();
+  if (!unknown.empty()) {
+    return asker.answer(api::Completed{.outcome = api::Outcome::kFault,
+                                       .reason = "what waits is being disarmed; " + unknown,
+                                       .detail = {}});
+  }
+  asker.answer(api::Accepted{});
+  if (open_.size() >= kMaxOpen) {
+    open_.front().asker.answer(api::done("carried out; its end is not waited for"));
+    open_.pop_front();
+  }
+  open_.push_back({.asker = asker, .motors = std::move(motors)});
 }
 
 void Trigger::follow() {

@@ -17,6 +17,9 @@ Result<void> check_trigger_delay(std::int64_t delay_us);
 
 class Trigger final : public Service {
  public:
+  // Disarmings whose end is waited for at a time; beyond, they are carried out all the same.
+  static constexpr std::size_t kMaxOpen = 256;
+
   Trigger(Installation& installation, const Interlocks& interlocks, const Moves& moves,
           OpenMoves& open_moves)
       : installation_(installation),

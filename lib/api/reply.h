@@ -1,4 +1,6 @@
-// What is said to a request: Refused and nothing more, or Accepted and later exactly one Completed.
+// What is said to a request: Refused and nothing more, or Accepted and later exactly one Completed;
+// Completed alone where a request is over with its answer (one that a stop has ended before it was
+// carried out, and a stop that could not stop all).
 #pragma once
 
 #include <cstdint>

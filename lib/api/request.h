@@ -331,8 +331,9 @@ struct Request
 // For logs and counts: "move", "stop", "emergency stop", ...
 std::string_view name_of(const Request& request);
 
-// Taken before anything that waits.
-bool is_stop(const Request& request);
+// Ends motion: a stop of whatever kind, a pause, a hold, a disarming, a jog's end. Taken before
+// anything that waits, however much that is, and ends what has arrived before it and has not begun.
+bool ends_motion(const Request& request);
 
 // Carrying it out twice does what once does, so it needs no session: stops, and what only reads.
 bool is_repeatable(const Request& request);

@@ -66,8 +66,13 @@ class Session {
 
 // One request's way back. Without a session nobody is told, as of what a signal has started.
 struct Asker {
+  static constexpr std::uint64_t kNotCounted = UINT64_MAX;
+
   std::shared_ptr<Session> session;
   std::int64_t number = 0;  // of the request, by the client's own count
+  // When the request arrived: after so many that end motion (daemon/precedence.h). Of one that ends
+  // motion itself, that one is among them.
+  std::uint64_t after_stops = kNotCounted;
 
   void answer(const Reply& reply) const {
     if (session) session->answer(number, reply);

@@ -1,6 +1,7 @@
 #include "api/sessions.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace bushd::api {
@@ -78,25 +79,39 @@ void Sessions::close_oldest(std::list<std::int64_t>& order) {
 }
 
 Sessions::Ruling Sessions::rule(std::int64_t session, const std::string& client_id,
-                                std::int64_t number, const Request& request) {
-  const bool stop = is_stop(request);
-  if (is_repeatable(request) && !stop) return {.carry_out = true};
+                                std::int64_t number, const Request& request, std::uint64_t stops) {
+  const bool stop = ends_motion(request);
+  if (is_repeatable(request) && !stop) return {.carry_out = true, .after_stops = stops};
   const auto found = find(session, client_id);
   if (found == sessions_.end()) {
-    if (stop) return {.carry_out = true};
+    if (stop) return {.carry_out = true, .after_stops = stops};
     return {.reply = unknown_session()};
   }
-  Ruling ruling = rule_known(found, number, request);
+  Known& known = found->second;
+  const bool stopped_before = known.stops.contains(number);
+  Ruling ruling = rule_known(found, number, request, stops);
   // Whoever can speak may stop.
   const bool refused = ruling.reply && std::holds_alternative<Refused>(*ruling.reply);
-  const bool answered_before = found->second.answers.contains(number) &&
-                               found->second.answers.at(number).kind == request.index();
-  if (stop && refused && !answered_before) return {.carry_out = true};
+  const auto answer = known.answers.find(number);
+  const bool answered_before =
+      answer == known.answers.end() ? stopped_before : answer->second.kind == request.index();
+  if (stop && refused && !answered_before) return {.carry_out = true, .after_stops = stops};
   return ruling;
 }
 
-Sessions::Ruling Sessions::rule_known(Iterator session, std::int64_t number,
-                                      const Request& request) {
+void Sessions::note_stop(Known& session, std::int64_t number, std::uint64_t stops) {
+  std::erase_if(session.stops,
+                [&](const auto& stop) { return !session.numbers.holds(stop.first); });
+  session.stops.emplace(number, stops);
+  if (session.stops.size() <= kMostStops) return;
+  const auto oldest = session.stops.begin();
+  const auto next = std::next(oldest);
+  next->second = std::min(next->second, oldest->second);
+  session.stops.erase(oldest);
+}
+
+Sessions::Ruling Sessions::rule_known(Iterator session, std::int64_t number, const Request& request,
+                                      std::uint64_t stops) {
   use(session);
   Known& known = session->second;
   switch (known.numbers.note(number)) {
@@ -121,7 +136,11 @@ Sessions::Ruling Sessions::rule_known(Iterator session, std::int64_t number,
   bytes_ += answer.bytes;
   known.answers.emplace(number, std::move(answer));
   fit(known);
-  return {.carry_out = true, .record = true};
+  const auto overtaken_by = known.stops.upper_bound(number);
+  const std::uint64_t after =
+      overtaken_by == known.stops.end() ? stops : std::min(stops, overtaken_by->second);
+  if (ends_motion(request)) note_stop(known, number, stops);
+  return {.carry_out = true, .record = true, .after_stops = after};
 }
 
 void Sessions::record(std::int64_t session, std::int64_t number, const Reply& reply) {

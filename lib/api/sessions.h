@@ -7,6 +7,9 @@
 // know: the request may have been carried out by the run before, or before the session was
 // forgotten. Nothing is ever carried out twice, whatever is forgotten; memory is bounded in bytes.
 //
+// Within a session the numbers say what was asked first: a request that arrives after one that ends
+// motion, and has a lower number, is taken as if it had arrived before that.
+//
 // No I/O, no clock.
 #pragma once
 
@@ -42,6 +45,9 @@ class Sessions {
   };
   // What an answer takes beside its own memory.
   static constexpr std::size_t kBytesPerAnswer = 160;
+  // Of a session: requests that have ended motion, whose numbers are remembered. Of more, those
+  // before the oldest one count as asked before all that were.
+  static constexpr std::size_t kMostStops = 64;
 
   // `seed` tells this run of the daemon from others: sessions of two runs differ unless the seeds
   // are equal.
@@ -61,11 +67,14 @@ class Sessions {
     bool record = false;
     // To be sent at once. Without it, and without carry_out, the answer is still to come.
     std::optional<Reply> reply{};
+    // To be carried out as if it had arrived after so many that end motion (Asker::after_stops).
+    std::uint64_t after_stops = 0;
   };
-  // Notes the number, if it is new. Stops are carried out whatever is known of their session, but
-  // for one that is answered again; what only reads always is.
+  // Notes the number, if it is new. What ends motion is carried out whatever is known of its
+  // session, but for one that is answered again; what only reads always is. `stops`: so many that
+  // end motion have arrived, from whomever.
   Ruling rule(std::int64_t session, const std::string& client_id, std::int64_t number,
-              const Request& request);
+              const Request& request, std::uint64_t stops = 0);
 
   // The answer to a request that was to be recorded; the one before is replaced. Of what has been
   // forgotten it is ignored.
@@ -91,6 +100,8 @@ class Sessions {
     std::map<std::int64_t, Answer> answers{};
     std::list<std::int64_t> by_age{};  // numbers of `answers`, oldest first
     std::size_t bytes = 0;
+    // Numbers of requests that end motion, and how many had arrived before each.
+    std::map<std::int64_t, std::uint64_t> stops{};
   };
   using Iterator = std::unordered_map<std::int64_t, Known>::iterator;
 
@@ -100,7 +111,9 @@ class Sessions {
   void close_oldest(std::list<std::int64_t>& order);
   void drop_answer(Known& session, std::int64_t number);
   void fit(Known& session);
-  Ruling rule_known(Iterator session, std::int64_t number, const Request& request);
+  Ruling rule_known(Iterator session, std::int64_t number, const Request& request,
+                    std::uint64_t stops);
+  static void note_stop(Known& session, std::int64_t number, std::uint64_t stops);
 
   Limits limits_;
   std::uint64_t seed_;

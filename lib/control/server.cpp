@@ -3,9 +3,11 @@
 #include <fcntl.h>
 #include <grp.h>
 #include <sys/epoll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,10 +22,23 @@ namespace {
 
 constexpr Server::Connection kListener = 0;
 constexpr int kBacklog = 256;
+// No connection waits longer to be accepted, not even where all connect at once.
+constexpr std::int64_t kMostUnreadNs = 30'000'000'000;
 constexpr std::size_t kAcceptedAtOnce = 64;
 
 Error system_error(const std::string& what, const std::string& path) {
   return {.message = what + ": " + std::strerror(errno), .file = path};
+}
+
+std::int64_t ns_of(const timespec& time) {
+  constexpr std::int64_t kNsPerS = 1'000'000'000;
+  return time.tv_sec * kNsPerS + time.tv_nsec;
+}
+
+std::int64_t now_ns() {
+  timespec time{};
+  ::clock_gettime(CLOCK_REALTIME, &time);
+  return ns_of(time);
 }
 
 // Closed unless it is released.
@@ -124,7 +139,8 @@ Server::Server(std::string path, PidLock lock, int listener, int epoll, Limits l
       epoll_(epoll),
       spare_(open_spare()),
       limits_(limits),
-      buffer_(kMaxPacketBytes) {}
+      buffer_(kMaxPacketBytes),
+      nobody_came_ns_(now_ns()) {}
 
 Server::~Server() {
   for (const auto& [connection, peer] : peers_) ::close(peer.fd);
@@ -146,19 +162,22 @@ void Server::handle() {
   const int n = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), 0);
   events.resize(static_cast<std::size_t>(std::max(n, 0)));
   bytes_left_ = limits_.bytes_at_once;
+  accept_all();
   // In turns, beginning behind who was served last.
   std::sort(events.begin(), events.end(), [this](const epoll_event& a, const epoll_event& b) {
     return a.data.u64 - turn_ - 1 < b.data.u64 - turn_ - 1;
   });
+  bool any_urgent = false;
   for (const epoll_event& event : events) {
     const auto found = peers_.find(event.data.u64);
     if (bytes_left_ == 0 || found == peers_.end() || !is_urgent(found->second)) continue;
+    any_urgent = true;
     handle_peer(found->first, event.events);
   }
+  // Who connects from now on comes after what was urgent.
+  if (any_urgent) accept_all();
   for (const epoll_event& event : events) {
-    if (event.data.u64 == kListener) {
-      accept_all();
-    } else if (bytes_left_ > 0) {
+    if (event.data.u64 != kListener && bytes_left_ > 0) {
       turn_ = event.data.u64;
       handle_peer(event.data.u64, event.events);
     }
@@ -191,7 +210,9 @@ bool Server::is_urgent(const Peer& peer) const {
 
 void Server::accept_all() {
   for (std::size_t i = 0; i < kAcceptedAtOnce; ++i) {
+    const std::int64_t before_ns = now_ns();
     const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd < 0 && errno == EAGAIN) nobody_came_ns_ = before_ns;
     if (fd >= 0) {
       accept_one(fd);
     } else if (errno == EMFILE || errno == ENFILE) {
@@ -218,7 +239,14 @@ void Server::accept_one(int fd) {
     return;
   }
   const Connection connection = ++last_;
-  const Peer& peer = peers_.emplace(connection, Peer{.fd = fd}).first->second;
+  Peer& peer = peers_.emplace(connection, Peer{.fd = fd}).first->second;
+  const int on = 1;
+  static_cast<void>(::setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on));
+  int waiting = 0;
+  if (::ioctl(fd, FIONREAD, &waiting) == 0) {
+    peer.unstamped_bytes = static_cast<std::size_t>(std::max(waiting, 0));
+  }
+  peer.connected_after_ns = nobody_came_ns_;
   watch(connection, peer, EPOLL_CTL_ADD);
   if (handlers_.opened) {
     handlers_.opened(connection,
@@ -229,22 +257,44 @@ void Server::accept_one(int fd) {
 bool Server::read(Connection connection, Peer& peer) {
   constexpr std::size_t kPerPacket = 512;
   iovec part{.iov_base = buffer_.data(), .iov_len = buffer_.size()};
-  // Descriptors that somebody sends along are closed by the kernel: there is no room for them.
+  // Descriptors that somebody sends along are closed by the kernel: there is room for a time only.
   msghdr message{};
   message.msg_iov = &part;
   message.msg_iovlen = 1;
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(timespec))> control{};
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
   const ssize_t n = ::recvmsg(peer.fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
   if (n < 0) return errno == EAGAIN || errno == EINTR;
   if (n == 0) return false;
   const std::span<const std::uint8_t> bytes(buffer_.data(), static_cast<std::size_t>(n));
   bytes_left_ -= std::min(bytes_left_, bytes.size() + kPerPacket);
+  const Sent sent = sent_at(peer, bytes.size(), message);
   const auto view = (message.msg_flags & MSG_TRUNC) != 0 ? std::nullopt : view_of(bytes);
   if (!view) {
     reject(connection);
   } else if (handlers_.packet) {
-    handlers_.packet(connection, *view);
+    handlers_.packet(connection, *view, sent);
   }
   return true;
+}
+
+// The kernel writes the time of a packet down from when it has been asked to.
+Server::Sent Server::sent_at(Peer& peer, std::size_t bytes, const msghdr& message) {
+  if (peer.unstamped_bytes > 0) {
+    peer.unstamped_bytes -= std::min(peer.unstamped_bytes, bytes);
+    const std::int64_t now = now_ns();
+    return {.earliest_ns = std::max(peer.connected_after_ns, now - kMostUnreadNs),
+            .latest_ns = now};
+  }
+  const cmsghdr* head = CMSG_FIRSTHDR(&message);
+  if (head == nullptr || head->cmsg_level != SOL_SOCKET || head->cmsg_type != SCM_TIMESTAMPNS) {
+    return {.earliest_ns = now_ns(), .latest_ns = now_ns()};
+  }
+  timespec time{};
+  std::memcpy(&time, CMSG_DATA(head), sizeof time);
+  const std::int64_t ns = ns_of(time);
+  return {.earliest_ns = ns, .latest_ns = ns};
 }
 
 void Server::reject(Connection connection) {

@@ -21,6 +21,8 @@
 #include "control/packet.h"
 #include "control/pid_lock.h"
 
+struct msghdr;
+
 namespace bushd::control {
 
 struct Limits {
@@ -39,10 +41,16 @@ class Server {
  public:
   using Connection = std::uint64_t;  // never used again
 
+  // When a packet was sent, by the system's clock, in nanoseconds: exactly, or between these two.
+  struct Sent {
+    std::int64_t earliest_ns;
+    std::int64_t latest_ns;
+  };
+
   // Called from within handle(); they may send and close.
   struct Handlers {
     std::function<void(Connection, const api::Credentials&)> opened;
-    std::function<void(Connection, View)> packet;
+    std::function<void(Connection, View, const Sent&)> packet;
     // Packets on such a channel are read before those of all other connections.
     std::function<bool(std::string_view channel)> is_urgent{};
     std::function<void(Connection)> closed;
@@ -81,6 +89,10 @@ class Server {
     std::size_t unread_bytes = 0;
     unsigned bad = 0;
     bool doomed = false;
+    // Sent before the connection was accepted: so many bytes, whose times the kernel does not tell,
+    // and not before this.
+    std::size_t unstamped_bytes = 0;
+    std::int64_t connected_after_ns = 0;
   };
 
   Server(std::string path, PidLock lock, int listener, int epoll, Limits limits);
@@ -89,6 +101,7 @@ class Server {
   void handle_peer(Connection connection, std::uint32_t events);
   // The packet that it has sent longest ago is urgent.
   bool is_urgent(const Peer& peer) const;
+  static Sent sent_at(Peer& peer, std::size_t bytes, const msghdr& message);
   // One packet. Returns whether the connection may go on.
   bool read(Connection connection, Peer& peer);
   bool flush(Peer& peer);
@@ -109,8 +122,9 @@ class Server {
   std::size_t unread_bytes_ = 0;
   std::uint64_t dropped_ = 0;
   std::vector<std::uint8_t> buffer_;
-  std::size_t bytes_left_ = 0;  // of those that this call of handle() reads
-  Connection turn_ = 0;         // who was served last, but for what is urgent
+  std::size_t bytes_left_ = 0;   // of those that this call of handle() reads
+  Connection turn_ = 0;          // who was served last, but for what is urgent
+  std::int64_t nobody_came_ns_;  // until then all who wanted to connect had been accepted
 };
 
 }  // namespace bushd::control

@@ -54,13 +54,16 @@ struct GetStatus {};
 
 // All that a client may say, in the order of `kClientChannels`.
 struct ClientMessage {
-  RequestId id;  // of a request, or of GetStatus
+  RequestId id;               // of a request, or of GetStatus
+  std::int64_t utime_us = 0;  // of a request: the client's clock, the same in each repetition
   std::variant<Hello, Subscription, GetStatus, api::Request> content;
 };
 
-// Channels that clients speak on, and those of stops alone.
+// Channels that clients speak on, and those of them on which comes what ends motion
+// (api::ends_motion).
 std::span<const std::string_view> client_channels();
-bool is_stop_channel(std::string_view channel);
+std::span<const std::string_view> urgent_channels();
+bool is_urgent_channel(std::string_view channel);
 
 // Nothing for a payload that is not exactly one message of the channel's type, and for a channel
 // that clients do not speak on. What is in it is as wrong as it may be: the core looks at it.

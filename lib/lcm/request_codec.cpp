@@ -1,4 +1,5 @@
 // What clients say.
+#include <algorithm>
 #include <array>
 #include <type_traits>
 
@@ -435,7 +436,9 @@ std::optional<ClientMessage> decode_request(Payload payload) {
   if (!message) return std::nullopt;
   auto request = from_message(*message);
   if (!request) return std::nullopt;
-  return ClientMessage{.id = id_of(message->request), .content = std::move(*request)};
+  return ClientMessage{.id = id_of(message->request),
+                       .utime_us = message->request.utime_us,
+                       .content = std::move(*request)};
 }
 
 std::optional<ClientMessage> decode_hello(Payload payload) {
@@ -520,8 +523,14 @@ std::span<const std::string_view> client_channels() {
   return kClientChannels;
 }
 
-bool is_stop_channel(std::string_view channel) {
-  return channel == "STOP" || channel == "EMERGENCY_STOP";
+std::span<const std::string_view> urgent_channels() {
+  static constexpr std::array<std::string_view, 6> kChannels = {"STOP", "EMERGENCY_STOP", "PAUSE",
+                                                                "HOLD", "DISARM",         "JOG"};
+  return kChannels;
+}
+
+bool is_urgent_channel(std::string_view channel) {
+  return std::ranges::find(urgent_channels(), channel) != urgent_channels().end();
 }
 
 std::optional<ClientMessage> decode_client_message(std::string_view channel, Payload payload) {

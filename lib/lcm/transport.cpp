@@ -129,6 +129,7 @@ void Transport::on_message(const lcm_recv_buf_t* buffer, const char*, void* subs
   constexpr std::size_t kPerMessage = 256;
   auto& self = *static_cast<Subscription*>(subscription);
   self.transport->handled_bytes_ += buffer->data_size + kPerMessage;
+  self.transport->received_utime_us_ = buffer->recv_utime;
   // C code calls this. An exception that passed through it would leave LCM believing that a handler
   // still runs, and the next lcm_handle() would abort.
   try {

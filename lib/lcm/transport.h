@@ -35,7 +35,7 @@ class Transport {
   // The socket's receive buffer is enlarged (lcm/receive_buffer.h), unless the URL has its size:
   // `&recv_buf_size=4194304`.
   // With `channels` the kernel keeps everything else away, so that a flood on other channels is
-  // none here. Up to 4.
+  // none here. Up to 8.
   static Result<std::unique_ptr<Transport>> open(const std::string& url,
                                                  const std::vector<std::string>& channels = {});
   ~Transport();
@@ -79,6 +79,9 @@ class Transport {
                                int queue_capacity = kQueueCapacity);
   Result<void> publish_bytes(const std::string& channel, std::span<const std::uint8_t> bytes);
 
+  // When the message that a handler is called for came to this machine, in microseconds since 1970.
+  std::int64_t received_utime_us() const { return received_utime_us_; }
+
   // Payloads on subscribed channels that were no message of the channel's type.
   std::uint64_t rejected() const { return rejected_; }
 
@@ -97,6 +100,7 @@ class Transport {
   std::uint64_t rejected_ = 0;
   std::exception_ptr thrown_;
   std::size_t handled_bytes_ = 0;  // by this call of handle()
+  std::int64_t received_utime_us_ = 0;
 };
 
 }  // namespace bushd::lcm

@@ -309,7 +309,7 @@ void Motor::follow_end_of_line(const Report& report, std::vector<Event>& events)
   OnLine& now = std::get<OnLine>(activity_);
   const bool there = axis_.line_planned_end() == axis_.line_target();
   if (there && now.last_run && !now.stands) {
-    const bool stops = axis_.stopping() && !now.by_others;
+    const bool stops = axis_.stopping() && !is_paused() && !now.by_others;
     const bool settles = !stops && report.tick < axis_.over_tick() + setup_.settle_ticks;
     if (!settles) events.emplace_back(reached());
   } else if (is_paused()) {
@@ -334,7 +334,7 @@ void Motor::follow_end_of_run(const Report& report, std::vector<Event>& events) 
   if (axis_.ran_out()) {
     events.emplace_back(ran_out());
   } else if (there && further_.empty()) {
-    const bool stops = axis_.stopping() && !moving_now().by_others;
+    const bool stops = axis_.stopping() && !is_paused() && !moving_now().by_others;
     const bool settles = !stops && report.tick < axis_.end_tick() + setup_.settle_ticks;
     if (!settles) events.emplace_back(reached());
   } else if (stands_paused()) {

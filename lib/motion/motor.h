@@ -170,6 +170,8 @@ class Motor {
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
   // Somebody has said where it stands, in this run of the daemon or as was kept.
   bool confirmed() const { return confirmed_; }
+  // Its MCU is offline, and was lost while it moved, so it may have run on.
+  bool lost_in_motion() const { return lost_ && lost_->in_motion; }
   // Since then its MCU has lost power, and it stood.
   const std::optional<std::string>& restored_reason() const { return restored_reason_; }
 

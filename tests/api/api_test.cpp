@@ -38,11 +38,18 @@ TEST(Request, EachTypeHasANameOfItsOwn) {
   EXPECT_EQ(name_of(SetTable{}), "set table");
 }
 
-TEST(Request, OnlyStopsGoFirst) {
-  EXPECT_TRUE(is_stop(Stop{}));
-  EXPECT_TRUE(is_stop(EmergencyStop{}));
-  EXPECT_FALSE(is_stop(Move{}));
-  EXPECT_FALSE(is_stop(Disarm{}));
+TEST(Request, OnlyWhatEndsMotionGoesFirst) {
+  EXPECT_TRUE(ends_motion(Stop{}));
+  EXPECT_TRUE(ends_motion(EmergencyStop{}));
+  EXPECT_TRUE(ends_motion(Pause{}));
+  EXPECT_TRUE(ends_motion(Hold{}));
+  EXPECT_TRUE(ends_motion(Disarm{}));
+  EXPECT_TRUE(ends_motion(Jog{.motor = "theta", .per_s = 0}));
+  EXPECT_FALSE(ends_motion(Jog{.motor = "theta", .per_s = -1}));
+  EXPECT_FALSE(ends_motion(Jog{.motor = "theta", .renew = true}));
+  EXPECT_FALSE(ends_motion(Move{}));
+  EXPECT_FALSE(ends_motion(Resume{}));
+  EXPECT_FALSE(ends_motion(Disable{}));
 }
 
 TEST(Request, WhatMovesOrChangesIsNotRepeatable) {

@@ -220,6 +220,63 @@ TEST(Sessions, StopsAreCarriedOutUnlessTheirOwnAnswerIsKnown) {
   EXPECT_TRUE(sessions.rule(session, "scan", 2000, EmergencyStop{}).carry_out);
 }
 
+// Whatever ends motion: whoever can speak may end it.
+TEST(Sessions, PausesHoldsDisarmingsAndJogsEndsNeedNoneEither) {
+  Sessions sessions(1);
+  for (const Request& request :
+       {Request(Pause{}), Request(Hold{}), Request(Disarm{}), Request(Jog{.motor = "m"})}) {
+    EXPECT_TRUE(sessions.rule(7, "scan", 1, request).carry_out) << name_of(request);
+  }
+  EXPECT_TRUE(refused(sessions.rule(7, "scan", 1, Jog{.motor = "m", .per_s = 1})));
+  EXPECT_TRUE(refused(sessions.rule(7, "scan", 1, Resume{})));
+}
+
+// The network has changed their order.
+TEST(Sessions, ALowerNumberThanThatOfAStopCameBeforeIt) {
+  Sessions sessions(1);
+  const std::int64_t session = sessions.open("scan", 7);
+  const std::int64_t other = sessions.open("other", 7);
+  EXPECT_EQ(sessions.rule(session, "scan", 10, Move{}, 3).after_stops, 3u);
+  EXPECT_EQ(sessions.rule(session, "scan", 20, Stop{}, 3).after_stops, 3u);
+  EXPECT_EQ(sessions.rule(session, "scan", 30, Pause{}, 5).after_stops, 5u);
+  EXPECT_EQ(sessions.rule(session, "scan", 15, Move{}, 9).after_stops, 3u);
+  EXPECT_EQ(sessions.rule(session, "scan", 25, Move{}, 9).after_stops, 5u);
+  EXPECT_EQ(sessions.rule(session, "scan", 31, Move{}, 9).after_stops, 9u);
+  EXPECT_EQ(sessions.rule(other, "other", 15, Move{}, 9).after_stops, 9u);
+  // Ended or not, its answer is the same to each repetition.
+  sessions.record(session, 15, result("stopped"));
+  const auto again = sessions.rule(session, "scan", 15, Move{}, 12);
+  EXPECT_FALSE(again.carry_out);
+  EXPECT_EQ(reason_of(again.reply), "stopped");
+}
+
+TEST(Sessions, ALateRepetitionOfAStopIsNotCarriedOutThoughItsAnswerIsForgotten) {
+  Sessions sessions(1, {.bytes_per_session = 2 * Sessions::kBytesPerAnswer});
+  const std::int64_t session = sessions.open("scan", 7);
+  EXPECT_TRUE(sessions.rule(session, "scan", 1, Stop{}).carry_out);
+  for (std::int64_t number = 2; number < 10; ++number) {
+    EXPECT_TRUE(sessions.rule(session, "scan", number, Move{}).carry_out);
+  }
+  const auto late = sessions.rule(session, "scan", 1, Stop{});
+  EXPECT_FALSE(late.carry_out);
+  EXPECT_NE(reason_of(late.reply).find("answer not kept"), std::string::npos);
+}
+
+// Bounded; what is forgotten makes no request later than it was.
+TEST(Sessions, OfManyStopsNoneMakesAnEarlierRequestALaterOne) {
+  Sessions sessions(1);
+  const std::int64_t session = sessions.open("scan", 7);
+  for (std::int64_t i = 1; i <= 400; ++i) {
+    sessions.rule(session, "scan", 2 * i, Stop{}, static_cast<std::uint64_t>(i));
+  }
+  for (std::int64_t i = 1; i <= 400; ++i) {
+    const auto ruling = sessions.rule(session, "scan", 2 * i - 1, Move{}, 1000);
+    EXPECT_LE(ruling.after_stops, static_cast<std::uint64_t>(i)) << i;
+    if (i <= 400 - static_cast<std::int64_t>(Sessions::kMostStops) + 1) continue;
+    EXPECT_EQ(ruling.after_stops, static_cast<std::uint64_t>(i)) << "still known";
+  }
+}
+
 TEST(Sessions, AStopWhoseAnswerWasARefusalIsAnsweredAgain) {
   Sessions sessions(1);
   const std::int64_t session = sessions.open("scan", 7);

@@ -81,7 +81,8 @@ class ServerTest : public testing::Test {
                                  who_ = who;
                                },
                            .packet =
-                               [this](Server::Connection, View view) {
+                               [this](Server::Connection, View view, const Server::Sent& sent) {
+                                 sent_.push_back(sent);
                                  heard_.emplace_back(view.channel);
                                  if (on_packet_) on_packet_();
                                },
@@ -100,6 +101,7 @@ class ServerTest : public testing::Test {
   std::string path_ = (directory_.path() / "run" / "control").string();
   std::unique_ptr<Server> server_;
   std::vector<std::string> heard_;
+  std::vector<Server::Sent> sent_;
   std::function<void()> on_packet_;
   Server::Connection last_ = 0;
   api::Credentials who_;

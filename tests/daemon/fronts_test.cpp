@@ -4,6 +4,7 @@
 #include <poll.h>
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -32,11 +33,18 @@ class FrontsTest : public testing::Test {
   // What the core does with a request: answers it with its number of this kind.
   void carry_out(const api::Asker& asker, const api::Request& request) {
     carried_out_.emplace_back(api::name_of(request));
+    after_.push_back(asker.after_stops);
     who_.push_back(asker.session->text());
     asker.answer(api::Accepted{});
     asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                                 .reason = "the " + std::to_string(carried_out_.size()) + ".",
                                 .detail = {}});
+  }
+  // After how many stops each request has arrived, by its name.
+  std::map<std::string, std::uint64_t> arrivals() const {
+    std::map<std::string, std::uint64_t> after;
+    for (std::size_t i = 0; i < after_.size(); ++i) after[carried_out_[i]] = after_[i];
+    return after;
   }
   void publish_something() {
     publishing_.publish(McuId{0}, api::StateSnapshot{.bus = "hall", .mcu = "hall:1"});
@@ -46,9 +54,12 @@ class FrontsTest : public testing::Test {
 
   std::vector<std::string> carried_out_;
   std::vector<std::string> who_;
+  std::vector<std::uint64_t> after_;  // how many stops each has arrived
   std::int64_t now_us_ = 1'000'000;
-  Reception reception_{
-      [this](const api::Asker& asker, const api::Request& request) { carry_out(asker, request); }};
+  StopCount stops_;
+  Reception reception_{stops_, [this](const api::Asker& asker, const api::Request& request) {
+                         carry_out(asker, request);
+                       }};
   Publishing publishing_{
       kRunOfFronts,
       1,
@@ -132,6 +143,68 @@ TEST_F(LcmFrontTest, UnknownSessionsAreRefusedButMayStop) {
   EXPECT_EQ(ask({.session = 0, .client_id = "scan", .number = 1}, api::Stop{}), "the 1.");
   EXPECT_EQ(ask({.session = 0, .client_id = "scan", .number = 1}, api::EmergencyStop{}), "the 2.");
   EXPECT_THAT(carried_out_, ElementsAre("stop", "emergency stop"));
+}
+
+// The network changes their order: the numbers say what was asked first.
+TEST_F(LcmFrontTest, AMoveThatWasAskedForBeforeAStopIsAfterNone) {
+  const std::int64_t number = session("scan");
+  const auto id = [number](std::int64_t n) {
+    return lcm::RequestId{.session = number, .client_id = "scan", .number = n};
+  };
+  EXPECT_EQ(ask(id(2), api::Stop{}), "the 1.");
+  EXPECT_EQ(ask(id(1), api::Move{}), "the 2.");
+  EXPECT_EQ(ask(id(3), api::Move{}), "the 3.");
+  EXPECT_THAT(carried_out_, ElementsAre("stop", "move", "move"));
+  EXPECT_THAT(after_, ElementsAre(1u, 0u, 1u));
+  EXPECT_EQ(ask(id(1), api::Move{}), "the 2.") << "as often as it is repeated";
+  EXPECT_EQ(ask(id(2), api::Stop{}), "the 1.");
+  EXPECT_EQ(carried_out_.size(), 3u);
+}
+
+// bushctl stops without a session, and repeats that until it is answered, and while it waits.
+TEST_F(LcmFrontTest, AStopWithoutASessionIsRepeatedWithoutEffect) {
+  const auto stop_at = [this](std::int64_t utime_us) {
+    heard_.clear();
+    say(lcm::encode(utime_us, {.client_id = "bushctl", .number = 1}, api::Request(api::Stop{})));
+    const auto& reply = std::get<lcm::ReplyMessage>(heard_.back());
+    EXPECT_EQ(reply.id, (lcm::RequestId{.session = 0, .client_id = "bushctl", .number = 1}));
+    return api::reason_of(reply.reply);
+  };
+  EXPECT_EQ(stop_at(1'000'000), "the 1.");
+  EXPECT_EQ(stop_at(1'000'000), "the 1.");
+  EXPECT_EQ(stop_at(2'000'000), "the 2.") << "another one";
+  EXPECT_EQ(stop_at(0), "the 3.") << "of a client without a clock";
+  EXPECT_EQ(stop_at(0), "the 4.");
+}
+
+// They have a transport of their own, which is read first.
+TEST_F(LcmFrontTest, AMoveThatCameBeforeAStopIsAfterNoneThoughItIsReadLater) {
+  const auto stops = std::move(*lcm::Transport::open("memq://"));
+  StopCount counted;
+  std::vector<std::string> taken;
+  Reception reception(counted, [&](const api::Asker& asker, const api::Request& request) {
+    taken.push_back(std::string(api::name_of(request)) + " after " +
+                    std::to_string(asker.after_stops));
+  });
+  LcmFront front({.transport = *transport_, .stops = stops.get(), .prefix = "OTHER", .run = 1},
+                 reception, publishing_, [] { return std::int64_t{1}; });
+  EXPECT_TRUE(front.subscribe());
+  const auto jog = [](double per_s) {
+    return api::Request(api::Jog{.motor = "m", .per_s = per_s});
+  };
+  const auto say_on = [](lcm::Transport& transport, const lcm::RequestId& id,
+                         const api::Request& request) {
+    const auto packet = lcm::encode(1, id, request);
+    EXPECT_TRUE(transport.publish_bytes("OTHER_" + packet->channel, packet->payload));
+  };
+  say_on(*transport_, {.client_id = "a", .number = 2}, api::Request(api::ListTables{}));
+  say_on(*stops, {.client_id = "b", .number = 1}, jog(0));
+  say_on(*stops, {.client_id = "b", .number = 2}, api::Request(api::Pause{}));
+  say_on(*stops, {.client_id = "b", .number = 3}, api::Request(api::Stop{}));
+  front.handle();
+  while (!reception.idle()) reception.carry_out_next();
+  EXPECT_THAT(taken,
+              ElementsAre("jog after 1", "pause after 2", "stop after 3", "list tables after 0"));
 }
 
 TEST_F(LcmFrontTest, WhatIsNoMessageIsCounted) {
@@ -235,10 +308,66 @@ TEST_F(SocketFrontTest, AConnectionKeepsItsName) {
   EXPECT_EQ(front_->dropped(), 2u);
 }
 
+// Stops are read first, and the kernel says what came first.
+TEST_F(SocketFrontTest, AMoveThatCameBeforeAStopIsAfterNoneThoughItIsReadLater) {
+  Client scan = connect();
+  Client panel = connect();
+  Client late = connect();
+  for (Client* client : {&scan, &panel, &late}) {
+    say(*client, lcm::encode(lcm::Subscription{}));  // all are accepted
+  }
+  const auto send = [](Client& client, std::int64_t number, const api::Request& request) {
+    EXPECT_TRUE(client.link->send(*lcm::encode(0, {.client_id = "c", .number = number}, request)));
+  };
+  send(scan, 1, api::Move{});
+  send(scan, 2, api::Home{});
+  send(panel, 1, api::Stop{});
+  send(panel, 2, api::Arm{});
+  send(late, 1, api::Enable{});
+  settle();
+  EXPECT_EQ(carried_out_.front(), "stop");
+  const std::map<std::string, std::uint64_t> expected{
+      {"stop", 1}, {"move", 0}, {"home", 0}, {"arm", 1}, {"enable", 1}};
+  EXPECT_EQ(arrivals(), expected);
+}
+
+// bushctl connects for each command: both may be there when the daemon looks.
+TEST_F(SocketFrontTest, WhatWasSentBeforeTheConnectionWasAcceptedIsBeforeAStop) {
+  Client panel = connect();
+  say(panel, lcm::encode(lcm::Subscription{}));
+  const auto send = [](Client& client, std::int64_t number, const api::Request& request) {
+    EXPECT_TRUE(client.link->send(*lcm::encode(0, {.client_id = "c", .number = number}, request)));
+  };
+  Client scan = connect();
+  send(scan, 1, api::Move{});
+  Client other = connect();
+  send(other, 1, api::Pause{});
+  send(other, 2, api::Resume{});
+  send(panel, 1, api::Stop{});
+  settle();
+  Client late = connect();
+  send(late, 1, api::Enable{});
+  settle();
+  auto after = arrivals();
+  EXPECT_EQ(after["move"], 0u) << "before both";
+  EXPECT_EQ(after["resume"], 0u) << "it may have been";
+  EXPECT_EQ(after["enable"], 2u) << "connected after both";
+  // A resume that was sent behind its own pause is not ended by that.
+  Client alone = connect();
+  send(alone, 1, api::Pause{});
+  send(alone, 2, api::Resume{});
+  carried_out_.clear();
+  after_.clear();
+  settle();
+  EXPECT_THAT(carried_out_, ElementsAre("pause", "resume"));
+  EXPECT_THAT(after_, ElementsAre(3u, 3u));
+}
+
 TEST_F(SocketFrontTest, WhatComesAfterItsClientHasGoneIsNobodys) {
   Client scan = connect();
   api::Asker asker;
-  Reception keep([&asker](const api::Asker& who, const api::Request&) { asker = who; });
+  StopCount stops;
+  Reception keep(stops, [&asker](const api::Asker& who, const api::Request&) { asker = who; });
   front_ = nullptr;
   SocketFront front(*server_, kRunOfFronts, keep, publishing_, [] { return std::int64_t{1}; });
   EXPECT_TRUE(scan.link->send(

@@ -140,6 +140,20 @@ TEST(HomeSequence, AMotorThatIsHeldBeforeItsTurnIsNotMoved) {
   }
 }
 
+// As it is held; and the one that is being homed goes on.
+TEST(HomeSequence, AMotorThatIsPausedBeforeItsTurnIsNotMoved) {
+  for (const bool kept : {false, true}) {
+    SequenceLab lab({"order = 1", "order = 2", "", ""}, kept);
+    const auto all = lab.home_all();
+    ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -50; }));
+    EXPECT_THAT(lab.wait(lab.send(api::Pause{})).reason, HasSubstr("not paused, being homed: m01"));
+    const Answer answer = lab.wait(all);
+    EXPECT_THAT(answer.motor_results, ElementsAre("reached", "stopped"));
+    EXPECT_THAT(answer.reason, HasSubstr("m02: stopped before it was its turn to be homed, asked"));
+    EXPECT_FALSE(lab.has_moved("m02"));
+  }
+}
+
 TEST(HomeSequence, ThenMayBecomeImpossible) {
   SequenceLab lab({"then = 120", "order = 2", "", ""});
   EXPECT_EQ(lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kChange,

@@ -315,7 +315,7 @@ TEST(Jogs, AreMarkedBeforeTheyBegin) {
   const std::int64_t stands = lab.shaft_steps("m01");
   const auto held = lab.send(jog(500));
   lab.send(jog(0));
-  EXPECT_EQ(lab.wait(held).result, "refused");
+  EXPECT_EQ(lab.wait(held).result, "stopped");
   lab.run_for(1);
   EXPECT_EQ(lab.shaft_steps("m01"), stands);
 }

@@ -28,7 +28,8 @@ class LcmWatchTest : public testing::Test {
   }
 
   std::unique_ptr<lcm::Transport> transport_ = std::move(*lcm::Transport::open("memq://"));
-  Reception reception_{[](const api::Asker&, const api::Request&) {}};
+  StopCount stops_;
+  Reception reception_{stops_, [](const api::Asker&, const api::Request&) {}};
   Publishing publishing_{
       kRun,
       1,

@@ -245,8 +245,8 @@ TEST_F(WaitingLine, IsStoppedBeforeItBegins) {
     const auto line = begin();
     lab.send(request);
     const Answer answer = lab.wait(line, 0.1);
-    EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, HasSubstr("stopped before it was carried out; nothing has moved"));
+    EXPECT_EQ(answer.result, "stopped");
+    EXPECT_THAT(answer.reason, HasSubstr("before this was carried out; nothing has moved"));
     lab.run_for(0.02);
     const int parts = sent[BUSHD_MSG_TABLE_DATA];
     expect_rest_at({0, 0, 0, 0});

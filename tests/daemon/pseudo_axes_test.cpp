@@ -248,10 +248,11 @@ TEST(PseudoAxes, WhatCannotBeAskedSaysWhatCan) {
   EXPECT_THAT(refusal(to({{"gap", 1e300}})), HasSubstr("beyond the soft limit"));
   for (const api::Request& request : std::initializer_list<api::Request>{
            api::Home{{"gap"}}, api::Jog{.motor = "centre", .per_s = 1},
-           api::SetPosition{.motors = {{"gap", api::UserUnits{0}}}}, api::Disarm{{"gap"}}}) {
+           api::SetPosition{.motors = {{"gap", api::UserUnits{0}}}}}) {
     EXPECT_EQ(refusal(request).substr(refusal(request).find(" is computed")),
               " is computed from motors left, right; name these");
   }
+  EXPECT_EQ(lab.wait(lab.send(api::Disarm{{"gap"}})).result, "done") << "as a stop";
   EXPECT_THAT(lab.wait(lab.send(to({{"gap", 0}}))).reason, HasSubstr("left"));
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -73,6 +74,10 @@ class Slices : public testing::Test {
     lab_->read_period_us = 400;  // until 128 MCUs have connected, two million bytes arrive
     motors_ = motors;
     lab_->connect();
+    reception_.emplace(lab_->core().counted_stops(),
+                       [this](const api::Asker& asker, const api::Request& request) {
+                         lab_->core().request(lab_->now_us(), asker, request);
+                       });
   }
   std::shared_ptr<Client> client(const std::string& id) {
     return std::make_shared<Client>(id, log_);
@@ -83,12 +88,12 @@ class Slices : public testing::Test {
     return move;
   }
   void send(const std::shared_ptr<Client>& from, const api::Request& request) {
-    reception_.take({.session = from, .number = ++number_}, request, 1);
+    reception_->take({.session = from, .number = ++number_}, request, 1);
   }
   // What the event loop does between two looks at what has arrived.
   void one_round() {
     lab_->core().keep_up(lab_->now_us());
-    if (!reception_.idle() && !lab_->core().begins_moves()) reception_.carry_out_next();
+    if (!reception_->idle() && !lab_->core().begins_moves()) reception_->carry_out_next();
     lab_->core().work();
   }
   bool answered(const std::string& text) const {
@@ -104,9 +109,7 @@ class Slices : public testing::Test {
   int motors_ = 0;
   std::vector<std::string> log_;
   std::int64_t number_ = 0;
-  daemon::Reception reception_{[this](const api::Asker& asker, const api::Request& request) {
-    lab_->core().request(lab_->now_us(), asker, request);
-  }};
+  std::optional<daemon::Reception> reception_;  // of an open lab
 };
 
 TEST_F(Slices, AStopUnderAFloodOfDryRunsWaitsForOneSliceAtMost) {
@@ -158,7 +161,7 @@ TEST_F(Slices, AMoveOfAllMotorsIsBegunInSlicesThatAStopComesBetween) {
   ASSERT_TRUE(lab_->run_until([&] { return answered("mover 1 completed: "); }, 10));
   EXPECT_THAT(log_, testing::Contains(HasSubstr("stopped")));
   EXPECT_EQ(lab_->shaft_steps(name(kMotorsOfBus - 1)), 0) << "it has not begun";
-  while (!reception_.idle() || lab_->core().begins_moves()) one_round();
+  while (!reception_->idle() || lab_->core().begins_moves()) one_round();
   EXPECT_TRUE(answered("other 2 "));
 }
 
@@ -167,7 +170,7 @@ TEST_F(Slices, AMoveBegunInSlicesStartsInOneTickAndArrives) {
   api::Move move = dry_run_of_all(50);
   move.dry_run = false;
   send(client("mover"), move);
-  while (!reception_.idle() || lab_->core().begins_moves()) {
+  while (!reception_->idle() || lab_->core().begins_moves()) {
     one_round();
     lab_->run_for(0.002);
   }
@@ -184,7 +187,7 @@ TEST_F(Slices, AnEmergencyStopLetsNoOtherMotorBegin) {
   send(client("mover"), move);
   for (int round = 0; round < 3; ++round) one_round();
   send(client("operator"), api::EmergencyStop{});
-  while (!reception_.idle() || lab_->core().begins_moves()) one_round();
+  while (!reception_->idle() || lab_->core().begins_moves()) one_round();
   ASSERT_TRUE(lab_->run_until([&] { return answered("mover 1 completed: "); }, 10));
   EXPECT_EQ(lab_->shaft_steps(name(kMotorsOfBus - 1)), 0);
 }
@@ -193,11 +196,11 @@ TEST_F(Slices, ADryRunIsOfTheStateAtItsAcceptance) {
   open(hall(2, 16), 32);
   const auto first = client("first");
   send(first, dry_run_of_all(20'000));
-  reception_.carry_out_next();
+  reception_->carry_out_next();
   // Meanwhile a motor moves: that is no concern of it.
   const auto other = client("other");
   send(other, api::Move{.motors = {{name(0), 500}}});
-  reception_.carry_out_next();
+  reception_->carry_out_next();
   lab_->run_until([&] { return !first->plans.empty(); }, 10);
   ASSERT_EQ(first->plans.size(), 1u);
   const api::MovePlan& plan = first->plans[0];
@@ -214,16 +217,16 @@ TEST_F(Slices, DryRunsAreBoundedPerClientAndInAll) {
   open(hall(2, 16), 32);
   const auto one = client("one");
   for (int i = 0; i < 3; ++i) send(one, dry_run_of_all(100));
-  while (!reception_.idle()) reception_.carry_out_next();
+  while (!reception_->idle()) reception_->carry_out_next();
   EXPECT_TRUE(answered("one 3 refused: 2 dry runs of this client wait already"));
   for (std::size_t i = 0; i < DryRuns::kMax; ++i) {
     send(client("c" + std::to_string(i)), dry_run_of_all(100));
   }
-  while (!reception_.idle()) reception_.carry_out_next();
+  while (!reception_->idle()) reception_->carry_out_next();
   EXPECT_TRUE(answered("dry runs wait already; try again in a moment"));
   lab_->run_until([&] { return answered("one 2 completed"); }, 10);
   send(one, dry_run_of_all(100));
-  reception_.carry_out_next();
+  reception_->carry_out_next();
   EXPECT_THAT(log_.back(), HasSubstr("one " + std::to_string(number_) + " accepted"));
 }
 

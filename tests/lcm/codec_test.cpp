@@ -53,9 +53,13 @@ TEST(Codec, EveryRequestHasAChannelOfItsOwn) {
   }
   EXPECT_EQ(encode(0, kId, api::Request(api::Move{}))->channel, "MOVE");
   EXPECT_EQ(encode(0, kId, api::Request(api::SetTable{}))->channel, "SET_TABLE");
-  EXPECT_TRUE(is_stop_channel(encode(0, kId, api::Request(api::Stop{}))->channel));
-  EXPECT_TRUE(is_stop_channel(encode(0, kId, api::Request(api::EmergencyStop{}))->channel));
-  EXPECT_FALSE(is_stop_channel("MOVE"));
+  for (const api::Request& request :
+       {api::Request(api::Stop{}), api::Request(api::EmergencyStop{}), api::Request(api::Pause{}),
+        api::Request(api::Hold{}), api::Request(api::Disarm{}), api::Request(api::Jog{})}) {
+    EXPECT_TRUE(api::ends_motion(request)) << api::name_of(request);
+    EXPECT_TRUE(is_urgent_channel(encode(0, kId, request)->channel)) << api::name_of(request);
+  }
+  EXPECT_FALSE(is_urgent_channel("MOVE"));
 }
 
 TEST(Codec, MovesArriveAsTheyWereMeant) {

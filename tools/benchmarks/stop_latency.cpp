@@ -140,17 +140,19 @@ struct Daemon {
   std::int64_t dry_runs = 0;  // asked for
   std::int64_t slices = 0;
   std::uint64_t most_units = 0;
-  bushd::daemon::Reception reception{[this](const api::Asker& asker, const api::Request& request) {
-    if (api::is_stop(request)) {
-      const Sent& stop = sent.at(static_cast<std::size_t>(asker.number - 1));
-      waited_us.push_back(static_cast<double>(now_ns() - stop.ns) * 1e-3);
-      processor_us.push_back(
-          static_cast<double>(processor_ns(CLOCK_THREAD_CPUTIME_ID) - stop.processor_ns) * 1e-3);
-      return asker.answer(api::Accepted{});
-    }
-    ++dry_runs;
-    hall.core().request(hall.now_us(), asker, request);
-  }};
+  bushd::daemon::Reception reception{
+      hall.core().counted_stops(), [this](const api::Asker& asker, const api::Request& request) {
+        if (api::ends_motion(request)) {
+          const Sent& stop = sent.at(static_cast<std::size_t>(asker.number - 1));
+          waited_us.push_back(static_cast<double>(now_ns() - stop.ns) * 1e-3);
+          processor_us.push_back(
+              static_cast<double>(processor_ns(CLOCK_THREAD_CPUTIME_ID) - stop.processor_ns) *
+              1e-3);
+          return asker.answer(api::Accepted{});
+        }
+        ++dry_runs;
+        hall.core().request(hall.now_us(), asker, request);
+      }};
   bushd::daemon::Publishing publishing{
       1, bench::VirtualHall::kMcus, 1, {.now_us = unix_us, .unix_us = unix_us}};
 

@@ -29,9 +29,10 @@ DaemonRun::DaemonRun(const bushd::config::Config& config, daemon::Outputs& outpu
       core_(config, outputs, static_cast<std::uint16_t>(run)),
       publishing_(run, config.state_parts(), config.buses.size(),
                   {.now_us = ears_.now_us, .unix_us = ears_.now_us}),
-      reception_([this](const bushd::api::Asker& asker, const bushd::api::Request& request) {
-        core_.request(ears_.now_us(), ears_.carry_out(asker, request), request);
-      }),
+      reception_(core_.counted_stops(),
+                 [this](const bushd::api::Asker& asker, const bushd::api::Request& request) {
+                   core_.request(ears_.now_us(), ears_.carry_out(asker, request), request);
+                 }),
       front_({.transport = *transport_,
               .prefix = config.lcm.prefix,
               .run = run,

@@ -109,7 +109,7 @@ void Promise::forget_oldest(std::list<std::int64_t>& order) {
 
 Promise::Duty Promise::duty_of(const Request& request) {
   Session* session = find(request.session, request.client);
-  if (session == nullptr) return request.is_stop() ? Duty::kCarryOut : Duty::kUnknownSession;
+  if (session == nullptr) return request.ends_motion() ? Duty::kCarryOut : Duty::kUnknownSession;
   use(request.session, *session);
   const std::int64_t number = request.number;
   if (!session->highest || number > *session->highest) {
@@ -117,7 +117,7 @@ Promise::Duty Promise::duty_of(const Request& request) {
     std::erase_if(session->seen,
                   [&](std::int64_t seen) { return below(number, seen) >= kNumbers; });
   } else if (below(*session->highest, number) >= kNumbers) {
-    return request.is_stop() ? Duty::kCarryOut : Duty::kTooOld;
+    return request.ends_motion() ? Duty::kCarryOut : Duty::kTooOld;
   }
   return session->seen.insert(number).second ? Duty::kCarryOut : Duty::kAnswerAgain;
 }
@@ -151,7 +151,7 @@ Promise::Wrong Promise::given() {
   if (given.carried_out) return std::nullopt;
   const Request& request = given.request;
   if (given.duty == Duty::kCarryOut) {
-    if (request.is_stop()) return "a stop is not carried out: " + text_of(request);
+    if (request.ends_motion()) return "a stop is not carried out: " + text_of(request);
     if (!given.refused) waiting_[request.client].push_back(request);
     return std::nullopt;
   }
@@ -167,7 +167,7 @@ Promise::Wrong Promise::given() {
 std::optional<Request> Promise::carried_out(const std::string& client, std::int64_t number) {
   ++carried_out_;
   if (given_ && given_->request.client == client && given_->request.number == number) {
-    if (!given_->request.is_stop()) return std::nullopt;  // it has not had its turn
+    if (!given_->request.ends_motion()) return std::nullopt;  // it has not had its turn
     given_->carried_out = true;
     ++asked_.at(key_of(given_->request.id())).carried_out;
     return given_->request;
@@ -188,9 +188,12 @@ Promise::Wrong Promise::answered(const Key& key, const api::Reply& reply) {
   Asked& asked = asked_.at(key);
   const bool completed = std::holds_alternative<api::Completed>(reply);
   const bool refused = std::holds_alternative<api::Refused>(reply);
-  const bool room = completed ? asked.completed < asked.accepted
-                              : asked.accepted + asked.refused < asked.carried_out;
+  const bool first = asked.accepted + asked.refused < asked.carried_out;
+  // A result may come alone: what was over before it began.
+  const bool alone = completed && asked.completed == asked.accepted && first;
+  const bool room = completed ? alone || asked.completed < asked.accepted : first;
   if (!room) return "one reply too many:" + text_of(message);
+  if (alone) ++asked.accepted;
   ++(completed ? asked.completed : refused ? asked.refused : asked.accepted);
   asked.told = essence(message);
   on_the_way_.push_back(*asked.told);
@@ -230,7 +233,7 @@ Promise::Wrong Promise::hear(const lcm::ReplyMessage& message) {
   Asked& asked = asked_.at(key_of(message.id));
   if (given_->duty != Duty::kCarryOut) return check_again(message, asked);
   // Too many wait already.
-  if (given_->request.is_stop() || !is_refusal(message.reply, "wait")) {
+  if (given_->request.ends_motion() || !is_refusal(message.reply, "wait")) {
     return "said before it was carried out:" + text_of(message);
   }
   given_->refused = true;

@@ -93,6 +93,11 @@ struct Request {
   }
   bushd::lcm::RequestId id() const { return {session, client, number}; }
   bool is_stop() const { return ask == Ask::kStop || ask == Ask::kEmergencyStop; }
+  // As api::ends_motion.
+  bool ends_motion() const {
+    return is_stop() || ask == Ask::kPause || ask == Ask::kHold || ask == Ask::kDisarm ||
+           (ask == Ask::kJog && speed_micro == 0 && !renew);
+  }
   // Of motors that then have a part in it, each with a result of its own.
   bool is_move() const { return ask == Ask::kMoveBy || ask == Ask::kMoveTo || ask == Ask::kArm; }
   bool names(const std::string& motor) const {

@@ -97,7 +97,11 @@ void Witness::reply(TimeNs now_ns, const Key& key, const api::Reply& reply) {
   }
   if (const auto* completed = std::get_if<api::Completed>(&reply)) {
     if (completed->reason.empty()) violated(now_ns, "a result without a reason");
-    finished(now_ns, key, asked, *completed);
+    if (asked.accepted) {
+      finished(now_ns, key, asked, *completed);
+    } else {
+      over_at_once(now_ns, key, asked, *completed);
+    }
   } else {
     if (std::get<api::Refused>(reply).reason.empty()) {
       violated(now_ns, "a refusal without a reason");

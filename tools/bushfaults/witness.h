@@ -208,6 +208,8 @@ class Witness {
   void refused(const Asked& asked);
   void finished(TimeNs now_ns, const Key& key, const Asked& asked,
                 const bushd::api::Completed& result);
+  void over_at_once(TimeNs now_ns, const Key& key, Asked& asked,
+                    const bushd::api::Completed& result);
   void position_set(const Request& request);
   void moved(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result,
              const Motors& motors);

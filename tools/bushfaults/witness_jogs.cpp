@@ -96,6 +96,14 @@ void Witness::hold_accepted(const Request& request) {
     motor.held = request.ask == Ask::kHold;
     motor.held_at.reset();
     motor.idle_checks = 0;
+    if (!motor.held || !motor.move) continue;
+    // What waits for the trigger waits no more, and is stopped if that has come.
+    Asked& asked = asked_.at(*motor.move);
+    const std::size_t i = asked.index_of(motor.name);
+    if (asked.request.ask != Ask::kArm || asked.began[i]) continue;
+    asked.stops[i] = true;
+    motor.stops = true;
+    motor.target.reset();
   }
 }
 

@@ -215,6 +215,19 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
   }
 }
 
+// A stop that could not stop all; or what a stop has ended before it began.
+void Witness::over_at_once(TimeNs now_ns, const Key& key, Asked& asked,
+                           const api::Completed& completed) {
+  if (asked.request.ends_motion()) {
+    accepted(now_ns, key, asked);
+    return finished(now_ns, key, asked, completed);
+  }
+  const bool stopped = completed.outcome == api::Outcome::kStopped &&
+                       completed.reason.find("nothing has moved") != std::string::npos;
+  if (!stopped) violated(now_ns, "a result, and it was not accepted: " + text_of(asked.request));
+  ++moves_by_result_["stopped before it began"];
+}
+
 void Witness::moved(TimeNs now_ns, const Asked& asked, const api::Completed& completed,
                     const Motors& motors) {
   for (std::size_t i = 0; i < motors.size(); ++i) {

@@ -362,6 +362,8 @@ class Client:
         await self._driver.until(lambda: exchange.accepted or exchange.over)
         if exchange.error is not None:
             raise exchange.error
+        if exchange.outcome is not None and exchange.outcome is not model.Outcome.DONE:
+            return arguments.result_of(exchange, check)  # it could not stop all, and says so at once
         return None
 
     async def emergency_stop(self, *, check: bool = True) -> model.Result:

@@ -1,0 +1,39 @@
+// Which stop a message came before, though it is read after it: stops are read before all others.
+// No clock of its own: messages bring the times at which the kernel got them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+
+namespace bushd::daemon {
+
+// When a message came to this machine, by its clock, and by what it came.
+struct Arrival {
+  std::int64_t earliest_ns;
+  std::int64_t latest_ns;
+  // Of one stream (not 0) messages are read in the order in which they were sent, or numbered.
+  std::int64_t stream = 0;
+};
+
+class Arrivals {
+ public:
+  // Nothing waits longer to be read, unless the clock was set meanwhile.
+  static constexpr std::int64_t kMostUnreadNs = 60'000'000'000;
+  static constexpr std::size_t kMost = 64;
+
+  // A request that ends motion is read; it has this number (Precedence::count).
+  void stopped(const Arrival& arrival, std::uint64_t number);
+  // Another request is read, and so many stops have been: after how many it has arrived. Where the
+  // times do not tell, it came before.
+  std::uint64_t after_stops(const Arrival& arrival, std::uint64_t stops) const;
+
+ private:
+  struct Stop {
+    Arrival arrival;
+    std::uint64_t number;  // the first of those that it stands for
+  };
+  std::deque<Stop> stops_;  // as read, the newest last
+};
+
+}  // namespace bushd::daemon
