@@ -27,7 +27,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       pauses_(installation_, interlocks_, moves_, open_moves_),
       lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
       arrays_(installation_, interlocks_, journal_, moves_, open_moves_),
-      emergency_stop_(installation_, interlocks_, homing_, open_moves_, outputs),
+      emergency_stop_(installation_, interlocks_, homing_, open_moves_, kept_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
       trigger_(installation_, interlocks_, moves_, open_moves_),
@@ -69,6 +69,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
   });
   drivers_.set_listener([this](McuId mcu) { idle_drivers_.switched(mcu); });
   kept_.set_listener([this] {
+    emergency_stop_.take_kept();
     settings_.take_kept();
     camac_.take_kept();
   });

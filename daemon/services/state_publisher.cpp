@@ -27,6 +27,9 @@ api::McuState state_word(const link::McuView& view) {
 
 std::string detail_of(const Mcu& mcu, bool two_masters) {
   const link::McuView& view = mcu.view();
+  if (view.phase != link::McuPhase::kOnline && view.bound_by_stop) {
+    return view.detail + "; an emergency stop binds it: when it is there, run 'bushctl clear'";
+  }
   if (view.phase != link::McuPhase::kOnline) return view.detail;
   if (view.outdated_us > 0) return "has not reported since this daemon stood still";
   if (view.report.faults != 0) return motion::fault_text(view.report);

@@ -344,7 +344,7 @@ void Master::drop(link::McuIndex, std::uint8_t motor) {
 }
 
 void Master::emergency_stop(bushd_stop_mode mode) {
-  if (board_.view.phase != link::McuPhase::kOnline) return;
+  board_.view.bound_by_stop = true;
   board_.view.report.faults |= BUSHD_FAULT_EMERGENCY;
   report_wanted_ = true;
   if (!motion_) return;
@@ -386,6 +386,7 @@ void Master::control(link::McuIndex, std::uint8_t actions) {
     events_.emplace_back(link::RequestRefused{kBoard, BUSHD_MSG_CONTROL, BUSHD_E_STATE});
   } else if ((actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0) {
     board_.view.report.faults = 0;
+    board_.view.bound_by_stop = false;
   }
 }
 

@@ -62,6 +62,7 @@ class Master final : public link::BusMaster {
   void replace(link::McuIndex mcu, std::uint16_t motors, link::Tick first) override;
   void drop(link::McuIndex mcu, std::uint8_t motor) override;
   void emergency_stop(bushd_stop_mode mode) override;
+  void bind_to_stop(link::McuIndex, bushd_stop_mode mode) override { emergency_stop(mode); }
 
   void reconfigure(link::McuIndex mcu, link::McuSetup setup) override;
   // Of a table with steps that come sooner than one delay code: the board could not keep it.

@@ -101,8 +101,12 @@ class BusMaster {
   // Nothing more is sent for this motor.
   virtual void drop(McuIndex mcu, std::uint8_t motor) = 0;
   // Every motor of every MCU stops as soon as can be, and nothing more is sent for any. Said again
-  // until all MCUs that are online have latched BUSHD_FAULT_EMERGENCY.
+  // until all MCUs that are online have latched BUSHD_FAULT_EMERGENCY. It binds all of them
+  // (McuView::bound_by_stop): one that comes later has it latched before it is set up. So does one
+  // that an MCU tells of. Only CLEAR_FAULTS that the MCU has carried out frees it.
   virtual void emergency_stop(bushd_stop_mode mode) = 0;
+  // Binds an MCU that is not online to a stop that is not cleared.
+  virtual void bind_to_stop(McuIndex mcu, bushd_stop_mode mode) = 0;
 
   // --- What is asked of an MCU, and answered in later reports
 

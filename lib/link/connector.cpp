@@ -72,14 +72,31 @@ Result<void> Connector::check_room(McuIndex mcu, const McuSetup& setup) const {
 void Connector::control(McuIndex mcu, std::uint8_t actions) {
   if (actions & BUSHD_CONTROL_ENABLE) links_[mcu].powered = true;
   if (actions & BUSHD_CONTROL_DISABLE) links_[mcu].powered = false;
-  if (actions & BUSHD_CONTROL_CLEAR_FAULTS) links_[mcu].stopped_by_people = false;
+  if (actions & BUSHD_CONTROL_CLEAR_FAULTS) links_[mcu].clearing = true;
   links_[mcu].queue.control(actions);
 }
 
-void Connector::emergency_stop() {
-  for (Link& link : links_) {
-    link.stopped_by_people = true;
-    link.queue.discard_clearing();
+void Connector::emergency_stop(bushd_stop_mode mode) {
+  for (const McuIndex i : mcus_.indices()) bind_to_stop(i, mode);
+}
+
+void Connector::bind_to_stop(McuIndex mcu, bushd_stop_mode mode) {
+  Link& link = links_[mcu];
+  mcus_[mcu].view.bound_by_stop = true;
+  link.stop_mode = mode;
+  link.clearing = false;
+  link.queue.discard_clearing();
+  link.stop_now = mcus_[mcu].view.phase == McuPhase::kConnecting;
+}
+
+void Connector::follow_stop(McuIndex mcu) {
+  McuView& view = mcus_[mcu].view;
+  Link& link = links_[mcu];
+  if ((view.report.faults & BUSHD_FAULT_EMERGENCY) != 0) {
+    // The emergency stop that took the MCU over is nobody's.
+    view.bound_by_stop |= !link.taken_over;
+  } else if (link.clearing) {
+    view.bound_by_stop = link.clearing = false;
   }
 }
 
@@ -109,11 +126,13 @@ bool Connector::send_due_identify(std::int64_t now_us) {
   return false;
 }
 
-bool Connector::send_ramp_down(std::int64_t now_us) {
+bool Connector::send_stop(std::int64_t now_us) {
   for (const McuIndex i : mcus_.indices()) {
-    if (mcus_[i].view.phase != McuPhase::kConnecting || !links_[i].ramp_down_now) continue;
-    links_[i].ramp_down_now = false;
-    const std::array<std::uint8_t, 1> payload = {BUSHD_STOP_RAMP};
+    const McuView& view = mcus_[i].view;
+    if (view.phase != McuPhase::kConnecting || !links_[i].stop_now) continue;
+    links_[i].stop_now = false;
+    const bushd_stop_mode mode = view.bound_by_stop ? links_[i].stop_mode : BUSHD_STOP_RAMP;
+    const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(mode)};
     writer_.send(now_us, mcus_[i].setup.address, BUSHD_MSG_EMERGENCY, payload);
     return true;
   }
@@ -193,7 +212,8 @@ void Connector::take(std::int64_t now_us, McuIndex mcu, const bushd_identity& id
   record.view.reported = false;
   record.poll_wanted = true;
   link.setup_written = false;
-  link.taken_over = false;
+  link.taken_over = link.clearing = false;
+  link.stop_now = record.view.bound_by_stop;
   link.queue.clear();
   link.scratch.clear();
   link.identify_attempts = 0;
@@ -262,8 +282,8 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
 std::uint8_t Connector::first_actions(McuIndex mcu, bool may_clear) const {
   const Link& link = links_[mcu];
   unsigned faults = mcus_[mcu].view.report.faults;
-  // The emergency stop that took the MCU over is nobody's.
-  if (link.taken_over && !link.stopped_by_people) faults &= ~unsigned{BUSHD_FAULT_EMERGENCY};
+  const bool bound = mcus_[mcu].view.bound_by_stop;
+  if (link.taken_over && !bound) faults &= ~unsigned{BUSHD_FAULT_EMERGENCY};
   const bool clear = may_clear && (faults & kPeoplesFaults) == 0;
   std::uint8_t actions = clear ? BUSHD_CONTROL_CLEAR_FAULTS : 0;
   if (link.powered.value_or(true) && (faults & kFaultsWithoutEnable) == 0) {
@@ -309,19 +329,24 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
   Link& link = links_[mcu];
   const bushd_report& report = view.report;
   note_power(mcu);
+  if (view.bound_by_stop && (report.faults & BUSHD_FAULT_EMERGENCY) == 0) {
+    // Nobody answers that frame: it is said until a report shows it.
+    link.stop_now = mcus_[mcu].poll_wanted = true;
+    return;
+  }
   // Tables are for motors at rest, and one may still be ramping down from before. But a table run
   // of an earlier master could go on for hours.
   if (!link.setup_written && report.moving == 0) {
     write_setup(mcu);
   } else if (!link.setup_written && report.running != 0) {
     link.taken_over |= (report.faults & BUSHD_FAULT_EMERGENCY) == 0;
-    link.ramp_down_now = true;
+    link.stop_now = true;
   } else if (!link.setup_written || !link.queue.empty() || !in_step) {
     return;
   } else if (report.state != BUSHD_STATE_BUSY || !*link.powered) {
     view.phase = McuPhase::kOnline;
     view.detail.clear();
-    link.was_online = link.stopped_by_people = false;
+    link.was_online = link.taken_over = false;
     listener_.came_online(mcu);
   } else if ((report.flags & BUSHD_FLAG_CONFIGURED) != 0 &&
              (report.flags & BUSHD_FLAG_ENABLED) == 0) {

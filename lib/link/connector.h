@@ -45,7 +45,9 @@ class Connector {
   bool reconfigure(McuIndex mcu, McuSetup setup);
   // The MCU has room for these tables, as far as it is known; or why not.
   Result<void> check_room(McuIndex mcu, const McuSetup& setup) const;
-  void emergency_stop();
+  // It binds all MCUs, or this one, until they have carried out CLEAR_FAULTS.
+  void emergency_stop(bushd_stop_mode mode);
+  void bind_to_stop(McuIndex mcu, bushd_stop_mode mode);
 
   // Requests beside the setup.
   SetupQueue& queue(McuIndex mcu) { return links_[mcu].queue; }
@@ -56,8 +58,9 @@ class Connector {
   const Scratch& scratch(McuIndex mcu) const { return links_[mcu].scratch; }
 
   bool send_due_identify(std::int64_t now_us);
-  // Table runs of an earlier master are ramped down before the setup.
-  bool send_ramp_down(std::int64_t now_us);
+  // One that is bound by an emergency stop has it latched, and table runs of an earlier master are
+  // ramped down, before the setup.
+  bool send_stop(std::int64_t now_us);
   // By turns: one that does not answer its request keeps nobody else waiting.
   bool send_request(std::int64_t now_us);
   // When the next MCU is to be looked for. Precondition: it is offline.
@@ -70,7 +73,9 @@ class Connector {
   // `may_clear`: no emergency stop is under way.
   void tables(McuIndex mcu, const bushd_tables& held, bool may_clear);
   void acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t type, std::uint8_t status);
-  // The record of an MCU that connects has a new report. `in_step`: with bus time.
+  // The record of an MCU has a new report: whether a stop binds it.
+  void follow_stop(McuIndex mcu);
+  // Then, of one that connects. `in_step`: with bus time.
   void follow_report(std::int64_t now_us, McuIndex mcu, bool in_step);
   // The MCU has disabled its drivers, and people are to find out why.
   void drivers_off(McuIndex mcu) { links_[mcu].powered = false; }
@@ -84,12 +89,12 @@ class Connector {
     // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
     // switched off stay off through restarts and lost links: there may be hands in the mechanism.
     std::optional<bool> powered;
-    // While connecting: table runs of an earlier master are to be stopped, and were.
-    bool ramp_down_now = false;
+    // While connecting: it is to be stopped now; and has been, for no other reason than that table
+    // runs of an earlier master went on.
+    bool stop_now = false;
     bool taken_over = false;
-    // An emergency stop was commanded, and since then neither were faults cleared nor has the MCU
-    // come online.
-    bool stopped_by_people = false;
+    bushd_stop_mode stop_mode = BUSHD_STOP_RAMP;  // of the stop that binds it
+    bool clearing = false;                        // people have asked it to clear its faults
     std::int64_t retry_due_us = 0;
     unsigned identify_attempts = 0;  // in a row without an MCU that fits
   };

@@ -107,21 +107,22 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   return writer_.bytes();
 }
 
-// By urgency: an emergency; queues that are all but empty; replacements, what follows them, and the
-// polls that confirm them; queues about to run empty; reports; SYNCs; configuration; filling
-// queues.
+// By urgency: an emergency, also one that binds an MCU that has just come; queues that are all but
+// empty; replacements, what follows them, and the polls that confirm them; queues about to run
+// empty; reports; SYNCs; configuration; filling queues.
 bool Master::send_next(std::int64_t now_us) {
   const std::int64_t target_us = horizon_.queue_target_us();
   const auto below = [target_us](std::int64_t lead_us) {
     return StreamScheduler::Filling{.lead_us = lead_us, .target_us = target_us};
   };
   const StreamScheduler::Filling urgent = below(horizon_.queue_urgent_us());
-  return emergency_.send_due(now_us) || streams_.send_stream(now_us, below(kQueueCriticalUs)) ||
+  return emergency_.send_due(now_us) || connector_.send_stop(now_us) ||
+         streams_.send_stream(now_us, below(kQueueCriticalUs)) ||
          streams_.send_due_replacement(now_us) || streams_.send_stream(now_us, urgent, true) ||
          poller_.send_wanted(now_us) || streams_.send_stream(now_us, urgent) ||
          poller_.send_due(now_us) || synchroniser_.send_due(now_us) ||
-         connector_.send_ramp_down(now_us) || connector_.send_due_identify(now_us) ||
-         connector_.send_request(now_us) || streams_.send_stream(now_us, below(target_us));
+         connector_.send_due_identify(now_us) || connector_.send_request(now_us) ||
+         streams_.send_stream(now_us, below(target_us));
 }
 
 std::int64_t Master::next_wake_us() const {
@@ -285,7 +286,11 @@ void Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t positio
 void Master::emergency_stop(bushd_stop_mode mode) {
   emergency_.begin(mode);
   for (const McuIndex i : mcus_.indices()) streams_.drop_all(i);
-  connector_.emergency_stop();
+  connector_.emergency_stop(mode);
+}
+
+void Master::bind_to_stop(McuIndex mcu, bushd_stop_mode mode) {
+  connector_.bind_to_stop(mcu, mode);
 }
 
 void Master::reconfigure(McuIndex mcu, McuSetup setup) {

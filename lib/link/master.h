@@ -79,6 +79,7 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   void drop(McuIndex mcu, std::uint8_t motor) override { streams_.drop(mcu, motor); }
   // Within two ticks of hearing it.
   void emergency_stop(bushd_stop_mode mode) override;
+  void bind_to_stop(McuIndex mcu, bushd_stop_mode mode) override;
 
   void reconfigure(McuIndex mcu, McuSetup setup) override;
   Result<void> check_room(McuIndex mcu, const McuSetup& setup) const override;

@@ -88,6 +88,7 @@ void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answ
   view.reported = true;
   view.outdated_us = 0;
   poller_.follow_report(index);
+  connector_.follow_stop(index);
   if (report.faults & BUSHD_FAULT_OVERCURRENT) connector_.drivers_off(index);
   const auto agreement = synchroniser_.follow_report(now_us, index, answer.line_us, answer.in_time);
   if (agreement == Synchroniser::Agreement::kOtherTime && view.phase == McuPhase::kOnline) {

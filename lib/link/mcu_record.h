@@ -29,6 +29,8 @@ struct McuView {
   std::array<Tick, BUSHD_MOTORS_PER_MCU> known_until{};  // likewise
   std::string uncertain_reason{};                        // of the last PositionUncertain
   std::string note{};  // what people should know of it while it is online
+  // An emergency stop that nobody has cleared binds it, whether it is there or not.
+  bool bound_by_stop = false;
 };
 
 // Common to the machines of a master. Each keeps for itself what only it needs to know.

@@ -375,6 +375,7 @@ void Master::drop(McuIndex, std::uint8_t) {
 
 void Master::emergency_stop(bushd_stop_mode mode) {
   faults_ |= BUSHD_FAULT_EMERGENCY;
+  view_.bound_by_stop = true;
   if (run_) leave_plan(now_us_, mode == BUSHD_STOP_IMMEDIATE);
   report_due_us_ = 0;
   wake_us_ = 0;
@@ -388,7 +389,10 @@ void Master::reconfigure(McuIndex, link::McuSetup setup) {
 }
 
 void Master::control(McuIndex, std::uint8_t actions) {
-  if ((actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0 && !run_) faults_ = 0;
+  if ((actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0 && !run_) {
+    faults_ = 0;
+    view_.bound_by_stop = false;
+  }
   // There is nothing that could disable the driver.
   if ((actions & BUSHD_CONTROL_DISABLE) != 0) {
     events_.push_back(link::RequestRefused{kMcu, BUSHD_MSG_CONTROL, BUSHD_E_STATE});

@@ -90,6 +90,7 @@ class Master final : public link::BusMaster, private link::LinePort {
   void replace(link::McuIndex, std::uint16_t, link::Tick first) override;
   void drop(link::McuIndex, std::uint8_t) override;
   void emergency_stop(bushd_stop_mode mode) override;
+  void bind_to_stop(link::McuIndex, bushd_stop_mode mode) override { emergency_stop(mode); }
 
   void reconfigure(link::McuIndex, link::McuSetup setup) override;
   void control(link::McuIndex, std::uint8_t actions) override;

@@ -68,7 +68,7 @@ class LiveBench : public Bench {
   daemon::HomingQueue homing{installation, interlocks,   open_moves, moves,
                              kept,         idle_drivers, *this};
   daemon::Travels travels{installation, interlocks, open_moves, kept, idle_drivers, *this};
-  daemon::EmergencyStop emergency_stop{installation, interlocks, homing, open_moves, *this};
+  daemon::EmergencyStop emergency_stop{installation, interlocks, homing, open_moves, kept, *this};
 
  private:
   void advance();

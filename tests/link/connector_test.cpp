@@ -167,11 +167,11 @@ TEST_F(Connecting, TableRunOfAnEarlierMasterIsRampedDownBeforeTheSetup) {
   report().moving = report().running = 1;
   connector.follow_report(0, kFirst, true);
   EXPECT_FALSE(connector.send_request(0));
-  ASSERT_TRUE(connector.send_ramp_down(0));
+  ASSERT_TRUE(connector.send_stop(0));
   const Sent sent = take_sent(writer).back();
   EXPECT_EQ(sent.type, BUSHD_MSG_EMERGENCY);
   EXPECT_EQ(sent.address, McuAddress{1});
-  EXPECT_FALSE(connector.send_ramp_down(0)) << "once per report";
+  EXPECT_FALSE(connector.send_stop(0)) << "once per report";
   report().moving = report().running = 0;
   report().faults = BUSHD_FAULT_EMERGENCY;
   connector.follow_report(0, kFirst, true);
@@ -184,12 +184,12 @@ TEST_F(Connecting, TableRunOfAnEarlierMasterIsRampedDownBeforeTheSetup) {
 TEST_F(Connecting, PeoplesEmergencyStopIsNotTakenForThatOfTheTakingOver) {
   for (const bool found_first : {false, true}) {
     if (found_first) find();
-    connector.emergency_stop();
+    connector.emergency_stop(BUSHD_STOP_RAMP);
     if (!found_first) find();
     report() = {};
     report().moving = report().running = 1;
     connector.follow_report(0, kFirst, true);
-    ASSERT_TRUE(connector.send_ramp_down(0));
+    ASSERT_TRUE(connector.send_stop(0));
     report().moving = report().running = 0;
     report().faults = BUSHD_FAULT_EMERGENCY;
     connector.follow_report(0, kFirst, true);
@@ -204,8 +204,14 @@ TEST_F(Connecting, PeoplesEmergencyStopIsNotTakenForThatOfTheTakingOver) {
 
 TEST_F(Connecting, EmergencyStopThatWasClearedIsOver) {
   mcus[kFirst].view.phase = McuPhase::kOnline;
-  connector.emergency_stop();
+  connector.emergency_stop(BUSHD_STOP_RAMP);
   connector.control(kFirst, BUSHD_CONTROL_CLEAR_FAULTS);
+  report().faults = BUSHD_FAULT_EMERGENCY;
+  connector.follow_stop(kFirst);
+  EXPECT_TRUE(mcus[kFirst].view.bound_by_stop) << "it has not carried that out yet";
+  report().faults = 0;
+  connector.follow_stop(kFirst);
+  EXPECT_FALSE(mcus[kFirst].view.bound_by_stop);
   connector.give_up(kFirst, "unplugged", 0);
   find();
   report().moving = report().running = 1;
@@ -215,6 +221,41 @@ TEST_F(Connecting, EmergencyStopThatWasClearedIsOver) {
   connector.follow_report(0, kFirst, true);
   setup_requests();
   EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE});
+}
+
+TEST_F(Connecting, WhoIsBoundByAStopHasItBeforeAnythingElse) {
+  connector.bind_to_stop(kFirst, BUSHD_STOP_IMMEDIATE);
+  find();
+  for (int report = 0; report < 3; ++report) {
+    EXPECT_FALSE(connector.send_request(0));
+    ASSERT_TRUE(connector.send_stop(0)) << "until it tells of it";
+    const Sent sent = take_sent(writer).back();
+    EXPECT_EQ(sent.type, BUSHD_MSG_EMERGENCY);
+    EXPECT_EQ(sent.address, McuAddress{1});
+    EXPECT_EQ(sent.payload, Bytes{BUSHD_STOP_IMMEDIATE});
+    EXPECT_FALSE(connector.send_stop(0));
+    connector.follow_stop(kFirst);
+    connector.follow_report(0, kFirst, true);
+  }
+  report().faults = BUSHD_FAULT_EMERGENCY;
+  connector.follow_stop(kFirst);
+  connector.follow_report(0, kFirst, true);
+  setup_requests();
+  EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_ENABLE}) << "and is not cleared";
+  // A clear that it has not confirmed frees nobody.
+  connector.control(kFirst, BUSHD_CONTROL_CLEAR_FAULTS);
+  connector.give_up(kFirst, "unplugged", 0);
+  find();
+  report().faults = 0;
+  connector.follow_stop(kFirst);
+  EXPECT_TRUE(mcus[kFirst].view.bound_by_stop);
+}
+
+TEST_F(Connecting, AStopThatAnMcuTellsOfBindsIt) {
+  find();
+  report().faults = BUSHD_FAULT_EMERGENCY;
+  connector.follow_stop(kFirst);
+  EXPECT_TRUE(mcus[kFirst].view.bound_by_stop);
 }
 
 TEST_F(Connecting, RefusalEndsTheSetupAndOfAnOnlineMcuIsOnlyTold) {
@@ -235,7 +276,7 @@ TEST_F(Connecting, RefusalEndsTheSetupAndOfAnOnlineMcuIsOnlyTold) {
 TEST_F(Connecting, UnsentClearingIsDiscardedByAnEmergencyStop) {
   mcus[kFirst].view.phase = McuPhase::kOnline;
   connector.control(kFirst, BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_ENABLE);
-  connector.emergency_stop();
+  connector.emergency_stop(BUSHD_STOP_RAMP);
   EXPECT_EQ(connector.queue(kFirst).front().payload, Bytes{BUSHD_CONTROL_ENABLE});
 }
 

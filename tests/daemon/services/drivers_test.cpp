@@ -90,7 +90,7 @@ TEST(Drivers, OfAnMcuThatIsOfflineAreRefused) {
   Moves moves(bench.installation, interlocks, journal, open_moves, dry_runs, bench);
   IdleDrivers idle_drivers(bench.installation, bench, [](MotorId) { return false; });
   HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, idle_drivers, bench);
-  EmergencyStop emergency_stop(bench.installation, interlocks, homing, open_moves, bench);
+  EmergencyStop emergency_stop(bench.installation, interlocks, homing, open_moves, kept, bench);
   Drivers drivers(bench.installation, interlocks, emergency_stop);
   drivers.request(0, bench.asker(), api::Enable{{"m03"}});
   EXPECT_THAT(bench.refusal(), HasSubstr("MCU hall:2 is offline"));

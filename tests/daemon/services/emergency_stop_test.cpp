@@ -24,7 +24,7 @@ TEST(EmergencyStop, AFloodIsCarriedOutAndItsMemoryIsBounded) {
   Moves moves(bench.installation, interlocks, journal, open_moves, dry_runs, bench);
   IdleDrivers idle_drivers(bench.installation, bench, [](MotorId) { return false; });
   HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, idle_drivers, bench);
-  EmergencyStop emergency_stop(bench.installation, interlocks, homing, open_moves, bench);
+  EmergencyStop emergency_stop(bench.installation, interlocks, homing, open_moves, kept, bench);
   constexpr std::size_t kMore = 10;
   for (std::size_t i = 0; i < EmergencyStop::kMaxOpen + kMore; ++i) {
     emergency_stop.request(0, bench.asker(static_cast<std::int64_t>(i)), {});
