@@ -134,9 +134,13 @@ Result<void> HomingQueue::may_home(MotorId id) const {
   }
   if (installation_[id].has_plan()) return fail("it moves; stop it first");
   if (auto may = interlocks_.may_move(id); !may) return may;
-  if (mcu.can_home()) return {};
-  return fail("MCU " + mcu.name() +
-              " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");
+  if (!mcu.can_home()) {
+    return fail("MCU " + mcu.name() +
+                " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");
+  }
+  const bushd_home message = message_for({.motor = id, .floor = 0});
+  return installation_[id].may_be_moved_within(std::int64_t{message.most_steps} +
+                                               message.slow_steps);
 }
 
 Result<std::uint16_t> HomingQueue::floor_of(MotorId id,

@@ -216,6 +216,7 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
              .boot_number = mcus_[mcu.id].heard->boot_number,
              .output = motor.output().value,
              .steps_per_unit = scale_text(motor),
+             .steps = motor.position_steps(),
              .position_text = same_scale && motor.coordinates().has_unit()
                                   ? motor.coordinates().text(kept.record->steps)
                                   : std::string(),

@@ -171,6 +171,17 @@ static bool slow_enough(const bushd_mcu* mcu, const bushd_home* message) {
   return slow_ns >= mcu->tick_ns && slow_ns >= slowest_ns;
 }
 
+// Wherever its stages may lead.
+static bool is_counted(const bushd_mcu* mcu, const bushd_home* message) {
+  for (int direction = -1; direction <= 1; direction += 2) {
+    const uint32_t counted = bushd_mcu_steps_counted(mcu, message->motor, direction);
+    if (message->most_steps > counted || message->slow_steps > counted - message->most_steps) {
+      return false;
+    }
+  }
+  return true;
+}
+
 static bool on_switch(const bushd_mcu* mcu, uint8_t m) {
   const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
   return ((pins.motors ^ mcu->inputs.inverted) & motor_bit(mcu->switches[m].home)) != 0;
@@ -205,7 +216,7 @@ static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
       (bushd_mcu_engaged(mcu) & bit) != 0) {
     return BUSHD_E_STATE;
   }
-  return slow_enough(mcu, message) ? BUSHD_OK : BUSHD_E_FORMAT;
+  return slow_enough(mcu, message) && is_counted(mcu, message) ? BUSHD_OK : BUSHD_E_FORMAT;
 }
 
 bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {

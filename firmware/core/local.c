@@ -75,7 +75,9 @@ static void begin_held(bushd_mcu* mcu) {
     } else {
       const bushd_table* table = bushd_mcu_table_of(mcu, &mcu->motor[m]);
       const uint16_t floor = mcu->local.by_keypad ? bushd_mcu_keypad_floor(mcu, table) : 0;
-      bushd_mcu_begin_by_itself(mcu, m, INT32_MAX, mcu->local.wish, floor);
+      const uint32_t counted = bushd_mcu_steps_counted(mcu, m, mcu->local.wish);
+      const uint32_t steps = counted < INT32_MAX ? counted : INT32_MAX;
+      bushd_mcu_begin_by_itself(mcu, m, steps, mcu->local.wish, floor);
     }
   }
 }

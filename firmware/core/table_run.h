@@ -22,8 +22,12 @@ bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ti
 const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t slot, const bushd_table* table);
 // The motor's run, just started, begins in this tick and takes as many.
 void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks);
+// Steps that a motor may make in this direction from the end of the tick that is emitted on before
+// its position is beyond +-(2^31 - 1).
+uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction);
 // A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
-// ends: it is `autonomous` until it rests. `floor`: as of bushd_run_start.
+// ends: it is `autonomous` until it rests. `floor`: as of bushd_run_start. Precondition: so many
+// steps are counted.
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
                                uint16_t floor);
 // Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise

@@ -195,6 +195,9 @@ static bushd_status check(bushd_mcu* mcu, const bushd_travel* message) {
       (bushd_mcu_engaged(mcu) & bit) != 0) {
     return BUSHD_E_STATE;
   }
+  if (message->steps > bushd_mcu_steps_counted(mcu, message->motor, message->direction)) {
+    return BUSHD_E_FORMAT;
+  }
   if (message->kind == BUSHD_TRAVEL_STEP) {
     if (message->sensor >= mcu->config.motors) return BUSHD_E_FORMAT;
   } else if (!has_both_limits(mcu, bit) || (at_edges && mcu->port.set_trigger == NULL) ||

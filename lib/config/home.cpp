@@ -11,6 +11,11 @@ namespace {
 using tables::TomlReader;
 
 constexpr std::int64_t kMostSteps = INT32_MAX;
+// Of either of the two ways: from 0 both are counted.
+constexpr std::int64_t kMostOfWay = (std::int64_t{1} << 30) - 1;
+// A motor makes as many steps beyond where it is homed, before it stands: at most one in each tick
+// in which the switch is read, and in that which is prepared then.
+constexpr std::int64_t kStepsBeyond = 3;
 constexpr std::int64_t kLastOrder = 1000;
 // Slower than a step in BUSHD_HOME_UNIT_NS x 65535 the message cannot say; faster than a step in
 // the shortest tick nobody can home.
@@ -26,11 +31,12 @@ Result<bool> read_direction(const TomlReader& reader) {
 }
 
 Result<void> read_numbers(const TomlReader& reader, Home* home) {
-  const auto most = reader.integer("most_steps", 1, kMostSteps, "steps");
+  const auto most = reader.integer("most_steps", 1, kMostOfWay, "steps");
   if (!most) return fail(most.error());
   home->most_steps = static_cast<std::uint32_t>(*most);
   if (reader.has("position_steps")) {
-    const auto position = reader.integer("position_steps", -kMostSteps, kMostSteps, "steps");
+    const auto position = reader.integer("position_steps", -kMostSteps + kStepsBeyond,
+                                         kMostSteps - kStepsBeyond, "steps");
     if (!position) return fail(position.error());
     home->position_steps = static_cast<std::int32_t>(*position);
   }
@@ -40,7 +46,7 @@ Result<void> read_numbers(const TomlReader& reader, Home* home) {
     home->slow_steps_per_s = static_cast<std::uint32_t>(*slow);
   }
   if (reader.has("slow_most_steps")) {
-    const auto slow_most = reader.integer("slow_most_steps", 1, kMostSteps, "steps");
+    const auto slow_most = reader.integer("slow_most_steps", 1, kMostOfWay, "steps");
     if (!slow_most) return fail(slow_most.error());
     home->slow_most_steps = static_cast<std::uint32_t>(*slow_most);
   }

@@ -95,7 +95,9 @@ void Motor::resume() {
 
 std::int64_t Motor::target_steps() const {
   if (!has_plan()) return position_;
-  if (axis_.stopping() && !is_paused()) return axis_.end_steps();
+  if (axis_.stopping() && !is_paused())
+    return jogs_ && !axis_.is_planned() ? position_ : axis_.end_steps();
+  if (jogs_) return position_;
   if (const OnLine* on_line = as<OnLine>()) return on_line->target_steps;
   const Armed* armed = as<Armed>();
   if (armed != nullptr && armed->on_line) return armed->on_line->target_steps;
@@ -124,52 +126,6 @@ void Motor::end_travel() {
   if (is<Travelling>()) rest();
 }
 
-void Motor::position_is_known() {
-  confirmed_ = true;
-  uncertain_reason_.reset();
-  restored_reason_.reset();
-}
-
-void Motor::position_is_restored(std::string reason) {
-  confirmed_ = true;
-  uncertain_reason_.reset();
-  restored_reason_ = std::move(reason);
-}
-
-void Motor::position_is_uncertain(std::string reason) {
-  restored_reason_.reset();
-  uncertain_reason_ = std::move(reason);
-}
-
-void Motor::position_is_unconfirmed() {
-  position_is_known();
-  confirmed_ = false;
-}
-
-PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
-  using api::Trust;
-  const std::string mcu = "MCU " + setup_.mcu;
-  if (!boot_number_) return {Trust::kUnknown, mcu + " has not reported where it stands yet"};
-  if (boot_number && *boot_number != *boot_number_) {
-    std::string at = std::to_string(position_);
-    if (setup_.coordinates.has_unit()) at += " (" + setup_.coordinates.text(position_) + ")";
-    return {Trust::kUnknown, mcu + " restarted; before, it was heard at " + at};
-  }
-  if (restoring_) return {Trust::kUnknown, "its position is being restored"};
-  if (lost_) {
-    std::string reason = lost_->in_motion ? mcu + " was lost while it moved, so it may have run on"
-                                          : mcu + " is out of reach; it rested when it was heard";
-    if (uncertain_reason_) reason += "; besides, " + *uncertain_reason_;
-    return {Trust::kStale, std::move(reason), lost_->heard_utime_us};
-  }
-  if (uncertain_reason_) return {Trust::kUncertain, *uncertain_reason_};
-  if (!confirmed_) {
-    return {Trust::kUncertain, "it has been neither set nor homed since this daemon started"};
-  }
-  if (restored_reason_) return {Trust::kRestored, *restored_reason_};
-  return {Trust::kKnown, {}};
-}
-
 void Motor::rest() {
   if (autonomous_ || moved_by_other_) {
     activity_ = Local{};
@@ -194,6 +150,7 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
   boot_number_ = report.boot_number;
   lost_.reset();
   if (restarted) uncertain_reason_ = "MCU " + setup_.mcu + " restarted";
+  if (!first && !restarted) follow_count(before);
   // Nobody here has seen whether it moved when it was stopped.
   const bool immediate = stops_immediately(report);
   const bool unpowered = (report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
@@ -218,6 +175,9 @@ std::vector<Event> Motor::report(const Report& report) {
       std::exchange(position_, report.of_mcu.motor[output().value].position_steps);
   take_limits(report.of_mcu);
   if (has_plan()) follow(report, events);
+  const bool by_itself = autonomous_ || has_bit(report.of_mcu.autonomous, output());
+  // Of one that is homed who has asked for that knows what its position is.
+  if (by_itself) follow_count(before);
   follow_autonomous(report.of_mcu, free && position_ != before);
   return events;
 }
@@ -499,6 +459,7 @@ event::Ended Motor::ended(Outcome outcome, std::string reason) {
   const bool was_paused = rests_in_pause() || (on_line != nullptr && on_line->stands);
   further_.clear();
   pause_ = Pause::kNo;
+  jogs_ = false;
   axis_.finish();
   rest();
   return {.outcome = outcome,

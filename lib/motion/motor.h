@@ -163,8 +163,12 @@ class Motor {
   std::optional<std::uint16_t> boot_number() const { return boot_number_; }
   // `boot_number`: of the MCU now.
   PositionTrust trust(std::optional<std::uint16_t> boot_number) const;
-  // Where it will stand when all is done, and it has been resumed if it is paused.
+  // Where it will stand when all is done, and it has been resumed if it is paused. Where it is, as
+  // long as nobody has said where it is to stand.
   std::int64_t target_steps() const;
+  // What a distance is counted from: where it stands, or has been told to go, or, if it is being
+  // stopped, where it will stand. Error: nobody has said where, or the motion there is paused.
+  Result<std::int64_t> distance_from() const;
   double velocity_steps_per_s() const { return moves() ? axis_.velocity_steps_per_s() : 0.0; }
   // Why steps may be lost, so that it may not move. Nothing: none are, as far as this daemon knows.
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
@@ -184,6 +188,8 @@ class Motor {
   Result<void> may_be_used() const;  // for any motion
   // Beyond that.
   Result<void> may_move_to(std::int64_t target, std::uint16_t floor = 0) const;
+  // Whether it may be moved by its MCU alone, as much as so many steps to either side.
+  Result<void> may_be_moved_within(std::int64_t steps) const;
   // How far it may go from here in a direction: to its soft limit, as far as positions are counted,
   // or for as long as a run may take. Where it stands, if that is not in this direction.
   std::int64_t farthest(int direction, std::uint16_t floor) const;
@@ -223,6 +229,9 @@ class Motor {
   bool stands_paused() const { return pause_ == Pause::kStands; }
   // start() is for it, not aim().
   bool stands() const { return !has_plan() || rests_in_pause(); }
+  // Its motion goes on until somebody ends it: where its runs lead nobody has asked for.
+  void jogs(bool now) { jogs_ = now; }
+  bool jogs() const { return jogs_; }
   void hold(bool now) { held_ = now; }
   bool is_held() const { return held_; }
   void arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor = 0);
@@ -297,6 +306,8 @@ class Motor {
   event::Ended stopped();
   event::Ended ran_out();
   event::Ended ended(Outcome outcome, std::string reason);
+  // The MCU has moved it from there, by itself or unseen: as far as it is counted, or not.
+  void follow_count(std::int64_t before);
   void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();
   std::string did_not_start() const;
@@ -307,6 +318,7 @@ class Motor {
   std::vector<Leg> further_;                         // after the run that it makes
   enum class Pause { kNo, kRamps, kStands, kOver };  // kOver: stopped where it stood
   Pause pause_ = Pause::kNo;
+  bool jogs_ = false;
   bool held_ = false;
   std::int64_t position_ = 0;
   std::optional<std::uint16_t> boot_number_;

@@ -67,6 +67,37 @@ Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const 
   return {};
 }
 
+Result<void> Motor::may_be_moved_within(std::int64_t steps) const {
+  if (std::abs(position_) + steps <= kMaxPosition) return {};
+  return fail(fmt::format(
+      "it stands at {}, and may make up to {} steps to either side, which would lead beyond +-{}, "
+      "where no more are counted; run 'bushctl set NAME 0', then home it",
+      position_, steps, kMaxPosition));
+}
+
+Result<std::int64_t> Motor::distance_from() const {
+  constexpr const char* kRemedy = "wait until it stands, or move it to a position";
+  if (!has_plan()) {
+    if (auto may = may_be_used(); !may) return fail(may.error());
+    return position_;
+  }
+  if (is_paused()) {
+    return fail("it is paused on its way to " + coordinates().text(target_steps()) +
+                ", so a distance could count from there or from where it is; stop it first, or "
+                "move it to a position");
+  }
+  if (axis_.stopping()) {
+    if (axis_.is_planned()) return axis_.end_steps();
+    return fail(
+        fmt::format("it is being stopped, and where it will stand is not known yet; {}", kRemedy));
+  }
+  if (jogs_)
+    return fail(fmt::format("it jogs, and nobody has said where it is to stand; {}", kRemedy));
+  if (follows())
+    return fail(fmt::format("it follows an array, which may get more rows; {}", kRemedy));
+  return target_steps();
+}
+
 Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) const {
   std::uint16_t floor = 0;
   if (setup_.max_speed) {

@@ -1,6 +1,9 @@
 #include "state/rules.h"
 
+#include <cstdint>
+#include <cstdlib>
 #include <ctime>
+#include <string>
 #include <utility>
 
 namespace bushd::state {
@@ -76,6 +79,11 @@ Verdict on_connecting(const Kept& kept, const Seen& seen) {
 
   auto doubt = changed(record, seen);
   if (!doubt && !same_boot) doubt = may_have_moved(kept, seen);
+  if (!doubt && same_boot && std::abs(seen.steps - record.steps) > INT32_MAX) {
+    // No motor makes so many steps unseen: the counter has gone on at the other end.
+    doubt = "MCU " + seen.mcu + " has moved it beyond +-" + std::to_string(INT32_MAX) +
+            " steps, where no more are counted";
+  }
   if (!doubt && same_boot && !stood(kept) && seen.may_have_overrun) {
     doubt = "its limit switch stopped it immediately, so it may have overrun";
   }

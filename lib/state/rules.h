@@ -16,6 +16,7 @@ struct Seen {
   std::uint16_t boot_number = 0;
   std::uint8_t output = 0;
   std::string steps_per_unit{};
+  std::int64_t steps = 0;       // as the MCU counts them now
   std::string position_text{};  // of the kept steps, in its unit; "" if there is none
   bool local = false;           // people may have moved it unseen
   // It stands where a switch stops it immediately: nobody saw from which speed.

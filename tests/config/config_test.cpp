@@ -336,7 +336,7 @@ INSTANTIATE_TEST_SUITE_P(
         home("Direction", "{ direction = \"left\", most_steps = 5 }", "motor[0].home.direction",
              "is \"left\"; allowed: negative, positive"),
         home("StepsMissing", "{ direction = \"negative\" }", "motor[0].home.most_steps",
-             "is missing; allowed: a whole number 1..2147483647 steps"),
+             "is missing; allowed: a whole number 1..1073741823 steps"),
         home("UnknownKey", "{ direction = \"negative\", most_steps = 5, pace = 3 }",
              "motor[0].home.pace", "unknown key"),
         home("Speed", "{ direction = \"negative\", most_steps = 5, slow_steps_per_s = 1 }",

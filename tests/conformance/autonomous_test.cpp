@@ -149,6 +149,32 @@ TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
   }
 }
 
+TEST_P(Autonomous, ItMovesNoFurtherThanPositionsAreCounted) {
+  constexpr std::int32_t kLeft = 50;
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor, 0, 0}));
+  for (const int sign : {1, -1}) {
+    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_SET_POSITION, bushd_encode_set_position,
+                                bushd_set_position{kMotor, sign * (INT32_MAX - kLeft)}));
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_HOME, bushd_encode_home,
+                                     bushd_home{kMotor, -1, 5000, 0, 400, 1000, 0}),
+                BUSHD_E_FORMAT);
+    }
+    const std::size_t before = steps(1, kMotor).size();
+    to_inputs_time();
+    set_inputs(
+        {0, static_cast<std::uint8_t>(sign > 0 ? BUSHD_INPUT_FORWARD : BUSHD_INPUT_REVERSE)});
+    pass_ticks(120);
+    EXPECT_EQ(master_.poll(kReal).motor[kMotor].position_steps, sign * INT32_MAX);
+    EXPECT_EQ(steps(1, kMotor).size() - before, static_cast<std::size_t>(kLeft));
+    to_inputs_time();
+    set_inputs({});
+    pass_ticks(20);
+    EXPECT_EQ(master_.poll(kReal).moving, 0);
+    expect_alike();
+  }
+}
+
 class KeypadLine : public Autonomous {};
 BUSHD_FOR_TARGETS(KeypadLine, targets_with(BUSHD_CAN_KEYPAD));
 

@@ -372,5 +372,21 @@ TEST_P(Homing, BadCommandsAreRefused) {
   EXPECT_EQ(rig.home(moving), BUSHD_E_STATE);
 }
 
+// Wherever its stages may lead, its position is counted.
+TEST_P(Homing, IsRefusedWhereItsStepsAreNotCounted) {
+  constexpr std::int32_t kAll = 5000 + 400;  // of command()
+  for (const int direction : {-1, 1}) {
+    for (const int side : {-1, 1}) {
+      ASSERT_EQ(rig.set_position(kHomed, side * (INT32_MAX - kAll + 1)), BUSHD_OK);
+      EXPECT_EQ(rig.home(command(direction)), BUSHD_E_FORMAT);
+      ASSERT_EQ(rig.set_position(kHomed, side * (INT32_MAX - kAll)), BUSHD_OK);
+      ASSERT_EQ(rig.home(command(direction)), BUSHD_OK);
+      const bushd_report report = homed();
+      EXPECT_EQ(report.homing, BUSHD_HOMING_NOT_FOUND);
+      EXPECT_EQ(report.motor[kHomed].position_steps, side * (INT32_MAX - kAll) + direction * 5000);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace bushd::test

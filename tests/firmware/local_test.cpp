@@ -259,5 +259,35 @@ TEST_P(Local, LeavesAMotorThatHomesAlone) {
   EXPECT_LT(rig.pulses(0), -20);
 }
 
+// It comes to rest where its position is the last one that is counted, and goes back from there.
+TEST_P(Local, EndsWhereItsCountEnds) {
+  for (const int direction : {1, -1}) {
+    const auto button =
+        static_cast<std::uint8_t>(direction > 0 ? BUSHD_INPUT_FORWARD : BUSHD_INPUT_REVERSE);
+    const auto other =
+        static_cast<std::uint8_t>(direction > 0 ? BUSHD_INPUT_REVERSE : BUSHD_INPUT_FORWARD);
+    ASSERT_EQ(rig.set_position(0, direction * (INT32_MAX - 200)), BUSHD_OK);
+    ASSERT_EQ(rig.set_position(2, direction * INT32_MAX), BUSHD_OK);
+    const std::int64_t before = rig.pulses(2);
+    const std::int64_t from = rig.pulses(0);
+    hold(button, 500);
+    EXPECT_EQ(rig.poll().motor[0].position_steps, direction * INT32_MAX);
+    EXPECT_EQ(rig.pulses(0) - from, direction * 200);
+    EXPECT_EQ(rig.pulses(2), before) << "there already";
+    // Pressed again, and on the other side.
+    release();
+    rig.pass_until_rest();
+    hold(button, 50);
+    EXPECT_EQ(rig.poll().motor[0].position_steps, direction * INT32_MAX);
+    hold(other, 100);
+    release();
+    rig.pass_until_rest();
+    EXPECT_LT(direction * (rig.pulses(0) - from), 200);
+    EXPECT_EQ(rig.poll().motor[0].position_steps,
+              direction * (INT32_MAX - 200) + (rig.pulses(0) - from));
+    EXPECT_LT(direction * rig.pulses(2), direction * before);
+  }
+}
+
 }  // namespace
 }  // namespace bushd::test

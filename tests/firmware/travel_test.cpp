@@ -320,5 +320,11 @@ TEST(TravelOfASmallMcu, IsUnknown) {
   EXPECT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload), BUSHD_E_UNKNOWN_MESSAGE);
 }
 
+TEST_P(Travel, IsRefusedWhereItsStepsAreNotCounted) {
+  ASSERT_EQ(rig.set_position(kTraveller, INT32_MAX - 30), BUSHD_OK);
+  EXPECT_EQ(request(once(31)), BUSHD_E_FORMAT);
+  ASSERT_EQ(request(once(30)), BUSHD_OK);
+}
+
 }  // namespace
 }  // namespace bushd::test
