@@ -13,8 +13,10 @@ Result<void> Interlocks::may_move() const {
 }
 
 Result<void> Interlocks::may_move(MotorId motor) const {
+  if (auto may = may_move(); !may) return may;
   if (auto may = installation_[motor].may_be_used(); !may) return may;
   const Mcu& mcu = installation_.mcu_of(motor);
+  if (auto online = mcu.must_be_online(); !online) return online;
   if (auto may = may_move_by(mcu); !may) return may;
   for (const MotorId other : mcu.motors()) {
     if (!mcu.one_at_a_time() || other == motor || !installation_[other].has_plan()) continue;
@@ -27,8 +29,13 @@ Result<void> Interlocks::may_move(MotorId motor) const {
   return {};
 }
 
+Result<void> Interlocks::may_begin(MotorId motor) const {
+  if (auto may = may_move(); !may) return may;
+  return may_move_by(installation_.mcu_of(motor));
+}
+
 Result<void> Interlocks::may_move_by(const Mcu& mcu) const {
-  if (auto online = mcu.must_be_online(); !online) return online;
+  if (!mcu.online()) return mcu.must_be_online();
   if (mcu.report().faults != 0) {
     return fail("MCU " + mcu.name() + " has a fault: " + motion::fault_text(mcu.report()));
   }

@@ -70,9 +70,7 @@ MotorStatus CamacMotors::status(int number) {
   const bool supplied =
       !mcu.online() || mcu.asleep || (mcu.report().flags & BUSHD_FLAG_ENABLED) != 0;
   status.supply_missing = !supplied;
-  auto may = interlocks_.may_move();
-  if (may) may = interlocks_.may_move(id);
-  if (!may) {
+  if (const auto may = interlocks_.may_move(id); !may) {
     status.not_connected = supplied;
     warn(id, installation_[id].name() + ": " + may.error().text());
   }

@@ -185,13 +185,21 @@ void HomingQueue::add(Task task) {
 }
 
 // With a store as soon as that knows of the motion, and once its drivers are enabled: step(). There
-// one ends as well that was held while it waited for its turn.
+// one ends as well that may not begin any more.
 void HomingQueue::begin(Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
-  const bool ends = installation_[task.motor].is_held() || !task.ended_by.empty();
+  const bool ends = !may_begin(task.motor) || !task.ended_by.empty();
   if (kept_.keeps() || !idle_drivers_.none() || ends) return;
   task.phase = Phase::kHoming;
   mcu.home(message_for(task));
+}
+
+// Now that it is its turn.
+Result<void> HomingQueue::may_begin(MotorId id) const {
+  if (installation_[id].is_held()) return fail("it was held before it was its turn to be homed");
+  if (auto may = interlocks_.may_begin(id); !may)
+    return fail("not homed, because " + may.error().text());
+  return {};
 }
 
 void HomingQueue::step(std::int64_t now_us) {
@@ -215,8 +223,8 @@ void HomingQueue::step(std::int64_t now_us, Mcu& mcu) {
 
 void HomingQueue::ask(std::int64_t now_us, Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
-  if (installation_[task.motor].is_held()) {
-    return end(mcu, Outcome::kStopped, "it was held before it was its turn to be homed");
+  if (const auto may = may_begin(task.motor); !may) {
+    return end(mcu, Outcome::kStopped, may.error().text());
   }
   if (!task.ended_by.empty()) return end(mcu, Outcome::kStopped, std::string(task.ended_by));
   const auto ready = kept_.make_ready(now_us, task.motor);

@@ -66,6 +66,7 @@ class HomingQueue final : public Service {
   Result<std::vector<MotorId>> motors_of(const api::Home& request) const;
   Result<std::vector<MotorId>> all_by_order() const;
   Result<void> may_home(MotorId motor) const;
+  Result<void> may_begin(MotorId motor) const;
   Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
   bushd_home message_for(const Task& task) const;  // precondition: its motor has a home
   void add(Task task);

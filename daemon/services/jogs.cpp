@@ -57,7 +57,6 @@ Result<void> Jogs::may_jog(std::int64_t now_us, MotorId motor, const api::Asker&
                 ms_text(barred.keepalive_us));
   }
   if (asker.session && asker.session->gone()) return fail("its client has gone");
-  if (auto may = interlocks_.may_move(); !may) return may;
   return interlocks_.may_move(motor);
 }
 

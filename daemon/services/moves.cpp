@@ -143,12 +143,7 @@ void Moves::begin_next() {
   const MotorId next = to_begin_.front();
   to_begin_.pop_front();
   ++units_;
-  if (!unbegun_.contains(next)) return;
-  if (const auto may = interlocks_.may_move(); !may) {
-    return cancel(next, "not begun, because " + may.error().text());
-  }
-  unbegun_.erase(next);
-  begin(next);
+  if (unbegun_.erase(next) != 0) begin(next);
 }
 
 void Moves::end_overtaken(std::int64_t) {
@@ -162,7 +157,19 @@ void Moves::end_overtaken(std::int64_t) {
 
 // Nobody has been told of it, nor does the log of moves know of it.
 void Moves::cancel(MotorId motor, const std::string& reason) {
+  unbegun_.insert(motor);
   end(motor, *installation_[motor].end(api::Outcome::kStopped, reason));
+}
+
+// Of runs whose plans are made.
+bool Moves::may_begin(const std::vector<MotorId>& motors) {
+  for (const MotorId held_back : motors) {
+    const auto may = interlocks_.may_begin(held_back);
+    if (may) continue;
+    for (const MotorId id : motors) cancel(id, "not begun, because " + may.error().text());
+    return false;
+  }
+  return true;
 }
 
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
@@ -210,6 +217,7 @@ Result<std::int64_t> Moves::go_on(std::int64_t now_us, MotorId id, const api::Am
 }
 
 void Moves::begin(MotorId id) {
+  if (!may_begin({id})) return;
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
   const motion::Tick start = motor.axis().start_tick();
@@ -236,6 +244,7 @@ void Moves::start_leg(std::int64_t now_us, MotorId id) {
 
 void Moves::begin_on_line(const std::vector<MotorId>& motors,
                           const std::shared_ptr<link::LinePace>& pace) {
+  if (!may_begin(motors)) return;
   for (const MotorId id : motors) {
     const motion::Axis& axis = installation_[id].axis();
     const bool in_mcus = axis.line() && axis.line()->in_mcus;

@@ -36,8 +36,8 @@ class Moves final : public Service {
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Move& move);
 
-  // Checks where a motor of a request may go, "NAME: WHY" if not. `by` counts from where it stands,
-  // or from its present target.
+  // Checks where a motor of a request may go, "NAME: WHY" if not. A distance counts from
+  // motion::Motor::distance_from.
   Result<std::int64_t> target_of(MotorId motor, const api::Amount& amount, api::Move::Kind kind,
                                  std::uint16_t floor) const;
   // motion::Motor::floor_at, "NAME: WHY" if there is none.
@@ -114,8 +114,9 @@ class Moves final : public Service {
   void start_leg(std::int64_t now_us, MotorId motor);
   // From rest; the motor is part of an open move.
   void start_run(MotorId motor, std::int64_t target, motion::Tick start, std::uint16_t floor);
-  // Its plan is made: it is logged, and its MCU gets it.
+  // Its plan is made: it is logged, and its MCU gets it. One that may not begin now ends.
   void begin(MotorId motor);
+  bool may_begin(const std::vector<MotorId>& motors);
   void begin_next();
   void cancel(MotorId motor, const std::string& reason);
   // Motors with another target: as soon as the line has time for it, and to the newest one only.

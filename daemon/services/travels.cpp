@@ -64,7 +64,6 @@ Travels::Travels(Installation& installation, const Interlocks& interlocks, OpenM
 Result<void> Travels::may_travel(MotorId id, const bushd_travel& message) const {
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
-  if (auto may = interlocks_.may_move(); !may) return may;
   if (auto may = interlocks_.may_move(id); !may) return may;
   if (motor.has_plan()) return fail("moves, by another's request");
   if (motor.is_held()) return fail("it is held; release it first");
@@ -108,7 +107,7 @@ void Travels::step(std::int64_t now_us) {
 // number that the MCU has.
 void Travels::ask(std::int64_t now_us, Mcu& mcu) {
   Task& task = *tasks_[mcu.id];
-  if (const auto may = interlocks_.may_move(); !may) {
+  if (const auto may = interlocks_.may_begin(task.motor); !may) {
     return end(mcu, Outcome::kStopped, "it did not begin: " + may.error().text());
   }
   const auto ready = kept_.make_ready(now_us, task.motor);

@@ -23,7 +23,12 @@ TEST(Interlocks, TheFirstReasonIsTold) {
   held = false;
   EXPECT_TRUE(interlocks.may_move());
   bench.installation.shutting_down = true;
-  EXPECT_THAT(interlocks.may_move().error().text(), HasSubstr("shutting down"));
+  for (const auto& may :
+       {interlocks.may_move(), interlocks.may_move({1}), interlocks.may_begin({1})}) {
+    EXPECT_THAT(may.error().text(), HasSubstr("shutting down"));
+  }
+  bench.installation.shutting_down = false;
+  EXPECT_THAT(interlocks.may_begin({1}).error().text(), HasSubstr("MCU hall:1 is offline"));
   bench.installation[MotorId{1}].home();
   EXPECT_THAT(interlocks.may_move({1}).error().text(), HasSubstr("being homed"));
 }
