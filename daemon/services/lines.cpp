@@ -208,7 +208,9 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
       return fail(fmt::format("{}: {} steps is out of range; allowed: +-{}", motor.name(), *steps,
                               motion::Motor::kMaxPosition));
     }
-    targets[at] = *steps + (absolute ? 0 : motor.target_steps());
+    const auto from = absolute ? Result<std::int64_t>(0) : motor.distance_from();
+    if (!from) return fail(motor.name() + ": " + from.error().message);
+    targets[at] = *steps + *from;
     if (line.way.increment(at) != line.way.longest()) continue;
     step = (targets[at] - ways[at].from) * (ways[at].to < ways[at].from ? -1 : 1);
   }

@@ -85,11 +85,12 @@ Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount, api
                 " steps is out of range; allowed: +-" +
                 std::to_string(motion::Motor::kMaxPosition));
   }
-  const std::int64_t from = absolute ? 0 : motor.target_steps();
-  auto may = interlocks_.may_move(id);
-  if (may) may = motor.may_move_to(from + steps, floor);
-  if (!may) return fail(motor.name() + ": " + may.error().text());
-  return from + steps;
+  const auto refuse = [&motor](const Error& why) { return fail(motor.name() + ": " + why.text()); };
+  if (const auto may = interlocks_.may_move(id); !may) return refuse(may.error());
+  const auto from = absolute ? Result<std::int64_t>(0) : motor.distance_from();
+  if (!from) return refuse(from.error());
+  if (const auto may = motor.may_move_to(*from + steps, floor); !may) return refuse(may.error());
+  return *from + steps;
 }
 
 void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts) {
@@ -175,6 +176,7 @@ bool Moves::may_begin(const std::vector<MotorId>& motors) {
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
 void Moves::take_over(const std::vector<MotorId>& motors, const api::Asker& by) {
   for (const MotorId motor : motors) {
+    installation_[motor].jogs(false);
     open_.not_stopped(motor);
     open_.end(motor, api::Outcome::kStopped,
               "was given a new target by " + text_of(by) + "; it moves on");
@@ -187,6 +189,7 @@ void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::i
   motion::Motor& motor = installation_[id];
   if (motor.has_plan()) take_over({id}, asker);
   open_.open(asker, {id}, OpenMoves::Purpose::kJog);
+  motor.jogs(true);
   motor.go_on({});
   if (!motor.stands()) return redirect(now_us, id, target, floor);
   open_.planned(id, 1, motor.axis().most_steps_per_s(floor));
@@ -223,7 +226,7 @@ void Moves::begin(MotorId id) {
   const motion::Tick start = motor.axis().start_tick();
   const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
   // A jog will change, and of what is streamed only ticks that have not been run can be taken back.
-  const bool by_table = installation_.by_table(mcu, steps) && !(mcu.streams() && open_.jogs(id));
+  const bool by_table = installation_.by_table(mcu, steps) && !(mcu.streams() && motor.jogs());
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));

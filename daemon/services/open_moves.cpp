@@ -146,9 +146,4 @@ const api::Asker* OpenMoves::asker_of(MotorId motor) const {
   return move ? &open_.at(*move).asker : nullptr;
 }
 
-bool OpenMoves::jogs(MotorId motor) const {
-  const auto move = book_.move_of(motor);
-  return move && open_.at(*move).purpose == Purpose::kJog;
-}
-
 }  // namespace bushd::daemon

@@ -77,8 +77,6 @@ class OpenMoves {
   bool together(MotorId a, MotorId b) const { return book_.move_of(a) == book_.move_of(b); }
   // Whose request it is; null if none.
   const api::Asker* asker_of(MotorId motor) const;
-  // Whether that request is a jog.
-  bool jogs(MotorId motor) const;
 
  private:
   struct Open {

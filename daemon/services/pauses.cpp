@@ -75,7 +75,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
       continue;
     }
     if (!moves(motor)) continue;
-    if (open_.jogs(motor)) {
+    if (installation_[motor].jogs()) {
       open_.say(motor, api::Outcome::kStopped,
                 {api::Outcome::kStopped, "ended, because " + text_of(asker) + " paused it"});
       jogs.push_back(motor);

@@ -197,9 +197,15 @@ Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
   };
   const auto first = std::ranges::find_if(move.motors, is_computed);
   const config::Pseudo& pseudo = installation_.config().pseudos[find(first->motor)->pseudo];
+  // Those that are not named keep to where they are, or have been told to go.
+  std::vector<std::int64_t> from;
   std::vector<double> now;
-  for (const MotorId motor : pseudo.motors) {
-    now.push_back(installation_[motor].coordinates().user_of(installation_[motor].target_steps()));
+  for (const MotorId id : pseudo.motors) {
+    const motion::Motor& motor = installation_[id];
+    const auto steps = motor.distance_from();
+    if (!steps) return fail(motor.name() + ": " + steps.error().message);
+    from.push_back(*steps);
+    now.push_back(motor.coordinates().user_of(*steps));
   }
   const auto positions = positions_asked(move, pseudo, now);
   if (!positions) return fail(positions.error());
@@ -213,12 +219,12 @@ Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
     const auto steps = motor.coordinates().steps_of_user((*motors)[j]);
     if (!steps) return fail(motor.name() + ": " + steps.error().message);
     longest = std::max(longest, std::abs((*motors)[j] - now[j]));
-    if (*steps != motor.target_steps()) line.motors.push_back({motor.name(), *steps});
+    if (*steps != from[j]) line.motors.push_back({motor.name(), *steps});
   }
   // Where it stands already; its first motor says so.
   if (line.motors.empty()) {
     const motion::Motor& motor = installation_[pseudo.motors.front()];
-    line.motors.push_back({motor.name(), motor.target_steps()});
+    line.motors.push_back({motor.name(), from.front()});
   }
   if (move.speed) {
     if (move.speed->in_steps) {

@@ -50,7 +50,7 @@ using MotorNames = std::vector<std::string>;
 // motor cannot move.
 struct Move {
   enum class Kind {
-    kRelative,  // by so much, of a motor that moves from its present target
+    kRelative,  // by so much, of a motor that moves from the target that it was given
     kAbsolute   // to this position
   };
   Kind kind = Kind::kRelative;

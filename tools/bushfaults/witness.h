@@ -110,9 +110,10 @@ class Witness {
   struct End {
     std::string word;  // of the result
     std::int64_t position_steps;
-    std::int64_t stands = 0;  // as the plant counts
-    bool moves_on = false;    // by another move; then nobody knows where exactly that began
-    bool paused = false;      // it may be no end, and no other line be written when it comes
+    std::int64_t stands = 0;   // as the plant counts
+    bool moves_on = false;     // by another move; then nobody knows where exactly that began
+    bool paused = false;       // it may be no end, and no other line be written when it comes
+    bool legs_follow = false;  // likewise: the next one may not be begun
     bool agrees(const bushd::api::MotorResult& result) const;
   };
   struct Range {

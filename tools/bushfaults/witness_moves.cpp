@@ -29,8 +29,8 @@ bool Witness::End::agrees(const api::MotorResult& result) const {
   // One that stands, paused, may end by what happens to its MCU.
   const bool of_mcu =
       paused && (result.outcome == api::Outcome::kLink || result.outcome == api::Outcome::kFault);
-  // Of a line it may be stopped where it stands on its way.
-  const bool on_way = word == "turned" && result.outcome == api::Outcome::kStopped;
+  // It may be stopped where it stands on its way, on a line or before another leg.
+  const bool on_way = (word == "turned" || legs_follow) && result.outcome == api::Outcome::kStopped;
   return (of_mcu || on_way || word == api::word(result.outcome)) &&
          (moves_on || position_steps == result.position_steps);
 }
@@ -354,6 +354,7 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
   const bool last = leg + 1 >= legs.size();
   const bool unknown = legs.empty() && units_.backlash_steps(index_of(motor)) != 0;
   motor.goes_on = end.word == "turned" || (end.word == "reached" && (!last || unknown));
+  end.legs_follow = end.word == "reached" && motor.goes_on;
   if (end.word == "reached" && last && !unknown) {
     check_approach(now_ns, motor, asked, index);
     check_settled(now_ns, motor, asked);

@@ -151,7 +151,7 @@ class Client:
             client.move(by={"theta": 1.0, "phi": 1.0})
 
         to, by: within +-(2^31 - 1) steps, and within the motor's soft limits; the nearest step counts. A distance
-            counts from the present target of a motor that moves.
+            counts from the target that a motor which moves was given; it is refused while the motor jogs or is paused.
         speed: not to be exceeded, above 0; without: as fast as table and `max_speed` of the motor allow.
         wait: False returns a `Motion` as soon as the daemon has accepted the move.
 
