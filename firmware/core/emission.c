@@ -7,6 +7,7 @@
 #include "firmware/core/access.h"
 #include "firmware/core/settle.h"
 #include "firmware/core/state.h"
+#include "firmware/core/local.h"
 #include "firmware/core/velocity.h"
 
 // Windings stay on for so long after a move, until the rotor has come to rest.
@@ -62,6 +63,7 @@ bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* messa
   if (!keeps_pulses(mcu, message)) return BUSHD_E_PULSE_WIDTH;
   const bushd_status status = use(mcu, message);
   if (status != BUSHD_OK) return status;
+  bushd_mcu_wait_for_local(mcu);
   // What was good for another number of steps in a tick must be asked for again.
   for (uint8_t m = 0; m < mcu->config.motors; ++m) mcu->motor[m].table = -1;
   bushd_mcu_forget_velocities(mcu);

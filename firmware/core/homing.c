@@ -98,9 +98,16 @@ void bushd_mcu_homing_meets_limit(bushd_mcu* mcu, bool cuts) {
   }
 }
 
+// A limit that is not the switch which it looks for is active there.
+static bool is_inhibited(const bushd_mcu* mcu, int8_t direction) {
+  const uint8_t m = mcu->homing.motor;
+  return (bushd_mcu_forbidden(mcu, direction) & motor_bit(m)) != 0 &&
+         !bushd_mcu_homes_at_limit(mcu, m, direction);
+}
+
 static void end_fast(bushd_mcu* mcu) {
   bushd_mcu_homing* homing = &mcu->homing;
-  if (!homing->meets_limit || homing->turned) {
+  if (!homing->meets_limit || homing->turned || is_inhibited(mcu, (int8_t)-homing->direction)) {
     end(mcu, BUSHD_HOMING_NOT_FOUND);
     return;
   }
@@ -132,7 +139,12 @@ static void go_on(bushd_mcu* mcu, bool active) {
       }
       break;
     case BUSHD_HOMING_RAMP_DOWN:
-      if (done) begin_slow(mcu, BUSHD_HOMING_BACK_OFF, (int8_t)-homing->direction);
+      if (!done) break;
+      if (is_inhibited(mcu, (int8_t)-homing->direction)) {
+        end(mcu, BUSHD_HOMING_LIMIT);
+      } else {
+        begin_slow(mcu, BUSHD_HOMING_BACK_OFF, (int8_t)-homing->direction);
+      }
       break;
     case BUSHD_HOMING_BACK_OFF:
       if (is_sure(mcu, !active)) {

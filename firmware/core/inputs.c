@@ -89,6 +89,7 @@ bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* messag
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   const uint16_t limits = message->limit_positive | message->limit_negative;
   if ((limits & ~bushd_mcu_own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
+  bushd_mcu_wait_for_local(mcu);
   mcu->inputs = *message;
   bushd_mcu_default_switches(mcu);
   bushd_mcu_begin_inputs(mcu);

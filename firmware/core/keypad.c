@@ -5,7 +5,7 @@
 enum { FORWARD = 0x00, REVERSE = 0xFF, SLOWER = 0xFE, STOP = 0xFD };
 enum { TEXT = 5, LAST_AMOUNT = (BUSHD_KEYPAD_SLOWEST - BUSHD_KEYPAD_FIRST) / BUSHD_KEYPAD_SLOWER };
 
-_Static_assert(LAST_AMOUNT < UINT8_MAX, "counted in a byte");
+_Static_assert(LAST_AMOUNT < 0x7F, "counted in seven bits");
 
 static uint16_t delay_of(const bushd_mcu_keypad* keypad) {
   return (uint16_t)(BUSHD_KEYPAD_FIRST + keypad->slower * BUSHD_KEYPAD_SLOWER);
@@ -17,20 +17,21 @@ void bushd_mcu_keypad_byte(bushd_mcu* mcu, uint8_t byte) {
   switch (byte) {
     case FORWARD:
     case REVERSE:
-      keypad->direction = byte == FORWARD ? 1 : -1;
+      if (!keypad->waits_for_release) keypad->direction = byte == FORWARD ? 1 : -1;
       keypad->fresh = true;
       break;
     case SLOWER:
-      keypad->slower = keypad->slower < LAST_AMOUNT ? (uint8_t)(keypad->slower + 1u) : 0;
+      keypad->slower = (keypad->slower < LAST_AMOUNT ? keypad->slower + 1u : 0u) & 0x7Fu;
       keypad->slowed = true;
       break;
     case STOP:
       keypad->direction = 0;
+      keypad->waits_for_release = false;
       break;
     default:
       return;
   }
-  keypad->refused = false;
+  keypad->refused = keypad->waits_for_release;
   keypad->due = true;
 }
 
@@ -67,8 +68,19 @@ int8_t bushd_mcu_keypad_direction(bushd_mcu* mcu) {
   if (keypad->fresh) keypad->heard = (uint16_t)mcu->uptime;
   keypad->fresh = false;
   const uint16_t most = mcu->local.settings.keypad_ticks;
-  if (most != 0 && (uint16_t)((uint16_t)mcu->uptime - keypad->heard) >= most) keypad->direction = 0;
+  const uint16_t silent = (uint16_t)((uint16_t)mcu->uptime - keypad->heard);
+  if (most != 0 && silent >= most) keypad->direction = 0;
+  if (keypad->waits_for_release && silent >= most &&
+      silent >= BUSHD_KEYPAD_RELEASE_NS / mcu->tick_ns) {
+    keypad->waits_for_release = false;
+  }
   return keypad->direction;
+}
+
+void bushd_mcu_keypad_wait_for_release(bushd_mcu* mcu) {
+  bushd_mcu_keypad_refuse(mcu);
+  mcu->local.pad.waits_for_release = true;
+  mcu->local.pad.fresh = true;
 }
 
 void bushd_mcu_keypad_refuse(bushd_mcu* mcu) {

@@ -27,10 +27,13 @@ typedef struct bushd_mcu bushd_mcu;
 #define BUSHD_KEYPAD_SLOWER 30u
 #define BUSHD_KEYPAD_SLOWEST 3000u
 #define BUSHD_KEYPAD_BAUD 625u
+// A key that is held is repeated more often than that.
+#define BUSHD_KEYPAD_RELEASE_NS UINT32_C(500000000)
 
 typedef struct bushd_mcu_keypad {
   int8_t direction;  // of the key that counts, +1 or -1; 0: none does
-  uint8_t slower;    // by so many amounts
+  uint8_t slower : 7;         // by so many amounts
+  bool waits_for_release : 1;  // a key may be held that was pressed for what was set before
   uint16_t heard;    // when a tick was prepared first with the direction, in low bits of uptime
   uint8_t left : 3;  // characters of the display still to be sent
   bool fresh : 1;    // no tick was prepared yet with the direction
@@ -50,8 +53,10 @@ int16_t bushd_mcu_keypad_display(bushd_mcu* mcu);
 
 // For local.c. The direction in the tick that is prepared.
 int8_t bushd_mcu_keypad_direction(bushd_mcu* mcu);
-// What counts ends, and the display says so.
+// What counts ends, and the display says so: it has to be received again.
 void bushd_mcu_keypad_refuse(bushd_mcu* mcu);
+// Another motor is its own: what is held must be released first.
+void bushd_mcu_keypad_wait_for_release(bushd_mcu* mcu);
 // Its delay in time units of this table, rounded up, or the longest that a run may have. A
 // division.
 uint16_t bushd_mcu_keypad_floor(const bushd_mcu* mcu, const bushd_table* table);

@@ -49,13 +49,19 @@ static void steer(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_steer(mcu, m, local->wish, most);
 }
 
-// Those that move by the loop still, after a release or a turn.
+// Those that move by the loop still, after a release or a turn. Where a limit inhibits the wanted
+// direction they only come to rest: one that still goes the other way must not turn into it.
 static void steer_held(bushd_mcu* mcu) {
   if (mcu->config.velocity_motors == 0) return;
-  const uint16_t held = (uint16_t)(mcu->local.held & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
-  const uint16_t steered = held & bushd_mcu_moved_by_velocity(mcu);
+  const uint16_t forbidden = bushd_mcu_forbidden(mcu, mcu->local.wish);
+  const uint16_t steered = mcu->local.held & bushd_mcu_moved_by_velocity(mcu);
   for (uint8_t m = 0; steered >> m != 0; ++m) {
-    if ((steered & motor_bit(m)) != 0) steer(mcu, m);
+    if ((steered & motor_bit(m)) == 0) continue;
+    if ((forbidden & motor_bit(m)) != 0) {
+      bushd_mcu_brake(mcu, m);
+    } else {
+      steer(mcu, m);
+    }
   }
 }
 
@@ -107,8 +113,12 @@ static bool moves_none(const bushd_mcu* mcu) {
 void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
   bushd_mcu_local* local = &mcu->local;
   const uint8_t buttons = buttons_of(mcu, system_inputs);
-  const bool allowed = may_enable(mcu) && (mcu->faults & kForbids) == 0;
-  if (buttons != 0 || !allowed) bushd_mcu_keypad_refuse(mcu);
+  const bool allowed = may_enable(mcu) && (mcu->faults & kForbids) == 0 && !local->configuring;
+  if (!allowed) {
+    bushd_mcu_keypad_wait_for_release(mcu);
+  } else if (buttons != 0) {
+    bushd_mcu_keypad_refuse(mcu);
+  }
   const int8_t key = bushd_mcu_keypad_direction(mcu);
   const int8_t wish = key != 0 ? key : wish_of(buttons);
   slow_down(mcu);
@@ -140,24 +150,40 @@ void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs) {
   mcu->local.readings = READINGS;
 }
 
+void bushd_mcu_wait_for_local(bushd_mcu* mcu) {
+  mcu->local.configuring = (mcu->config.disabled_capabilities & BUSHD_CAN_LOCAL) == 0;
+}
+
+// Motors that are taken away from those who move them.
+static void take_away(bushd_mcu* mcu, uint16_t motors) {
+  mcu->local.held &= (uint16_t)~motors;
+  motors &= mcu->autonomous;
+  for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
+    if (motors & 1u) bushd_mcu_ramp_down_run(mcu, m);
+  }
+}
+
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
   bushd_local* settings = &mcu->local.settings;
   if (((message->motors | message->keypad) & ~bushd_mcu_own_motors(mcu)) != 0) {
     return BUSHD_E_FORMAT;
   }
   if (message->keypad != 0 && !mcu->config.keypad) return BUSHD_E_FORMAT;
-  const uint16_t of_keypad = settings->keypad ^ message->keypad;
-  const uint16_t changed = (uint16_t)((settings->motors ^ message->motors) | of_keypad);
-  if (changed & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
+  const uint16_t added = (uint16_t)((message->motors & ~settings->motors) |
+                                    (message->keypad & ~settings->keypad));
+  if (added & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
   const bool first = settings->motors == 0 && message->motors != 0;
   // A key that moves others would be forgotten.
   if (first && (mcu->local.held & mcu->autonomous) != 0) return BUSHD_E_STATE;
+  const bool of_keypad = settings->keypad != message->keypad;
+  take_away(mcu, mcu->local.held & (uint16_t) ~(mcu->local.by_keypad ? message->keypad
+                                                                     : message->motors));
   *settings = *message;
+  mcu->local.configuring = false;
   if (first) {
     const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
     bushd_mcu_forget_presses(mcu, pins.system ^ mcu->inputs.system_inverted);
   }
-  if (of_keypad != 0) bushd_mcu_keypad_refuse(mcu);
-  mcu->local.held &= mcu->local.by_keypad ? message->keypad : message->motors;
+  if (of_keypad) bushd_mcu_keypad_wait_for_release(mcu);
   return BUSHD_OK;
 }

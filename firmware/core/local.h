@@ -16,12 +16,16 @@ typedef struct bushd_mcu_local {
   bushd_local settings;
   uint16_t held;     // motors that the button has moved or will move, until it is released
   int8_t wish;       // +1, -1; 0: none, or both
-  bool by_keypad;    // who wishes it
+  bool by_keypad : 1;    // who wishes it
+  bool configuring : 1;  // a part of a configuration is there: nothing moves until LOCAL ends it
   uint8_t readings;  // since it changed
   bushd_mcu_keypad pad;
 } bushd_mcu_local;
 
 bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);
+// A master configures: what is to move, by which switches and how is not all there before LOCAL.
+// If it never comes, as to an MCU that does not know it, nothing moves, and what is kept stays.
+void bushd_mcu_wait_for_local(bushd_mcu* mcu);
 void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs);  // before every tick
 // What is active now counts only after it was released. No motor may be moved by it.
 void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs);

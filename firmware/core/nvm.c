@@ -101,5 +101,6 @@ bushd_mcu_nvm_region bushd_mcu_nvm_scan_next(bushd_mcu* mcu, bushd_mcu_nvm_scan*
 bool bushd_mcu_nvm_is_quiet(const bushd_mcu* mcu, bushd_mcu_nvm_scan* scan) {
   if (scan->crc != scan->crc_before) scan->same_uptime = (uint16_t)mcu->uptime;
   scan->crc_before = scan->crc;
+  if (mcu->local.configuring) return false;
   return (uint16_t)((uint16_t)mcu->uptime - scan->same_uptime) >= QUIET_TICKS;
 }

@@ -124,6 +124,7 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
   if (message->tick_ns < mcu->config.min_tick_ns) return BUSHD_E_CAPACITY;
   mcu->reception.comm_timeout_ticks = message->comm_timeout_ticks;
   if (same) return BUSHD_OK;
+  bushd_mcu_wait_for_local(mcu);
   // What it counts in slots lasts as long in another tick no more.
   mcu->position_compare.arrivals = 0;
   mcu->tick_ns = message->tick_ns;

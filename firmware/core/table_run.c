@@ -96,8 +96,14 @@ void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
     return;
   }
   mcu->stream.queue_summary.stale = true;
-  bushd_run_ramp_down(&motor->made.run);
-  motor->mode = bushd_run_done(&motor->made.run) ? BUSHD_MCU_STREAM : BUSHD_MCU_RAMP_DOWN;
+  const bool begun = (mcu->stream.begun & motor_bit(m)) != 0;
+  if (begun) bushd_run_ramp_down(&motor->made.run);
+  if (begun && !bushd_run_done(&motor->made.run)) {
+    motor->mode = BUSHD_MCU_RAMP_DOWN;
+    return;
+  }
+  motor->mode = BUSHD_MCU_STREAM;
+  mcu->stream.begun &= (uint16_t)~motor_bit(m);
 }
 
 uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction) {

@@ -186,6 +186,7 @@ TEST_P(Homing, CanBeGivenUpInEveryStage) {
     bushd_home give_up = command();
     give_up.most_steps = 0;
     ASSERT_EQ(fresh.home(give_up), BUSHD_OK);
+    fresh.pass();
     fresh.pass_until_rest();
     ASSERT_EQ(fresh.poll().homing, BUSHD_HOMING_STOPPED) << n;
     ASSERT_EQ(fresh.poll().autonomous, 0);
@@ -234,6 +235,24 @@ TEST_P(Homing, EmergencyEndsIt) {
 }
 
 // Short lever: the ramp overruns it, and the switch no longer tells that the motor is beyond.
+// Nothing of it has been prepared: there is no step to complete.
+TEST_P(Homing, StoppedBeforeItBeginsItMakesNoStep) {
+  put({-200, -1});
+  const std::vector<std::function<void()>> stops = {
+      [&] { rig.emergency(BUSHD_STOP_RAMP); },
+      [&] { EXPECT_EQ(rig.home({kHomed, -1, 0, 0, 400, kSlow, 0}), BUSHD_OK); },
+  };
+  for (const auto& stop : stops) {
+    ASSERT_EQ(rig.home(command()), BUSHD_OK);
+    stop();
+    rig.pass(100);
+    EXPECT_EQ(rig.pulses(kHomed), 0);
+    EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_STOPPED);
+    EXPECT_EQ(rig.poll().moving, 0);
+    EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  }
+}
+
 TEST_P(Homing, EndedBetweenOverrunAndBackOffTheSwitchBarsTheWayOn) {
   constexpr std::uint16_t kBit = 1u << kHomed;
   ASSERT_EQ(rig.set_inputs({.limit_negative = kBit}), BUSHD_OK);

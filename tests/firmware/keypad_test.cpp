@@ -21,7 +21,14 @@ Law floored(const Law& law, std::uint32_t floor_ns) {
 
 class Keypad : public Streams {
  protected:
-  void SetUp() override { ASSERT_EQ(rig.local(0, kMotors), BUSHD_OK); }
+  // 0.5 s and a tick: a key that is held would have been repeated.
+  static constexpr int kUntilReleased = 197;
+
+  void SetUp() override {
+    ASSERT_EQ(rig.local(0, kMotors), BUSHD_OK);
+    rig.pass(kUntilReleased);
+    rig.forget_history();
+  }
   void press(std::uint8_t key, int ticks) {
     rig.keypad(key);
     rig.pass(ticks);
@@ -96,6 +103,7 @@ TEST_P(Keypad, SlowerInMotionIsARampDownAndANewBeginning) {
 TEST_P(Keypad, AMotorWithVelocityTakesTheSpeedUpInMotion) {
   ASSERT_EQ(rig.local(0, 0b0010), BUSHD_OK);
   ASSERT_EQ(rig.velocity({1, 100 * 64, 1000 * 64, 5000}), BUSHD_OK);
+  rig.pass(kUntilReleased);
   const auto steps_in_60_ticks = [this] {
     const std::int64_t before = rig.pulses(1);
     rig.pass(60);
@@ -117,6 +125,7 @@ TEST_P(Keypad, AMotorWithVelocityTakesTheSpeedUpInMotion) {
 
 TEST_P(Keypad, AKeyThatIsNotRepeatedCountsForAWhileWhereThatIsSet) {
   ASSERT_EQ(rig.local(0, kMotors, 20), BUSHD_OK);
+  rig.pass(kUntilReleased);
   press(kKeyForward, 19);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
   press(kKeyForward, 19);
@@ -157,7 +166,9 @@ TEST_P(Keypad, AFaultForgetsTheKey) {
   press(kKeyForward, 10);
   EXPECT_EQ(rig.keypad_display(), "----\n");
   ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
-  rig.pass(60);
+  for (int n = 0; n < 10; ++n) press(kKeyForward, 39);
+  EXPECT_EQ(rig.poll().autonomous, 0) << "held all the time";
+  rig.pass(kUntilReleased);
   EXPECT_EQ(rig.poll().autonomous, 0) << "it has to be pressed again";
   press(kKeyForward, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
@@ -175,6 +186,8 @@ TEST_P(Keypad, NothingMovesWhileAHostHasDisabledTheDrivers) {
 
 TEST_P(Keypad, ALimitForgetsTheKeyWhenItInhibitsAllMotors) {
   ASSERT_EQ(rig.set_inputs({.limit_positive = kMotors}), BUSHD_OK);
+  ASSERT_EQ(rig.local(0, kMotors), BUSHD_OK);
+  rig.pass(kUntilReleased);
   press(kKeyForward, 60);
   rig.keypad_display();
   rig.pins({1 << 1, 0});
@@ -221,10 +234,43 @@ TEST_P(Keypad, AHostsMotorIsNotItsUntilThatRests) {
   expect_counted_after_stop();
 }
 
+// The node repeats a key that is held, ten times a second.
+TEST_P(Keypad, AMasterEndsItAndTheKeyMustBeReleasedFirst) {
+  constexpr std::uint16_t kCounts = 195;
+  constexpr int kRepeat = 39;  // 0.1 s
+  const auto hold_for = [this](std::uint8_t key, int ticks) {
+    for (int n = 0; n < ticks; n += kRepeat) press(key, kRepeat);
+  };
+  for (const std::uint16_t counts : {kCounts, std::uint16_t{0}}) {
+    ASSERT_EQ(rig.local(0, kMotors, counts), BUSHD_OK);
+    rig.pass(kUntilReleased);
+    hold_for(kKeyForward, 10 * kRepeat);
+    ASSERT_EQ(rig.poll().autonomous, kMotors);
+    ASSERT_EQ(rig.local(0, 0b0010, counts), BUSHD_OK);
+    hold_for(kKeyForward, 10 * kRepeat);
+    EXPECT_EQ(rig.poll().moving, 0) << "of the other one too it was another key";
+    ASSERT_EQ(rig.local(0, kMotors, counts), BUSHD_OK);
+    hold_for(kKeyForward, 30 * kRepeat);
+    EXPECT_EQ(rig.poll().moving, 0) << "held all the time";
+    rig.pass(kUntilReleased);
+    hold_for(kKeyForward, 2 * kRepeat);
+    EXPECT_EQ(rig.poll().autonomous, kMotors);
+    ASSERT_EQ(rig.local(0, 0, counts), BUSHD_OK);
+    rig.pass_until_rest();
+    ASSERT_EQ(rig.local(0, kMotors, counts), BUSHD_OK);
+    hold_for(kKeyReverse, 4 * kRepeat);
+    EXPECT_EQ(rig.poll().moving, 0);
+    press(kKeyStop, 5);
+    hold_for(kKeyReverse, 2 * kRepeat);
+    EXPECT_EQ(rig.poll().autonomous, kMotors) << "a stop is a release";
+    expect_counted_after_stop();
+    ASSERT_EQ(rig.local(0), BUSHD_OK);
+  }
+}
+
 TEST_P(Keypad, SettingsAreRefusedThatDoNotFit) {
   EXPECT_EQ(rig.local(0, 0b1'0000), BUSHD_E_FORMAT);
   press(kKeyForward, 60);
-  EXPECT_EQ(rig.local(0, 0), BUSHD_E_STATE);
   EXPECT_EQ(rig.local(1, kMotors), BUSHD_E_STATE) << "its stuck inputs could not be told";
   EXPECT_EQ(rig.local(0, kMotors), BUSHD_OK) << "a host that connects says the same";
   rig.pass(10);

@@ -85,7 +85,6 @@ TEST_P(Local, AStreamOnSuchAMotorIsRefusedMeanwhileAndWhatStreamsIsLeftAlone) {
   hold(BUSHD_INPUT_FORWARD, 10);
   EXPECT_EQ(rig.take(ones(kStart, rig.first_open(), 4, 0)), BUSHD_E_STATE);
   EXPECT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_E_STATE);
-  EXPECT_EQ(rig.local(0), BUSHD_E_STATE);
   release();
   rig.pass_until_rest();
   const std::int64_t at = rig.pulses(0);
@@ -125,6 +124,7 @@ TEST_P(Local, ACutIsNoRampWhoeverAsksForIt) {
                             .emergency = BUSHD_EMERGENCY_INPUT_IMMEDIATE,
                             .overcurrent = 500}),
             BUSHD_OK);
+  ASSERT_EQ(rig.local(kLocal), BUSHD_OK);
   const std::vector<std::function<void()>> cuts = {
       [&] { rig.emergency(BUSHD_STOP_IMMEDIATE); },
       [&] {
@@ -174,6 +174,7 @@ TEST_P(Local, WorksWithoutAHostButNotWithoutDriversOrTables) {
 
 TEST_P(Local, StopsAtALimitAndComesBackFromIt) {
   ASSERT_EQ(rig.set_inputs({.limit_positive = 0b0001}), BUSHD_OK);
+  ASSERT_EQ(rig.local(kLocal), BUSHD_OK);
   hold(BUSHD_INPUT_FORWARD, 100);
   rig.pins({0b0001, BUSHD_INPUT_FORWARD});
   rig.pass(200);
@@ -203,6 +204,38 @@ TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
   expect_rest_as_counted();
 }
 
+// What a master takes away from them ramps down, and waits for the next press when it is given back.
+TEST_P(Local, AMasterEndsItAndTheButtonMustBeReleasedFirst) {
+  hold(BUSHD_INPUT_FORWARD, 130);
+  ASSERT_EQ(rig.poll().autonomous, kLocal);
+  ASSERT_EQ(rig.local(0b0100), BUSHD_OK);
+  rig.pass(100);
+  EXPECT_EQ(rig.poll().autonomous, 0b0100) << "the other one goes on";
+  const std::int64_t at = rig.pulses(0);
+  auto reference = Reference::move(law, 100000);
+  reference.ramp_down_at(128 * std::uint64_t{Rig::kTickNs});
+  EXPECT_EQ(at, static_cast<std::int64_t>(reference.steps()));
+  ASSERT_EQ(rig.local(kLocal), BUSHD_OK);
+  rig.pass(100);
+  EXPECT_EQ(rig.pulses(0), at) << "held all the time";
+  EXPECT_EQ(rig.poll().autonomous, 0b0100);
+  release();
+  rig.pass_until_rest();
+  hold(BUSHD_INPUT_FORWARD, 60);
+  EXPECT_EQ(rig.poll().autonomous, kLocal);
+  EXPECT_GT(rig.pulses(0), at);
+  ASSERT_EQ(rig.local(0), BUSHD_OK);
+  rig.pass_until_rest();
+  ASSERT_EQ(rig.local(kLocal), BUSHD_OK);
+  rig.pass(100);
+  EXPECT_EQ(rig.poll().moving, 0) << "held all the time";
+  release();
+  hold(BUSHD_INPUT_REVERSE, 60);
+  EXPECT_EQ(rig.poll().autonomous, kLocal);
+  release();
+  expect_rest_as_counted();
+}
+
 // People expect nothing of a button that was held, or is shorted, before anybody could press it.
 TEST_P(Local, AButtonMustHaveBeenSeenReleasedSinceItWasTold) {
   ASSERT_EQ(rig.local(0), BUSHD_OK);
@@ -214,6 +247,7 @@ TEST_P(Local, AButtonMustHaveBeenSeenReleasedSinceItWasTold) {
   rig.pass_until_rest();
   // Another wiring: what rests is a press now.
   ASSERT_EQ(rig.set_inputs({.system_inverted = BUSHD_INPUT_FORWARD}), BUSHD_OK);
+  ASSERT_EQ(rig.local(kLocal), BUSHD_OK);
   rig.pass(60);
   EXPECT_EQ(rig.pulses(0), 0) << "active at rest";
   rig.pins({0, BUSHD_INPUT_FORWARD});

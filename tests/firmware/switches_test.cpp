@@ -161,6 +161,63 @@ TEST_P(Switches, AHitSwitchInhibitsWhileSettingsAreToldAgain) {
   expect_forbidden(0, 0);
 }
 
+// Between INPUTS and MOTOR_INPUTS the switch of this motor is another one: nobody may move it by
+// the local inputs then, and if the line breaks there, not until a master has told all.
+TEST_P(Switches, LocalMotionWaitsUntilAllOfTheConfigurationIsThere) {
+  const auto press = [this](std::uint16_t inputs, std::uint8_t system) {
+    rig.pins({inputs, 0});
+    rig.pass(3);
+    rig.pins({inputs, system});
+    rig.pass(100);
+  };
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
+  ASSERT_EQ(rig.local(kSwitchedBit), BUSHD_OK);
+  press(bit(9), BUSHD_INPUT_FORWARD);
+  EXPECT_EQ(rig.pulses(kSwitched), 0) << "it stands at its switch";
+  rig.pins({bit(9), 0});
+  rig.pass(3);
+  ASSERT_EQ(rig.set_inputs(both()), BUSHD_OK);
+  press(bit(9), BUSHD_INPUT_FORWARD);
+  EXPECT_EQ(rig.pulses(kSwitched), 0) << "half of it is there";
+  ASSERT_EQ(rig.motor_inputs({kSwitched, 9, 14, 3}), BUSHD_OK);
+  rig.pass(100);
+  press(bit(9), BUSHD_INPUT_REVERSE);
+  EXPECT_EQ(rig.pulses(kSwitched), 0) << "all but the end";
+  ASSERT_EQ(rig.local(kSwitchedBit), BUSHD_OK);
+  rig.pass(100);
+  EXPECT_EQ(rig.pulses(kSwitched), 0) << "what is held then must be pressed anew";
+  press(bit(9), BUSHD_INPUT_FORWARD);
+  EXPECT_EQ(rig.pulses(kSwitched), 0);
+  press(bit(9), BUSHD_INPUT_REVERSE);
+  EXPECT_LT(rig.pulses(kSwitched), 0);
+  rig.pins({});
+  expect_rest_as_counted();
+}
+
+// A half of it is not kept over resets.
+TEST_P(Switches, AHalfConfigurationIsNotKept) {
+  bushd_mcu_nvm_scan scan{};
+  const auto is_quiet = [&] {
+    bool quiet = false;
+    for (int ticks = 0; ticks < 2000; ++ticks) {
+      rig.pass();
+      bushd_mcu_nvm_begin_scan(&scan);
+      while (bushd_mcu_nvm_scan_next(rig.mutable_mcu(), &scan, 64).at != nullptr) {
+      }
+      quiet = bushd_mcu_nvm_is_quiet(&rig.mcu(), &scan);
+    }
+    return quiet;
+  };
+  ASSERT_EQ(rig.local(kSwitchedBit), BUSHD_OK);
+  EXPECT_TRUE(is_quiet());
+  ASSERT_EQ(rig.set_inputs(both()), BUSHD_OK);
+  EXPECT_FALSE(is_quiet());
+  ASSERT_EQ(rig.motor_inputs({kSwitched, 9, 14, 3}), BUSHD_OK);
+  EXPECT_FALSE(is_quiet());
+  ASSERT_EQ(rig.local(kSwitchedBit), BUSHD_OK);
+  EXPECT_TRUE(is_quiet());
+}
+
 TEST_P(Switches, SettingsOutlastAReset) {
   ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
   std::vector<std::vector<std::uint8_t>> kept;
@@ -225,6 +282,12 @@ class Stage : public Switches {
     };
   }
   std::int64_t place() const { return rig.pulses(kSwitched) + plus_; }
+  void take_long_ticks() {
+    ASSERT_EQ(rig.configure(format, kSlow * 10'000), BUSHD_OK);
+    rig.sync_to(1000);
+    ASSERT_EQ(rig.assign(kSwitched, 0), BUSHD_OK);
+    ASSERT_NO_FATAL_FAILURE(wire({kSwitched, kPositive, kNegative, kHome}));
+  }
   static bushd_home command(int direction, std::uint32_t most_steps = 8000) {
     return {kSwitched, static_cast<std::int8_t>(direction), most_steps, 0, 400, kSlow, 100};
   }
@@ -412,6 +475,31 @@ TEST_P(Stage, OnItsSwitchAtTheOtherLimitItCannotBackOff) {
   put(-kEnd, {.at = -kEnd - 50, .direction = 1});
   rig.pass(3);
   EXPECT_EQ(rig.home(command(1)), BUSHD_E_FORBIDDEN);
+}
+
+// Ticks of the slowest step: the first one of a stage is made in the tick in which it begins.
+TEST_P(Stage, ALimitThatIsActiveWhereAStageBeginsLetsNoStepIntoIt) {
+  ASSERT_NO_FATAL_FAILURE(take_long_ticks());
+  rig.sense = [this] {
+    const bool there = place() >= 500;
+    const unsigned inputs = there ? 1u << kNegative | 1u << kHome : 0u;
+    return bushd_inputs{static_cast<std::uint16_t>(inputs), 0};
+  };
+  const auto way = home(command(1));
+  EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_LIMIT);
+  EXPECT_EQ(place(), way.second) << "not a step back";
+  EXPECT_EQ(rig.poll().motor[kSwitched].position_steps, rig.pulses(kSwitched));
+}
+
+TEST_P(Stage, BetweenTwoActiveLimitsItDoesNotTurn) {
+  ASSERT_NO_FATAL_FAILURE(take_long_ticks());
+  rig.sense = [this] {
+    const unsigned inputs = place() >= 500 ? 1u << kNegative | 1u << kPositive : 0u;
+    return bushd_inputs{static_cast<std::uint16_t>(inputs), 0};
+  };
+  const auto way = home(command(1));
+  EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_NOT_FOUND);
+  EXPECT_EQ(place(), way.second) << "not a step back";
 }
 
 TEST_P(Stage, CanBeGivenUpOnTheWayBack) {

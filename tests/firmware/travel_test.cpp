@@ -248,6 +248,24 @@ TEST_P(Travel, EndsByFaultsAndByStops) {
   EXPECT_EQ(rig.awaited_edge(), BUSHD_EDGE_NONE);
 }
 
+// Nothing of it has been prepared: there is no step to complete.
+TEST_P(Travel, StoppedBeforeItsStepItMakesNone) {
+  ASSERT_EQ(request(step()), BUSHD_OK);
+  rig.emergency(BUSHD_STOP_RAMP);
+  rig.pass();
+  expect_ends(BUSHD_TRAVEL_STOPPED, 0);
+  ASSERT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+  ASSERT_EQ(request(step()), BUSHD_OK);
+  ASSERT_EQ(request(give_up()), BUSHD_OK);
+  rig.pass();
+  expect_ends(BUSHD_TRAVEL_STOPPED, 0);
+  // The limit becomes active between the request and the first tick.
+  ASSERT_EQ(request(step()), BUSHD_OK);
+  right_ = stands_;
+  rig.pass();
+  expect_ends(BUSHD_TRAVEL_STOPPED, 0);
+}
+
 TEST_P(Travel, ASensorSeesTheStep) {
   ASSERT_EQ(request(step()), BUSHD_OK);
   EXPECT_EQ(stage(), BUSHD_TRAVEL_STEPS);

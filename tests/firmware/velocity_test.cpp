@@ -149,6 +149,7 @@ TEST_P(Velocity, ATurnWithinATickWaitsForTheNextOne) {
 
 TEST_P(Velocity, ALimitBrakesItAlongTheRampAndInhibitsTheWayOn) {
   ASSERT_EQ(rig.set_inputs({.limit_positive = 1u << kMotor}), BUSHD_OK);
+  ASSERT_EQ(rig.local(1u << kMotor), BUSHD_OK);
   hold(BUSHD_INPUT_FORWARD, 300);
   rig.pins({1u << kMotor, BUSHD_INPUT_FORWARD});
   const std::int64_t at = rig.pulses(kMotor);
@@ -169,6 +170,7 @@ TEST_P(Velocity, ALimitBrakesItAlongTheRampAndInhibitsTheWayOn) {
 
 TEST_P(Velocity, TurnedBackWhileALimitBrakesItGoesOnThroughZero) {
   ASSERT_EQ(rig.set_inputs({.limit_positive = 1u << kMotor}), BUSHD_OK);
+  ASSERT_EQ(rig.local(1u << kMotor), BUSHD_OK);
   hold(BUSHD_INPUT_FORWARD, 300);
   rig.pins({1u << kMotor, BUSHD_INPUT_FORWARD});
   rig.pass(20);
@@ -181,6 +183,45 @@ TEST_P(Velocity, TurnedBackWhileALimitBrakesItGoesOnThroughZero) {
   EXPECT_LT(turned - seen.begin(), 160) << "24 updates are 147 ticks";
   EXPECT_TRUE(std::all_of(turned, seen.end(), [](int n) { return n <= 0; }));
   hold(0, 1);
+  expect_counted();
+}
+
+// The other input is pressed, and the limit on the new way becomes active while the motor still goes
+// the old one: it comes to rest, whenever that is. If it has turned already, it brakes.
+TEST_P(Velocity, ALimitThatComesWhileItTurnsLetsNoStepIntoIt) {
+  const std::vector<bushd_set_velocity> all = {{kMotor, 200 * 64, 1000 * 64, 20000},
+                                               {kMotor, 400 * 64, 2000 * 64, 900},
+                                               kSettings};
+  for (const bushd_set_velocity& settings : all) {
+    ASSERT_EQ(rig.velocity(settings), BUSHD_OK);
+    for (const int direction : {1, -1}) {
+      const std::uint16_t limit = 1u << kMotor;
+      ASSERT_EQ(rig.set_inputs({.limit_positive = direction > 0 ? limit : std::uint16_t{0},
+                                .limit_negative = direction < 0 ? limit : std::uint16_t{0}}),
+                BUSHD_OK);
+      ASSERT_EQ(rig.local(1u << kMotor), BUSHD_OK);
+      const auto towards = direction > 0 ? BUSHD_INPUT_FORWARD : BUSHD_INPUT_REVERSE;
+      const auto away = direction > 0 ? BUSHD_INPUT_REVERSE : BUSHD_INPUT_FORWARD;
+      for (int ticks = 0; ticks < 40; ++ticks) {
+        SCOPED_TRACE("A " + std::to_string(settings.acceleration) + ", direction " +
+                     std::to_string(direction) + ", limit after " + std::to_string(ticks));
+        hold(away, 100);
+        hold(towards, ticks);
+        const std::size_t pressed = rig.history(kMotor).size();
+        rig.pins({limit, static_cast<std::uint8_t>(towards)});
+        // What is emitted, and what is prepared.
+        rig.pass(2);
+        const bool turned = direction * rig.history(kMotor).back() >= 0;
+        rig.pass(400);
+        const std::vector<int> seen = made(pressed + 2);
+        if (!turned) {
+          EXPECT_TRUE(std::ranges::none_of(seen, [&](int n) { return n * direction > 0; }));
+        }
+        EXPECT_EQ(rig.poll().moving, 0);
+        hold(0, 10);
+      }
+    }
+  }
   expect_counted();
 }
 
