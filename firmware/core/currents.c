@@ -22,7 +22,9 @@ static uint16_t speed_of(const bushd_mcu* mcu, uint8_t m) {
     const bool on_line = (mcu->line.motors & motor_bit(m)) != 0;
     return on_line ? bushd_mcu_line_delay(mcu, m) : bushd_run_delay(&motor->made.run);
   }
-  if (mcu->format == BUSHD_FORMAT_FINE) return motor->displacement;
+  if (mcu->format == BUSHD_FORMAT_FINE) {
+    return (motor->displacement & BUSHD_MCU_SELDOM) != 0 ? (uint16_t)1 : motor->displacement;
+  }
   const int16_t steps = next->steps[m];
   return (uint16_t)((steps < 0 ? -steps : steps) << 8);
 }

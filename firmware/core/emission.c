@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "firmware/core/access.h"
+#include "firmware/core/local.h"
 #include "firmware/core/settle.h"
 #include "firmware/core/state.h"
-#include "firmware/core/local.h"
 #include "firmware/core/velocity.h"
 
 // Windings stay on for so long after a move, until the rotor has come to rest.

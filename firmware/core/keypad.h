@@ -31,8 +31,8 @@ typedef struct bushd_mcu bushd_mcu;
 #define BUSHD_KEYPAD_RELEASE_NS UINT32_C(500000000)
 
 typedef struct bushd_mcu_keypad {
-  int8_t direction;  // of the key that counts, +1 or -1; 0: none does
-  uint8_t slower : 7;         // by so many amounts
+  int8_t direction;            // of the key that counts, +1 or -1; 0: none does
+  uint8_t slower : 7;          // by so many amounts
   bool waits_for_release : 1;  // a key may be held that was pressed for what was set before
   uint16_t heard;    // when a tick was prepared first with the direction, in low bits of uptime
   uint8_t left : 3;  // characters of the display still to be sent

@@ -169,15 +169,15 @@ bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
     return BUSHD_E_FORMAT;
   }
   if (message->keypad != 0 && !mcu->config.keypad) return BUSHD_E_FORMAT;
-  const uint16_t added = (uint16_t)((message->motors & ~settings->motors) |
-                                    (message->keypad & ~settings->keypad));
+  const uint16_t added =
+      (uint16_t)((message->motors & ~settings->motors) | (message->keypad & ~settings->keypad));
   if (added & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
   const bool first = settings->motors == 0 && message->motors != 0;
   // A key that moves others would be forgotten.
   if (first && (mcu->local.held & mcu->autonomous) != 0) return BUSHD_E_STATE;
   const bool of_keypad = settings->keypad != message->keypad;
-  take_away(mcu, mcu->local.held & (uint16_t) ~(mcu->local.by_keypad ? message->keypad
-                                                                     : message->motors));
+  take_away(mcu, mcu->local.held &
+                     (uint16_t) ~(mcu->local.by_keypad ? message->keypad : message->motors));
   *settings = *message;
   mcu->local.configuring = false;
   if (first) {

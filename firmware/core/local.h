@@ -14,11 +14,11 @@ typedef struct bushd_mcu bushd_mcu;
 
 typedef struct bushd_mcu_local {
   bushd_local settings;
-  uint16_t held;     // motors that the button has moved or will move, until it is released
-  int8_t wish;       // +1, -1; 0: none, or both
+  uint16_t held;         // motors that the button has moved or will move, until it is released
+  int8_t wish;           // +1, -1; 0: none, or both
   bool by_keypad : 1;    // who wishes it
   bool configuring : 1;  // a part of a configuration is there: nothing moves until LOCAL ends it
-  uint8_t readings;  // since it changed
+  uint8_t readings;      // since it changed
   bushd_mcu_keypad pad;
 } bushd_mcu_local;
 

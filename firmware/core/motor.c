@@ -48,8 +48,11 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
     if (motor->still_ticks < UINT8_MAX) ++motor->still_ticks;
     return;
   }
-  motor->still_ticks = 0;
+  const uint8_t before = motor->still_ticks;
   motor->displacement = (uint16_t)(displacement < 0 ? -displacement : displacement);
+  if (before == 0) return;
+  motor->still_ticks = 0;
+  if (motor->displacement == 1) motor->displacement = (uint16_t)(BUSHD_MCU_SELDOM + before + 1u);
 }
 
 static inline const bushd_run_tick* run_tick_of(bushd_mcu* mcu, const bushd_mcu_motor* motor) {

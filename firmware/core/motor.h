@@ -21,6 +21,8 @@ typedef enum bushd_mcu_mode {
   BUSHD_MCU_VELOCITY = 5  // by the velocity loop (velocity.h), until it is at rest
 } bushd_mcu_mode;
 
+#define BUSHD_MCU_SELDOM 0x8000u  // of bushd_mcu_motor.displacement
+
 // Ticks that are queued beyond a gap.
 typedef struct bushd_mcu_out_of_order {
   uint32_t from;
@@ -57,8 +59,10 @@ typedef struct bushd_mcu_motor {
   bool exact : 1;             // `run` is emitted exact to a slot, not by displacements
   bool has_out_of_order : 1;  // only in a stream
   uint16_t delay;             // of the running step when the queued ticks end; 0: at rest there
-  uint16_t displacement;      // the last one that was not 0, unsigned; in the fine format only
-  uint8_t still_ticks;        // made since; saturates
+  // The last one that was not 0, unsigned; in the fine format only. Where it is 1 and ticks of 0
+  // came before it: BUSHD_MCU_SELDOM and in how many ticks it was the first, up to 256.
+  uint16_t displacement;
+  uint8_t still_ticks;  // made since; saturates
   union {
     bushd_mcu_start start;  // of those in bushd_mcu.starting
     uint32_t spare_ns;      // of armed ones (bushd_mcu_make_run)

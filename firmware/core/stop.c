@@ -15,15 +15,21 @@ void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   const bushd_table* table = bushd_mcu_table_of(mcu, motor);
   // A delay below cruise cannot be running; the ramp must not reach codes that no move uses.
-  if (delay < table->cruise) delay = table->cruise;
+  if (delay != 0 && delay < table->cruise) delay = table->cruise;
   const int direction = bushd_mcu_last_direction(mcu, m);
   // In the fine format the remainder is the elapsed share of the running delay; in the coarse one
   // that share is unknown, and taking it as 0 makes the next step late rather than early.
   const int32_t progress = (int32_t)motor->remainder * direction;
   const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
   bushd_run_start_ramp_down(&motor->made.run, table, delay, fraction, direction);
-  motor->mode = BUSHD_MCU_RAMP_DOWN;
   motor->exact = false;
+  if (!bushd_run_done(&motor->made.run)) {
+    motor->mode = BUSHD_MCU_RAMP_DOWN;
+    return;
+  }
+  motor->mode = BUSHD_MCU_STREAM;
+  motor->remainder = 0;
+  mcu->stream.begun &= (uint16_t)~motor_bit(m);
 }
 
 static bool in_run(const bushd_mcu_motor* motor) {
@@ -115,6 +121,17 @@ static uint16_t delay_for(const bushd_mcu* mcu, const bushd_mcu_motor* motor, ui
   return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;
 }
 
+// By the last displacement. One of 1/256 step in the fine format may be of any slower speed: then
+// by the time between two of them. 0: it all but stands.
+static uint16_t fine_delay(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
+  const bool seldom = (motor->displacement & BUSHD_MCU_SELDOM) != 0;
+  const uint16_t ticks = (uint16_t)(motor->still_ticks + 1u);
+  const uint16_t apart = seldom ? motor->displacement & (uint16_t)~BUSHD_MCU_SELDOM : 0;
+  const uint16_t most = apart > ticks ? apart : ticks;
+  if (most > UINT8_MAX || motor->displacement == 0) return 0;
+  return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * most, seldom ? 1u : motor->displacement);
+}
+
 // The delay of the running step of a stream. In the fine format the last displacement tells it. In
 // the coarse one a tick of one step may be of any speed from a step in two ticks to two in one, and
 // a motor that was taken for too slow a one would stop all but dead, for too fast a one go on
@@ -123,11 +140,7 @@ static uint16_t delay_for(const bushd_mcu* mcu, const bushd_mcu_motor* motor, ui
 static uint16_t stream_delay(const bushd_mcu* mcu, uint8_t m, const rest_of_stream* rest,
                              uint32_t next) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
-  if (mcu->format == BUSHD_FORMAT_FINE) {
-    const uint64_t time_ns = (uint64_t)mcu->tick_ns * ((uint32_t)motor->still_ticks + 1u);
-    return motor->displacement == 0 ? UINT16_MAX
-                                    : delay_for(mcu, motor, time_ns, motor->displacement);
-  }
+  if (mcu->format == BUSHD_FORMAT_FINE) return fine_delay(mcu, motor);
   if (rest->goes_on && ticks_after(rest->until, next) < TICKS_AHEAD) return motor->delay;
   const int32_t steps = rest->steps + mcu->slot_buffer[0].steps[m] + mcu->slot_buffer[1].steps[m];
   const uint32_t most = (uint32_t)(steps < 0 ? -steps : steps) + 1u;

@@ -96,6 +96,31 @@ void bushd_run_begin_late(bushd_run* run, uint32_t ns) {
   run->since_ns = units * unit_ns - ns;
 }
 
+// The longest delay that a ramp-down waits for, in whole time units.
+static uint32_t longest_wait(const bushd_run* run) {
+  return BUSHD_RUN_WAITS_NS / run->table->time_unit_ns;
+}
+
+void bushd_run_leave_out_slow(bushd_run* run) {
+  const uint32_t longest = longest_wait(run);
+  if (longest >= UINT16_MAX || run->decel_left == 0) return;
+  const bool runs = run->lead_delay == 0;  // the first of them does
+  uint16_t out = codes_above(&run->table->decel, (uint16_t)longest);
+  if (out >= run->decel_left) out = (uint16_t)(run->decel_left - (runs ? 1u : 0u));
+  if (out == 0) return;
+  run->accel_end = 0;
+  run->accel_at = out;
+  bushd_run_set_decel(run, run->decel_left);
+}
+
+// delay x unit - (since x unit + since_ns) > BUSHD_RUN_WAITS_NS, in 32 bits.
+static bool waits_too_long(const bushd_run* run) {
+  const uint32_t unit_ns = run->table->time_unit_ns;
+  const int32_t more = (int32_t)(run->lead_delay - run->since - longest_wait(run));
+  if (more <= 0) return false;
+  return more > 1 || run->since_ns < unit_ns - BUSHD_RUN_WAITS_NS % unit_ns;
+}
+
 static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
   run->lead_delay = delay;
   run->accel_at = run->accel_end;
@@ -104,24 +129,38 @@ static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
 #endif
   run->cruise_left = 0;
   run->decel_left = (uint16_t)bushd_table_steps_to_stop(run->table, delay);
+  bushd_run_leave_out_slow(run);
+}
+
+static void rest_if_it_waits(bushd_run* run) {
+  if (!waits_too_long(run)) return;
+  run->lead_delay = 0;
+  run->decel_left = 0;
+  run->accel_at = run->accel_end;
 }
 
 void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
                                uint8_t fraction, int direction) {
   clear(run, table, direction);
   if (delay == 0) return;
-  lead_then_ramp_down(run, delay);
   // Rounded up to whole ns: rounded down, the position would first fall back behind `fraction`.
   const uint32_t unit_ns = table->time_unit_ns;
   const uint64_t over_ns = ((uint64_t)delay * unit_ns * fraction + 255u) / 256u;
   run->since = (uint32_t)(over_ns / unit_ns);
   run->since_ns = (uint32_t)(over_ns % unit_ns);
   run->fraction = fraction;
+  lead_then_ramp_down(run, delay);
+  rest_if_it_waits(run);
+}
+
+void bushd_run_ramp_down_after_step(bushd_run* run) {
+  const uint16_t delay = bushd_run_delay(run);
+  if (delay != 0) lead_then_ramp_down(run, delay);
 }
 
 void bushd_run_ramp_down(bushd_run* run) {
-  const uint16_t delay = bushd_run_delay(run);
-  if (delay != 0) lead_then_ramp_down(run, delay);
+  bushd_run_ramp_down_after_step(run);
+  rest_if_it_waits(run);
 }
 
 #if BUSHD_RUN_BRAKES
@@ -189,7 +228,7 @@ uint16_t bushd_run_take_step(bushd_run* run) {
   } else if (run->cruise_left != 0) {
     --run->cruise_left;
   } else {
-    --run->decel_left;
+    bushd_run_set_decel(run, (uint16_t)(run->decel_left - 1u));
   }
   run->since = 0;
   run->since_ns = 0;
@@ -200,7 +239,8 @@ uint16_t bushd_run_take_step(bushd_run* run) {
 #endif
 
 uint32_t bushd_run_steps_left(const bushd_run* run) {
-  return (run->lead_delay != 0) + (uint32_t)(run->accel_end - run->accel_at) + brake_left(run) +
+  // In a ramp-down that leaves some out the second of these is negative.
+  return (uint32_t)(run->lead_delay != 0) + run->accel_end - run->accel_at + brake_left(run) +
          run->cruise_left + run->decel_left;
 }
 
@@ -220,9 +260,11 @@ static uint32_t units_between(const bushd_ramp* ramp, uint16_t from, uint16_t to
 uint64_t bushd_run_units_left(const bushd_run* run) {
   if (bushd_run_done(run)) return 0;
   const bushd_table* table = run->table;
-  return (uint64_t)run->lead_delay + units_between(&table->accel, run->accel_at, run->accel_end) +
+  const uint16_t rise_to = run->accel_at < run->accel_end ? run->accel_end : run->accel_at;
+  return (uint64_t)run->lead_delay + units_between(&table->accel, run->accel_at, rise_to) +
          (uint64_t)run->cruise_left * run->cruise +
-         units_between(&table->decel, 0, (uint16_t)(run->decel_left + brake_left(run))) -
+         units_between(&table->decel, bushd_run_decel_end(run),
+                       (uint16_t)(run->decel_left + brake_left(run))) -
          (uint64_t)(int32_t)run->since;
 }
 
@@ -250,10 +292,11 @@ static uint16_t look_up_accel(bushd_run* run) {
 // come, and the steps still to be made are the fewest whose time is not less.
 static uint16_t look_up_decel(bushd_run* run) {
   const bushd_ramp* ramp = &run->table->decel;
+  const uint16_t end = bushd_run_decel_end(run);
   const uint32_t whole = ramp->sum[run->decel_left];
   const uint32_t remaining = whole - run->since;
-  const bool over = run->since >= whole;
-  const uint16_t left = over ? (uint16_t)0 : (uint16_t)(look_up(ramp, remaining - 1) + 1);
+  const bool over = run->since >= whole - ramp->sum[end];
+  const uint16_t left = over ? end : (uint16_t)(look_up(ramp, remaining - 1) + 1);
   run->since = ramp->sum[left] - remaining;
   return left;
 }
@@ -300,9 +343,10 @@ static uint32_t advance_decel(bushd_run* run) {
 #if BUSHD_RAMP_INDEX
   if (ramp->sum != NULL) left = look_up_decel(run);
 #endif
-  while (left > 0 && run->since >= ramp->code[left - 1]) run->since -= ramp->code[--left];
+  const uint16_t end = bushd_run_decel_end(run);
+  while (left > end && run->since >= ramp->code[left - 1]) run->since -= ramp->code[--left];
   const uint32_t steps = (uint32_t)(run->decel_left - left);
-  run->decel_left = left;
+  bushd_run_set_decel(run, left);
   return steps;
 }
 
@@ -320,7 +364,7 @@ static uint32_t advance(bushd_run* run, uint32_t units) {
 #if BUSHD_RUN_BRAKES
   if (run->brake_left != 0) steps += advance_brake(run);
 #endif
-  if (run->accel_at == run->accel_end && brake_left(run) == 0) {
+  if (run->accel_at >= run->accel_end && brake_left(run) == 0) {
     if (run->cruise_left != 0) steps += advance_cruise(run);
     if (run->cruise_left == 0 && run->decel_left != 0) steps += advance_decel(run);
   }
@@ -425,7 +469,7 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   // (advance_decel).
   uint32_t i = run->decel_left - 1u;
   uint32_t now = ramp->sum[run->decel_left] - run->since - 1;
-  const uint32_t safe = safe_ramp_ticks(ramp, tick, now + 1);
+  const uint32_t safe = safe_ramp_ticks(ramp, tick, now + 1 - ramp->sum[bushd_run_decel_end(run)]);
   if (ticks > safe) ticks = (size_t)safe;
   if (tick->rest_ns == 0) {
     ramp_ticks(ramp, tick, ticks, false, true, &now, &i, &run->since_ns, out);
@@ -528,6 +572,10 @@ size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int
     out[n++ * stride] = (int16_t)(displacement * run->direction);
   }
   const size_t active = n;
+  if (n < ticks && run->fraction != 0) {
+    out[n++ * stride] = (int16_t)(-(int16_t)run->fraction * run->direction);
+    run->fraction = 0;
+  }
   for (; n < ticks; ++n) out[n * stride] = 0;
   return active;
 }

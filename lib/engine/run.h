@@ -46,7 +46,8 @@ typedef struct bushd_run {
   uint16_t cruise;       // the table's cruise delay, or the run's floor above it
   uint16_t lead_delay;   // of a step with a delay of its own, before all others; 0: none
   uint16_t accel_at;     // next index on the accelerating side
-  uint16_t accel_end;    // and where that part ends
+  uint16_t accel_end;    // and where that part ends; of a ramp-down, where it lies before accel_at,
+                         // so many steps at its end are left out
 #if BUSHD_RUN_BRAKES
   uint16_t brake_left;  // steps on the decelerating side before those at the cruise delay
 #endif
@@ -55,7 +56,17 @@ typedef struct bushd_run {
   int8_t direction;
 } bushd_run;
 
-// For run.c and run_slots.c.
+// For run.c, run_plan.c and run_slots.c. Where the decelerating side ends.
+static inline uint16_t bushd_run_decel_end(const bushd_run* run) {
+  return run->accel_at > run->accel_end ? (uint16_t)(run->accel_at - run->accel_end) : (uint16_t)0;
+}
+// Steps on it have been made; with the last one the run is done.
+static inline void bushd_run_set_decel(bushd_run* run, uint16_t left) {
+  run->decel_left = left;
+  if (left != bushd_run_decel_end(run)) return;
+  run->decel_left = 0;
+  run->accel_at = run->accel_end;
+}
 static inline void bushd_run_count(bushd_run* run, uint32_t steps) {
 #if BUSHD_RUN_COUNTS
   run->steps_done += steps;
@@ -80,15 +91,27 @@ static inline bool bushd_run_begins_later(const bushd_run* run) {
   return (int32_t)run->since < 0;
 }
 
+// A ramp-down waits for no step that is to come later: a motor that slow may just stand. The
+// running step is not made if more than this is left of it, and no step on the way down with a
+// longer delay.
+#define BUSHD_RUN_WAITS_NS UINT32_C(500000000)
+
 // A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256
-// (rounded up to whole ns) is over: that step, then D(k-1) .. D(0). It is what an MCU runs when its
-// queue ends early. O(log count).
+// (rounded up to whole ns) is over: that step, then D(k-1) .. D(0), but for those that it does not
+// wait for. It is what an MCU runs when its queue ends early. O(log count).
 void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
                                uint8_t fraction, int direction);
 
 // Shortens the run to the nearest end that its table allows: the running step is completed, then
-// the fewest steps k with D(k) <= its delay. Does nothing to a run that is done. O(log count).
+// the fewest steps k with D(k) <= its delay, but for those that it does not wait for. Does nothing
+// to a run that is done. O(log count).
 void bushd_run_ramp_down(bushd_run* run);
+// The same, but the running step is completed however long it takes: motors that follow the run may
+// have made theirs.
+void bushd_run_ramp_down_after_step(bushd_run* run);
+// Of a run that ramps down from here on: leaves out the steps that it does not wait for, but not
+// the running one. For run_plan.c.
+void bushd_run_leave_out_slow(bushd_run* run);
 
 // Changes where the run ends, in its direction, and its floor: the running step, of delay x, is
 // completed, and `steps_after` more follow. They take up the accelerating side where x stands in
@@ -104,7 +127,8 @@ void bushd_run_ramp_down(bushd_run* run);
 bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, uint16_t floor);
 
 // The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of
-// the run they are 0. Returns the number of ticks in which the run was still active (<= ticks), so
+// the run they are 0. If that came in the middle of a step, the first fine one after it leads back
+// to the whole step. Returns the number of ticks in which the run was still active (<= ticks), so
 // a return value below `ticks` says that it has ended. O(1) amortised per tick.
 // Precondition: tick_ns >= 1, bushd_table_max_steps_per_tick(table, tick_ns) <=
 // BUSHD_MAX_STEPS_PER_TICK, and a run uses one tick length and one format throughout.

@@ -29,25 +29,30 @@ static uint32_t take(uint32_t* steps, uint32_t part) {
 
 uint64_t bushd_run_units_of_last(const bushd_run* run, uint32_t steps) {
   const bushd_table* table = run->table;
-  uint64_t units = units_between(&table->decel, 0, take(&steps, run->decel_left));
+  const uint32_t end = bushd_run_decel_end(run);
+  uint64_t units = units_between(&table->decel, end, end + take(&steps, run->decel_left - end));
   units += (uint64_t)take(&steps, run->cruise_left) * run->cruise;
   const uint32_t braked = take(&steps, brake_left(run));
   units += units_between(&table->decel, run->decel_left, run->decel_left + braked);
-  const uint32_t made_up = take(&steps, (uint32_t)(run->accel_end - run->accel_at));
+  const uint32_t rising =
+      run->accel_at < run->accel_end ? (uint32_t)(run->accel_end - run->accel_at) : 0u;
+  const uint32_t made_up = take(&steps, rising);
   units += units_between(&table->accel, run->accel_end - made_up, run->accel_end);
   return steps == 0 ? units : units + run->lead_delay;
 }
 
 void bushd_run_ramp_down_once(bushd_run* run) {
   if (brake_left(run) == 0) {
-    const bool ramps_down = run->accel_at == run->accel_end && run->cruise_left == 0;
-    if (!ramps_down) bushd_run_ramp_down(run);
+    const bool ramps_down = run->accel_at >= run->accel_end && run->cruise_left == 0;
+    if (!ramps_down) bushd_run_ramp_down_after_step(run);
+    if (ramps_down && run->accel_at == run->accel_end) bushd_run_leave_out_slow(run);
     return;
   }
 #if BUSHD_RUN_BRAKES
   run->decel_left = (uint16_t)(run->decel_left + run->brake_left);
   run->brake_left = 0;
   run->cruise_left = 0;
+  bushd_run_leave_out_slow(run);
 #endif
 }
 

@@ -16,9 +16,9 @@ extern "C" {
 // ramps) without an index, else O(1).
 uint64_t bushd_run_units_of_last(const bushd_run* run, uint32_t steps);
 
-// As bushd_run_ramp_down, but a run that ramps down already, to its end or to a floor, only goes on
-// with that: equal codes that it has still to make are not left out. The interval between two steps
-// of a slow motor that follows may hold all of them.
+// As bushd_run_ramp_down_after_step, but a run that ramps down already, to its end or to a floor,
+// only goes on with that: equal codes that it has still to make are not left out. The interval
+// between two steps of a slow motor that follows may hold all of them.
 void bushd_run_ramp_down_once(bushd_run* run);
 
 // Whether the run of this table and floor is one that motors of an MCU without the capability

@@ -36,7 +36,7 @@ static void make_steps(bushd_run* run, uint8_t steps) {
   } else if (run->cruise_left != 0) {
     run->cruise_left -= steps;
   } else {
-    run->decel_left = (uint16_t)(run->decel_left - steps);
+    bushd_run_set_decel(run, (uint16_t)(run->decel_left - steps));
   }
 }
 
@@ -186,12 +186,13 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
     made = (uint8_t)(left - part->left);
     run->cruise_left -= made;
   } else {
-    const uint8_t left = part->left = at_most(run->decel_left);
+    const uint8_t left = part->left =
+        at_most((uint32_t)(run->decel_left - bushd_run_decel_end(run)));
     part->code = &table->decel.code[run->decel_left - 1u];
     part->rate = &tick->per_unit;
     bushd_run_make_on_side(part, true);
     made = (uint8_t)(left - part->left);
-    run->decel_left = (uint16_t)(run->decel_left - made);
+    bushd_run_set_decel(run, (uint16_t)(run->decel_left - made));
   }
   bushd_run_count(run, made);
   return made;
@@ -379,7 +380,10 @@ static part_codes codes_of(const bushd_run* run) {
     return (part_codes){accel + run->accel_at, (uint32_t)(run->accel_end - run->accel_at), 1};
   }
   if (run->cruise_left != 0) return (part_codes){&run->cruise, run->cruise_left, 0};
-  if (run->decel_left != 0) return (part_codes){decel + run->decel_left - 1, run->decel_left, -1};
+  if (run->decel_left != 0) {
+    const uint16_t left = (uint16_t)(run->decel_left - bushd_run_decel_end(run));
+    return (part_codes){decel + run->decel_left - 1, left, -1};
+  }
   return (part_codes){decel, 0, 0};
 }
 

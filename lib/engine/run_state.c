@@ -10,6 +10,16 @@ static bool cruises(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
   return since_ns + (uint64_t)tick_ns * ticks < step_ns * run->cruise_left;
 }
 
+bool bushd_run_has_state(const bushd_run* run) {
+  const uint32_t left = bushd_run_steps_left(run);
+  if (left == 0 || bushd_run_begins_later(run) || bushd_run_decel_end(run) != 0) return false;
+#if BUSHD_RUN_BRAKES
+  if (run->brake_left != 0) return false;
+#endif
+  // All that would come after the running step is left out.
+  return left != 1 || bushd_table_decel(run->table, 0) <= bushd_run_delay(run);
+}
+
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
   const uint16_t cruise = run->cruise == run->table->cruise ? (uint16_t)0 : run->cruise;
   const bushd_run_state state = {run->direction,       cruises(run, tick_ns, ticks),

@@ -25,9 +25,12 @@ typedef struct bushd_run_state {
   uint16_t cruise;  // the delay, time units, if above the table's; else 0
 } bushd_run_state;
 
-// The state of a run that is not done, for going on with it for `ticks` ticks. Precondition: the
-// run stands at a tick boundary, has begun (bushd_run_begin_late), and does not brake
-// (bushd_run_retarget). O(1).
+// Whether its state may be told: it is not done, has begun (bushd_run_begin_late), does not brake
+// (bushd_run_retarget), and leaves out no steps (bushd_run_ramp_down). O(1).
+bool bushd_run_has_state(const bushd_run* run);
+
+// The state of a run, for going on with it for `ticks` ticks. Precondition: bushd_run_has_state,
+// and the run stands at a tick boundary. O(1).
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks);
 
 // A run in that state; steps_done, where it is counted, begins at 0. Returns false, and leaves the

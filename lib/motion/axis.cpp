@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/run_plan.h"
+#include "engine/run_state.h"
 #include "engine/slots.h"
 
 namespace bushd::motion {
@@ -22,7 +23,7 @@ std::uint16_t at_most_16_bits(Wide units) {
 
 // It makes nothing but the end of its decelerating side.
 bool ramps_down(const bushd_run& run) {
-  return run.accel_at == run.accel_end && run.brake_left == 0 && run.cruise_left == 0;
+  return run.accel_at >= run.accel_end && run.brake_left == 0 && run.cruise_left == 0;
 }
 
 }  // namespace
@@ -353,6 +354,10 @@ void Axis::plan_end() {
   if (followed_) return plan_trajectory_end(place);
   planned_run_steps_ = run_steps(place) + run_steps_left(place);
   run_end_ = end_of(place);
+  if (change_ && effective() > start_ && !on_path() && bushd_run_done(&place.run)) {
+    // It rests at once, in the middle of a step: its MCU has to be told of a tick of rest.
+    run_end_ = std::max(run_end_, effective() + 1);
+  }
   if (share_) {
     planned_end_ = from_ + share_->direction * (line_steps(planned_run_steps_) - share_from_steps_);
     end_ = on_path() ? own_end_on_path(place) : own_end_of(place);
@@ -372,8 +377,7 @@ std::optional<Axis::RunSegment> Axis::run_at(Tick first, unsigned max_ticks) {
   go_to(first);
   Place place = head_;
   take_change(place);
-  if (bushd_run_done(&place.run) || bushd_run_begins_later(&place.run)) return std::nullopt;
-  if (place.run.brake_left != 0) return std::nullopt;
+  if (!bushd_run_has_state(&place.run)) return std::nullopt;
   Tick until = std::min(first + max_ticks, end_of(place));
   if (change_ && effective() > first) until = std::min(until, effective());
   return RunSegment{.run = place.run, .ticks = static_cast<unsigned>(until - first)};

@@ -157,7 +157,8 @@ class Axis {
 
   // The run as it is at the beginning of tick `first`, and for how many ticks (1 .. max_ticks) it
   // gives what render() would: up to the next change or the run's end. Nothing before the start, in
-  // a start tick in whose middle it begins, while it slows down to a floor, and after the end.
+  // a start tick in whose middle it begins, while it slows down to a floor, in a ramp-down that
+  // leaves out its slowest steps, and after the end.
   // Preconditions as of render().
   struct RunSegment {
     bushd_run run;

@@ -8,7 +8,9 @@ namespace bushd::motion {
 
 bool Axis::run_over(const Place& place) const {
   if (followed_) return trajectory_over(place);
-  return on_path() ? place.path.done() : bushd_run_done(&place.run);
+  if (on_path()) return place.path.done();
+  // One that has come to rest in the middle of a step goes back to the whole one in the next tick.
+  return bushd_run_done(&place.run) && (!fine() || place.run.fraction == 0);
 }
 
 std::uint32_t Axis::run_steps(const Place& place) const {

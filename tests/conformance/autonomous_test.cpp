@@ -175,6 +175,35 @@ TEST_P(Autonomous, ItMovesNoFurtherThanPositionsAreCounted) {
   }
 }
 
+// Half a configuration moves nothing, and what a master takes away ramps down.
+TEST_P(Autonomous, LocalMotionIsAMastersToBeginAndToEnd) {
+  const auto press = [this](std::uint8_t button, int ticks) {
+    to_inputs_time();
+    set_inputs({0, button});
+    pass_ticks(ticks);
+  };
+  constexpr bushd_local kOne{1 << kMotor, 0, 0};
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, kOne));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, bushd_set_inputs{}));
+  press(BUSHD_INPUT_FORWARD, 60);
+  EXPECT_EQ(steps(1, kMotor).size(), 0u);
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, kOne));
+  press(0, 10);
+  press(BUSHD_INPUT_FORWARD, 60);
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{}));
+  pass_ticks(60);
+  EXPECT_EQ(master_.poll(kReal).moving, 0);
+  const std::size_t made = steps(1, kMotor).size();
+  EXPECT_GT(made, 50u);
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, kOne));
+  pass_ticks(60);
+  EXPECT_EQ(steps(1, kMotor).size(), made) << "held all the time";
+  press(0, 10);
+  press(BUSHD_INPUT_REVERSE, 60);
+  press(0, 60);
+  EXPECT_GT(steps(1, kMotor).size(), made);
+}
+
 class KeypadLine : public Autonomous {};
 BUSHD_FOR_TARGETS(KeypadLine, targets_with(BUSHD_CAN_KEYPAD));
 
@@ -193,6 +222,7 @@ TEST_P(DeniedKeypad, IsRefused) {
 TEST_P(KeypadLine, MovesItsMotors) {
   ASSERT_NO_FATAL_FAILURE(
       ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{0, 1 << kMotor, 100}));
+  pass_ticks(200);  // 0.5 s: a key that is held would have been repeated
   using enum test::KeypadByte;
   const auto press = [this](std::uint8_t key, int ticks) {
     to_inputs_time();

@@ -121,6 +121,25 @@ TEST_P(Conformance, TableRunsKeepToTheirFloors) {
   expect_the_same_reports();
 }
 
+// Steps of 0.655 s: one that is not made within 0.5 s is not made.
+TEST_P(Conformance, ARampDownWaitsForNoStepThatIsFarAway) {
+  const std::uint8_t motor = own(9);
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {motor}));
+  std::size_t made = 0;
+  for (const auto& [ticks, steps] : {std::pair{30, 0}, {100, 1}, {300, 1}, {350, 2}}) {
+    const std::uint32_t first = master_.poll(kReal).tick + 24;
+    run_by_table(first, {{motor, 0, 1, 50, UINT16_MAX}});
+    pass_ticks(24 + ticks);
+    tell(BUSHD_MSG_EMERGENCY, {BUSHD_STOP_RAMP});
+    pass_ticks(ticks == 30 || ticks == 300 ? 10 : 210);
+    EXPECT_EQ(master_.poll(kReal).moving, 0);
+    made += static_cast<std::size_t>(steps);
+    expect_the_same_steps(motor, made);
+    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_CLEAR_FAULTS}));
+  }
+  expect_the_same_reports();
+}
+
 // Inputs are told with every report, at any time of a tick.
 TEST_P(Conformance, TurnsRoundWhilePollsCome) {
   const Bytes motors = {2, own(14)};

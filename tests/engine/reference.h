@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace bushd::test {
@@ -54,7 +55,11 @@ class Reference {
     r.append(delay);
     r.steps_.back().end -= over_ns * 256;
     r.origin_ = -over_ns * 256;
-    r.append_ramp_down(delay);
+    if (r.waits_too_long(0, 0)) {
+      r.steps_.clear();
+    } else {
+      r.append_ramp_down(delay);
+    }
     return r;
   }
 
@@ -64,12 +69,26 @@ class Reference {
     for (Step& step : steps_) step.end += Wide{ns} * 256;
   }
 
-  // From `ns` on: the running step, then the fewest steps k with D(k) <= its delay.
-  void ramp_down_at(uint64_t ns) {
+  // From `ns` on: the running step, then the fewest steps k with D(k) <= its delay. Rest begins
+  // before a step that is more than half a second away; the run of a line completes the running
+  // one.
+  void ramp_down_at(uint64_t ns, bool of_a_line = false) {
     const size_t made = steps_at(ns);
     if (made == steps_.size()) return;
+    if (!of_a_line && waits_too_long(made, ns)) {
+      begun_ = steps_[made];
+      rest_ns_ = ns;
+      return steps_.resize(made);
+    }
     steps_.resize(made + 1);
     append_ramp_down(steps_.back().delay / (Wide{law_.unit_ns} * 256));
+  }
+
+  // A ramp-down that is under way at `ns` leaves out what it would wait for, but the running step.
+  void leave_out_slow(uint64_t ns) {
+    size_t end = steps_at(ns) + 1;
+    while (end < steps_.size() && steps_[end].delay <= kHalfASecond) ++end;
+    if (end < steps_.size()) steps_.resize(end);
   }
 
   // From `ns` on: the running step, then `after` more, the accelerating side taken up where its
@@ -103,13 +122,20 @@ class Reference {
     return made;
   }
 
-  // In 1/256 step.
+  // When it has come to rest in the middle of a step, whatever it has begun of it.
+  std::optional<uint64_t> rest_ns() const {
+    return begun_ ? std::optional<uint64_t>(rest_ns_) : std::nullopt;
+  }
+
+  // In 1/256 step. What was begun of a step that is not made is gone as soon as it rests.
   int64_t position_at(uint64_t ns) const {
     const size_t made = steps_at(ns);
     int64_t position = static_cast<int64_t>(made) * 256;
-    if (made < steps_.size()) {
+    const bool begun = begun_ && ns <= rest_ns_;
+    if (made < steps_.size() || begun) {
       const Wide begin = made == 0 ? origin_ : steps_[made - 1].end;
-      position += static_cast<int64_t>((Wide{ns} * 256 - begin) * 256 / steps_[made].delay);
+      const Wide delay = made < steps_.size() ? steps_[made].delay : begun_->delay;
+      position += static_cast<int64_t>((Wide{ns} * 256 - begin) * 256 / delay);
     }
     return position;
   }
@@ -123,8 +149,9 @@ class Reference {
   // The delay of the step that runs at `ns`, in units; 0 when all are made.
   uint16_t delay_at(uint64_t ns) const {
     const size_t made = steps_at(ns);
-    if (made == steps_.size()) return 0;
-    return static_cast<uint16_t>(steps_[made].delay / (Wide{law_.unit_ns} * 256));
+    if (made == steps_.size() && (!begun_ || ns >= rest_ns_)) return 0;
+    const Wide delay = made < steps_.size() ? steps_[made].delay : begun_->delay;
+    return static_cast<uint16_t>(delay / (Wide{law_.unit_ns} * 256));
   }
 
  private:
@@ -134,15 +161,24 @@ class Reference {
     const Wide delay = units * law_.unit_ns * 256;
     steps_.push_back({delay, (steps_.empty() ? Wide{0} : steps_.back().end) + delay});
   }
+  static constexpr Wide kHalfASecond = Wide{500'000'000} * 256;
+  bool waits_too_long(size_t step, uint64_t ns) const {
+    return steps_[step].end - Wide{ns} * 256 > kHalfASecond;
+  }
   void append_ramp_down(Wide delay) {
     size_t k = 0;
     while (k < law_.decel.size() && law_.decel_at(k) > delay) ++k;
-    while (k-- > 0) append(law_.decel_at(k));
+    while (k-- > 0) {
+      if (law_.decel_at(k) * law_.unit_ns * 256 > kHalfASecond) return;
+      append(law_.decel_at(k));
+    }
   }
 
   Law law_;
   std::vector<Step> steps_;
   Wide origin_ = 0;
+  std::optional<Step> begun_;  // and not made
+  uint64_t rest_ns_ = 0;
 };
 
 }  // namespace bushd::test

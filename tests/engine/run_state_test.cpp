@@ -71,7 +71,7 @@ void goes_on_as_the_original(Format format) {
   const Tables tables(any_law());
   const uint32_t tick_ns = any_tick_ns(tables.host.law());
   bushd_run run = any_run(tables.host, format, tick_ns);
-  RC_PRE(!bushd_run_done(&run) && run.brake_left == 0);
+  RC_PRE(bushd_run_has_state(&run));
   const auto ticks = between<uint16_t>(1, 190);
   const bushd_run_state state = through_a_frame(bushd_run_save(&run, tick_ns, ticks));
   bushd_run taken_up;

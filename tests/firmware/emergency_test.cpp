@@ -1,5 +1,7 @@
 // EMERGENCY: all stop from the first tick that is not prepared, and every step is counted.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numeric>
 
 #include "firmware/streams.h"
@@ -108,6 +110,41 @@ TEST_P(Emergency, RampsAStreamDownFromEveryTick) {
     }
     SCOPED_TRACE(n);
     expect_steps(after_emergency(fresh, BUSHD_STOP_RAMP), expected, 1);
+  }
+}
+
+// A step in 800 ticks and more: most ticks of the stream are without a displacement. By its table
+// two of these make one step more, D(0), and the others none.
+TEST_P(Emergency, OfAMotorThatIsSlowMakesNoStepMoreThanItsTable) {
+  if (format != BUSHD_FORMAT_FINE)
+    GTEST_SKIP() << "the coarse one tells no speed below a step in four ticks";
+  const Law slow{{2000, 400, 150, 40}, {2000, 400, 150, 40}, 40, 1'000'000};
+  constexpr std::uint32_t kShortNs = 250'000;
+  for (const std::uint16_t delay : std::array<std::uint16_t, 4>{200, 460, 700, 2000}) {
+    Law even = slow;
+    even.accel = even.decel = {delay};
+    even.cruise = delay;
+    const Plan moves = plan_move(even, 4, kShortNs, format);
+    for (const double at : {0.3, 1.1, 1.6, 1.9, 2.7}) {
+      Rig fresh({.queue_ticks = 16384});
+      fresh.make_ready(slow, format);
+      ASSERT_EQ(fresh.configure(format, kShortNs), BUSHD_OK);
+      fresh.sync_to(1000);
+      ASSERT_EQ(fresh.assign(0, 0), BUSHD_OK);
+      const std::uint32_t start = fresh.first_open();
+      for (std::size_t from = 0; from < moves.ticks() && from < 16000; from += 100) {
+        ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 100)), BUSHD_OK);
+      }
+      fresh.pass(static_cast<int>(at * delay * 1e6 / kShortNs) - 1);
+      fresh.emergency(BUSHD_STOP_RAMP);
+      fresh.pass(1'200'000'000 / kShortNs);
+      SCOPED_TRACE(std::to_string(delay) + " ms, stopped after " + std::to_string(at) + " steps");
+      EXPECT_EQ(fresh.poll().moving, 0);
+      const double left_ms = (std::ceil(at) - at) * delay;
+      const int steps = left_ms > 500 ? 0 : delay < 400 ? 2 : 1;
+      EXPECT_EQ(fresh.pulses(0), static_cast<std::int64_t>(at) + steps);
+      EXPECT_EQ(fresh.poll().motor[0].position_steps, fresh.pulses(0));
+    }
   }
 }
 

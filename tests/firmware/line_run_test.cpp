@@ -222,7 +222,7 @@ TEST_P(LineRun, IsRampedDownAlongTheLineWhenNoSyncTellsTheTime) {
   }
   rig.pass_until_rest();
   auto run = Reference::move(law, 333);
-  run.ramp_down_at(std::uint64_t{told + kSilence - first} * Rig::kTickNs);
+  run.ramp_down_at(std::uint64_t{told + kSilence - first} * Rig::kTickNs, true);
   ASSERT_LT(run.steps(), 333u);
   expect_on_line(rig, kOnLine, 333, static_cast<std::uint32_t>(run.steps()));
   const bushd_report report = rig.poll();
@@ -239,7 +239,7 @@ TEST_P(LineRun, GoesOnForThatLongFromItsBeginning) {
   ASSERT_EQ(start(rig, {.first = first, .motors = kOnLine, .longest = 333}), BUSHD_OK);
   rig.pass_until_rest();
   auto run = Reference::move(law, 333);
-  run.ramp_down_at(std::uint64_t{kSilence} * Rig::kTickNs);
+  run.ramp_down_at(std::uint64_t{kSilence} * Rig::kTickNs, true);
   expect_on_line(rig, kOnLine, 333, static_cast<std::uint32_t>(run.steps()));
   EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
 }
@@ -269,7 +269,7 @@ TEST_P(LineRun, EmergencyRampLeadsAlongTheLine) {
     fresh.emergency(BUSHD_STOP_RAMP);
     fresh.pass_until_rest();
     auto run = Reference::move(law, 333);
-    run.ramp_down_at(std::uint64_t{from - first} * Rig::kTickNs);
+    run.ramp_down_at(std::uint64_t{from - first} * Rig::kTickNs, true);
     SCOPED_TRACE(wait);
     // One that has not begun does not begin.
     expect_on_line(fresh, kOnLine, 333, wait == 0 ? 0 : static_cast<std::uint32_t>(run.steps()));

@@ -171,7 +171,7 @@ TEST_P(LineTrigger, IsRampedDownAlongTheLineInSilence) {
   rig.trigger(1'234'567);
   const bushd_report report = rig.poll();
   auto run = Reference::move(law, 333);
-  run.ramp_down_at(std::uint64_t{kSilence} * Rig::kTickNs - report.start_ns);
+  run.ramp_down_at(std::uint64_t{kSilence} * Rig::kTickNs - report.start_ns, true);
   rig.pass_until_rest();
   ASSERT_LT(run.steps(), 333u);
   bushd_line other;

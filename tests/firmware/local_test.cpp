@@ -204,7 +204,8 @@ TEST_P(Local, MotorsThatTheMcuDoesNotHaveAreRefused) {
   expect_rest_as_counted();
 }
 
-// What a master takes away from them ramps down, and waits for the next press when it is given back.
+// What a master takes away from them ramps down, and waits for the next press when it is given
+// back.
 TEST_P(Local, AMasterEndsItAndTheButtonMustBeReleasedFirst) {
   hold(BUSHD_INPUT_FORWARD, 130);
   ASSERT_EQ(rig.poll().autonomous, kLocal);

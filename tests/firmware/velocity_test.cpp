@@ -186,12 +186,11 @@ TEST_P(Velocity, TurnedBackWhileALimitBrakesItGoesOnThroughZero) {
   expect_counted();
 }
 
-// The other input is pressed, and the limit on the new way becomes active while the motor still goes
-// the old one: it comes to rest, whenever that is. If it has turned already, it brakes.
+// The other input is pressed, and the limit on the new way becomes active while the motor still
+// goes the old one: it comes to rest, whenever that is. If it has turned already, it brakes.
 TEST_P(Velocity, ALimitThatComesWhileItTurnsLetsNoStepIntoIt) {
-  const std::vector<bushd_set_velocity> all = {{kMotor, 200 * 64, 1000 * 64, 20000},
-                                               {kMotor, 400 * 64, 2000 * 64, 900},
-                                               kSettings};
+  const std::vector<bushd_set_velocity> all = {
+      {kMotor, 200 * 64, 1000 * 64, 20000}, {kMotor, 400 * 64, 2000 * 64, 900}, kSettings};
   for (const bushd_set_velocity& settings : all) {
     ASSERT_EQ(rig.velocity(settings), BUSHD_OK);
     for (const int direction : {1, -1}) {

@@ -45,7 +45,9 @@ Tick ticks_until_rest(const Reference& reference, std::uint32_t tick_ns) {
   Tick ticks = 0;
   while (reference.steps_at(static_cast<std::uint64_t>(ticks) * tick_ns) < reference.steps())
     ++ticks;
-  return ticks;
+  // One that rests in the middle of a step has to be told so for a tick.
+  const auto rest_ns = reference.rest_ns();
+  return rest_ns ? std::max(ticks, static_cast<Tick>(*rest_ns / tick_ns) + 1) : ticks;
 }
 
 std::vector<std::int16_t> render(Axis& axis, Tick first, unsigned count) {

@@ -15,7 +15,7 @@ from collections import namedtuple
 from itertools import accumulate
 
 from check_trace.emission import PERIODIC
-from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK, Move, Step
+from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK, MOST_WAIT_NS, Move, Step
 
 STEP = 2**32
 SHARE_BITS = 40
@@ -191,6 +191,8 @@ class ArrayMove(Move):
             delay = max(delay, min(self.table.accel[-1], self.table.decel[-1], self.table.cruise))
             delays = [delay, *self.table.ramp_down(delay)]
         since_ns = -(-delays[0] * unit_ns * begun // 256) if delays else 0
+        if delays and delays[0] * unit_ns - since_ns > MOST_WAIT_NS:
+            delays = []
         ends = list(accumulate(code * unit_ns for code in delays))
         done = 0
         while True:

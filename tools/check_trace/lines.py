@@ -17,7 +17,7 @@ import math
 from fractions import Fraction
 from itertools import accumulate
 
-from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK, PERIODIC, Move, Step, Table
+from check_trace.motion import FIRST_TICK, INTERIOR, LAST_TICK, MOST_WAIT_NS, PERIODIC, Move, Step, Table
 
 MOST_CODES = 32767
 MOST_UNITS = 2**31 - 1
@@ -110,13 +110,20 @@ class Run:
     def _ramps_down(self, running):
         return self.kinds[running] in ("down", "lead") and all(kind == "down" for kind in self.kinds[running + 1 :])
 
+    def _waited_for(self, ramp):
+        return [delay for delay in ramp if delay * self._table.unit_ns <= MOST_WAIT_NS]
+
     def ramp_down(self, running):
         """From the step `running`, counted from 0, on. A ramp that is under way goes on."""
         if self._ramps_down(running):
+            ramp = self._waited_for(self.delays[running + 1 :])
+            del self.delays[running + 1 + len(ramp) :]
+            del self.kinds[running + 1 + len(ramp) :]
+            self.ends = list(accumulate(self.delays))
             return
         index = self.kinds[running]
         if isinstance(index, int):
-            ramp = [self._table.delay_before_end(k) for k in range(index - 1, -1, -1)]
+            ramp = self._waited_for(self._table.delay_before_end(k) for k in range(index - 1, -1, -1))
         else:
             ramp = self._table.ramp_down(self.delays[running])
         self._lead(running)
@@ -127,7 +134,7 @@ class Run:
     def retarget(self, running, steps, floor):
         """To `steps` in all. Returns False if its ramp-down takes more, or would be shortened."""
         delay = self.delays[running]
-        ramp = self._table.ramp_down(delay)
+        ramp = self._table.way_down(delay)
         after = steps - running - 1
         if after < len(ramp) or (self._ramps_down(running) and steps < len(self.delays)):
             return False

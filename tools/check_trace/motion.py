@@ -39,6 +39,9 @@ from check_trace.problems import InputError
 Step = namedtuple("Step", "move number time_ns emitted_ns early_ns tick nth direction place bound_ns")
 INTERIOR, FIRST_TICK, LAST_TICK = range(3)
 
+# A ramp-down waits no longer for a step (docs/tables.md).
+MOST_WAIT_NS = 500_000_000
+
 
 class Table:
     def __init__(self, path, content):
@@ -68,7 +71,11 @@ class Table:
         )
 
     def ramp_down(self, delay):
-        """The delays that bring a motor to rest after a step made at `delay`."""
+        """The delays that bring a motor to rest after a step made at `delay`: as `way_down`, but for those that it does not wait for."""
+        return [down for down in self.way_down(delay) if down * self.unit_ns <= MOST_WAIT_NS]
+
+    def way_down(self, delay):
+        """From a step made at `delay` down to the slowest one."""
         fewest = next(k for k in range(len(self.decel) + 1) if self.delay_before_end(k) <= delay)
         return [self.delay_before_end(k) for k in range(fewest - 1, -1, -1)]
 
@@ -77,7 +84,7 @@ class Table:
         a = next(i for i in range(len(self.accel) + 1) if self.delay_from_start(i) <= delay)
         if self.delay_from_start(a) == delay:
             a += 1
-        floors = chain((min(floor, down) for down in self.ramp_down(delay)), repeat(floor))
+        floors = chain((min(floor, down) for down in self.way_down(delay)), repeat(floor))
         return (
             max(self.delay_from_start(a + j - 1), self.delay_before_end(steps - j), self.cruise, least)
             for j, least in zip(range(1, steps + 1), floors)
@@ -93,6 +100,7 @@ class Plan:
         self._unit_ns = unit_ns
         self.delays = []
         self.times_ns = []
+        self.begun = None  # a step that is not made: its delay, and when the motor rests
         self.go_on(0, (), 0)
 
     def go_on(self, done, rest, count):
@@ -167,14 +175,17 @@ class Move:
         if done == plan.count:
             return
         running = plan.delays[done]
-        rest = self.table.ramp_down(running)
-        count = len(rest)
         if target_steps is not None:
             after = (target_steps - self.from_steps) * self.direction - (done + 1)
-            if after >= count:
-                rest = self.table.onward(running, after, floor)
-                count = after
-        plan.go_on(done + 1, rest, count)
+            if after >= len(self.table.way_down(running)):
+                plan.go_on(done + 1, self.table.onward(running, after, floor), after)
+                return
+        if plan.times_ns[done] - until_ns > MOST_WAIT_NS:
+            plan.begun = (running, until_ns)
+            plan.go_on(done, (), 0)
+            return
+        rest = self.table.ramp_down(running)
+        plan.go_on(done + 1, rest, len(rest))
 
     def too_close(self):
         """A step that comes sooner than its table allows: none, where the table alone makes the delays."""
@@ -192,6 +203,9 @@ class Move:
         """Every step: when by the table, and when by way of ticks and slots."""
         times = self.times_ns()
         delays = self._plan.delays
+        begun_delay, rest_ns = self._plan.begun or (0, -1)
+        if begun_delay:
+            delays = [*delays, begun_delay]
         crossing = 256 if self.fine else 128
         made = 0
         q0 = 0  # position at the beginning of the tick, 1/256 step
@@ -200,11 +214,11 @@ class Move:
             end_ns = (tick + 1) * self.tick_ns
             after = bisect.bisect_right(times, end_ns, made)
             q1 = 256 * after
-            if self.fine and after < len(times):
+            if self.fine and (after < len(times) or end_ns <= rest_ns):
                 since_ns = end_ns - (times[after - 1] if after else self.late_ns)
                 q1 += since_ns * 256 // (delays[after] * self.table.unit_ns)
             if after > made:
-                last = after == len(times)
+                last = after == len(times) and end_ns > rest_ns
                 place = LAST_TICK if last else FIRST_TICK if tick == 0 else INTERIOR
                 stands = last or (tick == 0 and self.late_ns > 0)  # in a part of the tick
                 bound_ns = self.bound_ns(delays[made : after + 1], stands, q1 - q0, slots)

@@ -192,6 +192,20 @@ class RightTraces(CheckTraceTest):
                 with self.subTest(seed=seed, round=round_number):
                     self.assert_right(scene)
 
+    def test_a_stop_waits_for_no_step_that_is_far_away(self):
+        table = {"time_unit_ns": 40_000, "accel": [60000, 20000, 13000, 12500, 12000, 3000, 1000, 200]}
+        self.write_table(table)
+        # The first step takes 2.4 s, the second one 0.8, then come 0.52, 0.5 and 0.48 s.
+        ticks_of_s = 1_000_000_000 / TICK_NS
+        for fine, moves in itertools.product((True, False), ("stream", "table")):
+            for after_s, steps in ((0.5, 0), (1.8, 0), (1.95, 1), (2.6, 1), (2.75, 2), (3.21, 2), (3.8, 4), (4.9, 16)):
+                with self.subTest(fine=fine, moves=moves, after_s=after_s):
+                    scene = synthetic.Scene(table, self.table_file, fine, moves)
+                    scene.move("other", 1, 4, 100, 20, move_id=2)
+                    stop = 100 + int(after_s * ticks_of_s)
+                    self.assertEqual(scene.move("m", 1, 5, 100, -500, stop_tick=stop), steps)
+                    self.assert_right(scene)
+
     def test_a_stop_before_the_start_makes_no_step(self):
         scene = self.scene()
         self.assertEqual(scene.move("chi", 2, 0, 400, 50, stop_tick=400, move_id=7), 0)

@@ -33,18 +33,31 @@ def sha256_of(table):
     return hashlib.sha256("".join(str(number) + " " for number in numbers).encode("ascii")).hexdigest()
 
 
+def way_down(table, delay):
+    """The delays of the fewest steps that follow one made at `delay`, to rest."""
+    decel = table.get("decel", table["accel"][::-1])
+    ways = (k for k in range(len(decel)) if decel[len(decel) - 1 - k] <= delay)
+    k = next(ways, len(decel))
+    return decel[len(decel) - k :]
+
+
+def is_far(ns):
+    """Nobody waits for a step that is so far away, by the rule in docs/tables.md."""
+    return 2 * ns > 1_000_000_000
+
+
 def stopped(table, delays, after_ns):
     """The delays of a move that is stopped `after_ns` after its time 0."""
     if after_ns <= 0:
         return []
-    decel = table.get("decel", table["accel"][::-1])
+    unit_ns = table["time_unit_ns"]
     now = 0
     for done, delay in enumerate(delays):
-        now += delay * table["time_unit_ns"]
+        now += delay * unit_ns
+        if now > after_ns and is_far(now - after_ns):
+            return delays[:done]
         if now > after_ns:
-            ways = (k for k in range(len(decel)) if decel[len(decel) - 1 - k] <= delay)
-            k = next(ways, len(decel))
-            return delays[: done + 1] + decel[len(decel) - k :]
+            return delays[: done + 1] + [code for code in way_down(table, delay) if not is_far(code * unit_ns)]
     return delays
 
 
@@ -52,7 +65,6 @@ def retargeted(table, delays, after_ns, target):
     """The delays of a move whose target, in steps from its start, is another from `after_ns` on."""
     if after_ns <= 0:
         return delays_of(table, target)
-    ramp = stopped(table, delays, after_ns)
     now = 0
     for done, delay in enumerate(delays, 1):
         now += delay * table["time_unit_ns"]
@@ -60,8 +72,8 @@ def retargeted(table, delays, after_ns, target):
             break
     else:
         return delays
-    if target < len(ramp):
-        return ramp
+    if target < done + len(way_down(table, delay)):
+        return stopped(table, delays, after_ns)
     # As long a move as no ramp at its ends can disturb, from where its delay is that of the running step.
     accel, cruise = table["accel"], table.get("cruise", table["accel"][-1])
     up = [max(code, cruise) for code in accel] + [cruise] * (target + 1)
@@ -73,9 +85,9 @@ def retargeted(table, delays, after_ns, target):
     return delays[:done] + [max(a, d) for a, d in zip(up, down)]
 
 
-def edges_of(table, delays, fine, ticks_from_ns, late_ns=0):
+def edges_of(table, delays, fine, ticks_from_ns, late_ns=0, begun=None):
     """ns since the start tick's beginning of every edge of a move, which begins late_ns after that; before ticks_from_ns the
-    table is run as it is."""
+    table is run as it is. `begun`: the delay of a step that is not made, and when the motor rests."""
     times = [late_ns]
     for delay in delays:
         times.append(times[-1] + delay * table["time_unit_ns"])
@@ -85,6 +97,9 @@ def edges_of(table, delays, fine, ticks_from_ns, late_ns=0):
         whole = 0
         while whole < len(delays) and times[whole + 1] <= at_ns:
             whole += 1
+        if whole == len(delays) and fine and begun and at_ns <= begun[1]:
+            part = Fraction(at_ns - times[-1], begun[0] * table["time_unit_ns"])
+            return whole + Fraction(int(part * 256), 256)
         if whole == len(delays) or not fine or at_ns < late_ns:
             return Fraction(whole)
         part = Fraction(at_ns - times[whole], times[whole + 1] - times[whole])
@@ -140,9 +155,13 @@ class Scene:
         })
         self.ticks_from_ns[motor] = math.inf if self.moves == "table" else 0
         result = "reached"
+        begun = None
         if stop_tick is not None:
+            whole = delays
             after_ns = self._changed(motor, (stop_tick - start_tick) * TICK_NS)
             delays = stopped(self.table, delays, after_ns if after_ns <= 0 else after_ns - late_ns)
+            if after_ns > 0 and len(delays) < len(whole) and late_ns + sum(delays) * self.table["time_unit_ns"] <= after_ns:
+                begun = (whole[len(delays)], after_ns)
             self.events.append({"event": "stop", **event, "tick": stop_tick})
             if len(delays) != abs(steps):
                 result = "stopped"
@@ -151,7 +170,7 @@ class Scene:
         self.delays[motor] = delays
         self.events.append({"event": "result", **event, "result": result, "position_steps": end})
         own = self.edges.setdefault((address, output), [])
-        own += self._edges(motor, delays, start_tick, direction, late_ns)
+        own += self._edges(motor, delays, start_tick, direction, late_ns, begun)
         return len(delays)
 
     def change(self, motor, event, tick, target=None):
@@ -208,8 +227,8 @@ class Scene:
         self.ticks_from_ns[motor] = min(self.ticks_from_ns[motor], after_ns)
         return after_ns
 
-    def _edges(self, motor, delays, start_tick, direction, late_ns=0):
-        edges = edges_of(self.table, delays, self.fine, self.ticks_from_ns[motor], late_ns)
+    def _edges(self, motor, delays, start_tick, direction, late_ns=0, begun=None):
+        edges = edges_of(self.table, delays, self.fine, self.ticks_from_ns[motor], late_ns, begun)
         if self.burst_slots:
             step, first = self.burst_slots
             ticks = [at // TICK_NS for at in edges]
