@@ -31,7 +31,7 @@ constexpr const char* kRemedy = "end it, or give this one another prefix in [lcm
 // Multicast reaches the network namespace of a process, and no other; what comes after '?' in a URL
 // does not choose the network.
 std::string lock_name(const config::Lcm& lcm) {
-  struct stat network {};
+  struct stat network{};
   if (::stat("/proc/self/ns/net", &network) != 0) network.st_ino = 0;
   const std::string where =
       fmt::format("{} {}", lcm.url.substr(0, lcm.url.find('?')), network.st_ino);

@@ -25,7 +25,7 @@ Result<MoveLog> MoveLog::open(const std::string& path, std::uint64_t max_bytes) 
   const int fd =
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
   const int error = errno;
-  struct stat status {};
+  struct stat status{};
   const bool is_there = fd >= 0 ? ::fstat(fd, &status) == 0 : ::stat(path.c_str(), &status) == 0;
   if (is_there && !S_ISREG(status.st_mode) && !is_null_device(status)) {
     if (fd >= 0) ::close(fd);
@@ -47,15 +47,15 @@ MoveLog::~MoveLog() {
 }
 
 bool MoveLog::is_at_its_path() const {
-  struct stat open {};
-  struct stat there {};
+  struct stat open{};
+  struct stat there{};
   return ::fstat(fd_, &open) == 0 && ::stat(path_.c_str(), &there) == 0 &&
          open.st_dev == there.st_dev && open.st_ino == there.st_ino;
 }
 
 // What is no regular file never fills.
 bool MoveLog::has_room(std::size_t bytes) const {
-  struct stat status {};
+  struct stat status{};
   if (::fstat(fd_, &status) != 0 || !S_ISREG(status.st_mode) || status.st_size == 0) return true;
   return static_cast<std::uint64_t>(status.st_size) + bytes <= max_bytes_;
 }
@@ -88,7 +88,7 @@ Result<MoveLog::Appended> MoveLog::append(const std::string& line) {
   if (n == static_cast<ssize_t>(text.size())) return appended;
   const int error = errno;
   // Half a line would spoil the next one too.
-  struct stat status {};
+  struct stat status{};
   if (n > 0 && ::fstat(fd_, &status) == 0) {
     static_cast<void>(::ftruncate(fd_, status.st_size - n));
   }

@@ -23,7 +23,7 @@ bool journal_used = false;
 // $JOURNAL_STREAM is DEVICE:INODE of the stream; standard error may have been redirected since.
 bool is_journal(int fd) {
   const char* stream = std::getenv("JOURNAL_STREAM");
-  struct stat status {};
+  struct stat status{};
   if (stream == nullptr || ::fstat(fd, &status) != 0) return false;
   return std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino) == stream;
 }

@@ -118,7 +118,7 @@ static void shape_phases(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
       uint8_t* const phase = &mcu->emission.of.windings.phase[m];
       *phase = next_phase(*phase, count, (slot_buffer->direction & motor_bit(m)) != 0);
       if ((on & motor_bit(m)) == 0) continue;
-      levels &= (uint16_t) ~(0xFu << (BUSHD_PHASE_OUTPUTS * m));
+      levels &= (uint16_t)~(0xFu << (BUSHD_PHASE_OUTPUTS * m));
       levels |= levels_of(mcu, m);
     }
     slot_buffer->step[slot] = levels;

@@ -145,7 +145,7 @@ bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, ui
   uint32_t ticks;
   uint32_t spare_ns;
   if (!make(mcu, part, &ticks, &spare_ns)) return BUSHD_E_CAPACITY;
-  mcu->stream.starting &= (uint16_t) ~*motors;
+  mcu->stream.starting &= (uint16_t)~*motors;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((*motors & motor_bit(m)) == 0) continue;
     mcu->motor[m].on_line.until = ticks;

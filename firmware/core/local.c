@@ -69,7 +69,7 @@ static void steer_held(bushd_mcu* mcu) {
 static void begin_held(bushd_mcu* mcu) {
   steer_held(mcu);
   if ((mcu->local.held & ~mcu->autonomous) == 0) return;
-  mcu->local.held &= (uint16_t) ~(bushd_mcu_engaged(mcu) & ~mcu->autonomous);
+  mcu->local.held &= (uint16_t)~(bushd_mcu_engaged(mcu) & ~mcu->autonomous);
   uint16_t begins =
       (uint16_t)(mcu->local.held & ~mcu->autonomous & ~bushd_mcu_forbidden(mcu, mcu->local.wish));
   for (uint8_t m = 0; begins != 0; ++m, begins = (uint16_t)(begins >> 1)) {

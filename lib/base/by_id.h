@@ -8,7 +8,7 @@
 
 namespace bushd {
 
-// The first `size` identifiers. (The views of <ranges> are nothing that clang 14 can read.)
+// The first `size` identifiers.
 template <class Id>
 class Ids {
  public:

@@ -23,7 +23,7 @@ constexpr int kPacketsAtOnce = 256;
 
 // Who has a right to this socket, and how one becomes one of them.
 std::string no_right(const std::string& path) {
-  struct stat status {};
+  struct stat status{};
   const group* entry = ::stat(path.c_str(), &status) == 0 ? ::getgrgid(status.st_gid) : nullptr;
   if (entry != nullptr && entry->gr_gid == 0) {
     return "this user has no right to the control socket: it is for root only. Set [control] group "

@@ -22,7 +22,7 @@ constexpr std::string_view kInputRule =
 struct Use {
   std::string_view key;  // of `inputs`
   std::string_view name;
-  std::optional<Input> MotorInputs::*input;
+  std::optional<Input> MotorInputs::* input;
 };
 constexpr std::array<Use, 4> kUses = {{{"positive", "positive limit", &MotorInputs::positive},
                                        {"negative", "negative limit", &MotorInputs::negative},

@@ -46,7 +46,7 @@ Result<void> read_lines(const TomlReader& bus, MotorInputs* lines) {
   if (auto known = reader->only({"positive", "negative", "home"}); !known) return known;
   struct Use {
     std::string_view key;
-    std::optional<Input> MotorInputs::*input;
+    std::optional<Input> MotorInputs::* input;
   };
   for (const Use& use :
        {Use{"positive", &MotorInputs::positive}, Use{"negative", &MotorInputs::negative},

@@ -71,7 +71,7 @@ Result<void> give_to_group(const std::string& path, const std::string& group) {
                       .file = path});
   }
   // A service whose unit has that group needs no right to give files away, and may have none.
-  struct stat status {};
+  struct stat status{};
   if (::stat(path.c_str(), &status) == 0 && status.st_gid == entry->gr_gid) return {};
   if (::chown(path.c_str(), static_cast<uid_t>(-1), entry->gr_gid) != 0) {
     Error error = system_error("the socket cannot be given to group " + group, path);

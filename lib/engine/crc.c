@@ -54,11 +54,9 @@ static inline uint32_t crc_nibbles(uint32_t crc, uint8_t byte) {
 #define SIXTYFOUR(b, ...)                                                              \
   SIXTEEN(b, __VA_ARGS__), SIXTEEN(b + 16, __VA_ARGS__), SIXTEEN(b + 32, __VA_ARGS__), \
       SIXTEEN(b + 48, __VA_ARGS__)
-#define ROW(...)                                                                        \
-  {                                                                                     \
-    SIXTYFOUR(0, __VA_ARGS__), SIXTYFOUR(64, __VA_ARGS__), SIXTYFOUR(128, __VA_ARGS__), \
-        SIXTYFOUR(192, __VA_ARGS__)                                                     \
-  }
+#define ROW(...)                                                                       \
+  {SIXTYFOUR(0, __VA_ARGS__), SIXTYFOUR(64, __VA_ARGS__), SIXTYFOUR(128, __VA_ARGS__), \
+   SIXTYFOUR(192, __VA_ARGS__)}
 
 CONST_TABLE IN_FLASH uint32_t kSlice[BUSHD_CRC_SLICES][256] = {
     ROW(0x77073096, 0xEE0E612C, 0x076DC419, 0x0EDB8832, 0x1DB71064, 0x3B6E20C8, 0x76DC4190,

@@ -115,7 +115,7 @@ void bushd_emission_defer(uint16_t* masks, uint16_t motors, uint16_t setup_slots
     uint16_t early = masks[slot] & motors;
     masks[slot] &= (uint16_t)~early;
     for (uint16_t* later = masks + setup_slots; early != 0; ++later) {
-      const uint16_t placed = early & (uint16_t) ~*later;
+      const uint16_t placed = early & (uint16_t)~*later;
       *later |= placed;
       early &= (uint16_t)~placed;
     }

@@ -9,7 +9,7 @@ static bushd_line_entry get_entry(reader* r, bool* in_range) {
   const uint8_t head = get8(r);
   const bushd_line_entry entry = {(uint8_t)(head & HEAD_MOTOR), head & HEAD_POSITIVE ? 1 : -1,
                                   get32(r)};
-  if ((head & (uint8_t) ~(HEAD_MOTOR | HEAD_POSITIVE)) != 0) *in_range = false;
+  if ((head & (uint8_t)~(HEAD_MOTOR | HEAD_POSITIVE)) != 0) *in_range = false;
   return entry;
 }
 

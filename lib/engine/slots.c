@@ -11,7 +11,7 @@ int16_t bushd_slots_plan(int16_t displacement, int16_t* remainder, int16_t cross
                          bushd_slots* plan) {
   const bool back = displacement < 0;
   const uint16_t distance = back ? (uint16_t)-displacement : (uint16_t)displacement;
-  const int16_t progress = back ? (int16_t) - *remainder : *remainder;  // in this tick's direction
+  const int16_t progress = back ? (int16_t)-*remainder : *remainder;  // in this tick's direction
   // A crossing at x <= 0 cannot be: the step would have been made in the tick before.
   const uint16_t first = crossing > progress ? (uint16_t)(crossing - progress) : 0;
   if (distance == 0 || first > distance) {

@@ -27,8 +27,7 @@ struct Rate {
   std::uint32_t baud;
   LibSerial::BaudRate rate;
 };
-#define BUSHD_RATE(n) \
-  { n, LibSerial::BaudRate::BAUD_##n }
+#define BUSHD_RATE(n) {n, LibSerial::BaudRate::BAUD_##n}
 constexpr Rate kRates[] = {
     BUSHD_RATE(50),      BUSHD_RATE(75),      BUSHD_RATE(110),     BUSHD_RATE(134),
     BUSHD_RATE(150),     BUSHD_RATE(200),     BUSHD_RATE(300),     BUSHD_RATE(600),
@@ -58,7 +57,7 @@ bool is_console(const struct stat& status) {
 // only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot
 // be destroyed.
 Result<int> open_and_lock(const std::string& path) {
-  struct stat status {};
+  struct stat status{};
   if (::stat(path.c_str(), &status) == 0 && is_console(status)) {
     return fail(Error{.message = "is a console, not a serial port; name the port that the line is "
                                  "connected to",

@@ -26,7 +26,7 @@ class RealFile final : public File {
   RealFile& operator=(const RealFile&) = delete;
 
   Result<std::uint64_t> size() override {
-    struct stat status {};
+    struct stat status{};
     if (::fstat(fd_, &status) != 0) return failed(path_, "cannot be looked at");
     return static_cast<std::uint64_t>(status.st_size);
   }

@@ -166,7 +166,7 @@ TEST_F(ServerTest, TellsWhoIsThere) {
 
 TEST_F(ServerTest, TheFileHasItsRights) {
   open();
-  struct stat status {};
+  struct stat status{};
   ASSERT_EQ(::stat(path_.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 07777u, 0660u);
   server_.reset();

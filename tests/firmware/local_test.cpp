@@ -127,9 +127,7 @@ TEST_P(Local, ACutIsNoRampWhoeverAsksForIt) {
   ASSERT_EQ(rig.local(kLocal), BUSHD_OK);
   const std::vector<std::function<void()>> cuts = {
       [&] { rig.emergency(BUSHD_STOP_IMMEDIATE); },
-      [&] {
-        rig.pins({0, BUSHD_INPUT_FORWARD | BUSHD_INPUT_EMERGENCY});
-      },
+      [&] { rig.pins({0, BUSHD_INPUT_FORWARD | BUSHD_INPUT_EMERGENCY}); },
       [&] { rig.current(600); },
       [&] {
         rig.pins({0b0101, BUSHD_INPUT_FORWARD});

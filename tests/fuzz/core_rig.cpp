@@ -30,10 +30,8 @@ void CoreRig::boot() {
   static constexpr auto self = [](void* context) { return static_cast<CoreRig*>(context); };
   const bushd_port port = {
       .context = this,
-      .transmit =
-          [](void* context, const std::uint8_t* wire, std::size_t size, std::uint32_t delay_ns) {
-            self(context)->transmit({wire, size}, delay_ns);
-          },
+      .transmit = [](void* context, const std::uint8_t* wire, std::size_t size,
+                     std::uint32_t delay_ns) { self(context)->transmit({wire, size}, delay_ns); },
       .store_address =
           [](void* context, std::uint8_t address) {
             self(context)->address_ = address;

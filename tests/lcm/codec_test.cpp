@@ -249,17 +249,16 @@ TEST(Codec, RepliesArriveAsTheyWereMeant) {
   EXPECT_TRUE(std::holds_alternative<api::Accepted>(reply_over_the_wire(api::Accepted{}).reply));
   EXPECT_EQ(std::get<api::Refused>(reply_over_the_wire(api::Refused{"why"}).reply).reason, "why");
   const api::TableRef table{.name = "own", .revision = 2, .hash = "0123abcd"};
-  const auto moved =
-      std::get<api::Completed>(
-          reply_over_the_wire(
-              api::Completed{
-                  .outcome = api::Outcome::kLimit,
-                  .reason = "theta: stopped",
-                  .detail =
-                      std::vector<api::MotorResult>{
-                          {"theta", api::Outcome::kLimit, 7, 1.75, -0.25, "mm", 2, table, "me"},
-                          {"chi", api::Outcome::kReached, 9, 9, 9, "steps", 0, table}}})
-              .reply);
+  const auto moved = std::get<api::Completed>(
+      reply_over_the_wire(
+          api::Completed{
+              .outcome = api::Outcome::kLimit,
+              .reason = "theta: stopped",
+              .detail =
+                  std::vector<api::MotorResult>{
+                      {"theta", api::Outcome::kLimit, 7, 1.75, -0.25, "mm", 2, table, "me"},
+                      {"chi", api::Outcome::kReached, 9, 9, 9, "steps", 0, table}}})
+          .reply);
   EXPECT_EQ(moved.outcome, api::Outcome::kLimit);
   const auto& motors = std::get<std::vector<api::MotorResult>>(moved.detail);
   EXPECT_EQ(motors.at(1).motor, "chi");

@@ -73,7 +73,7 @@ class Pty : public testing::Test {
 TEST(SerialPort, ConsolesAreRefused) {
   unsigned there = 0;
   for (const char* path : {"/dev/tty", "/dev/tty0", "/dev/tty1", "/dev/console", "/dev/ptmx"}) {
-    struct stat status {};
+    struct stat status{};
     if (::stat(path, &status) != 0 || major(status.st_rdev) == 0) continue;
     // In a container the console may be a pty.
     if (major(status.st_rdev) != 4 && major(status.st_rdev) != 5) continue;

@@ -29,8 +29,7 @@ Rotor accelerated(const RotorRules& rules, double share) {
   const double a = share * rules.pull_out.front().torque_nm / rules.inertia_kgm2 *
                    rules.steps_per_turn / (2 * kPi);
   Rotor rotor(rules);
-  run(
-      rotor, [a](double x) { return std::sqrt(2 * x / a); }, 20000);
+  run(rotor, [a](double x) { return std::sqrt(2 * x / a); }, 20000);
   return rotor;
 }
 
@@ -54,8 +53,7 @@ TEST(Rotor, FollowsAStartWhoseEnergyItsTorqueCanGive) {
   const auto started = [](double rad_per_s) {
     Rotor rotor(kSmooth);
     const double hz = rad_per_s * kSmooth.steps_per_turn / (2 * kPi);
-    run(
-        rotor, [hz](double x) { return x / hz; }, 20000);
+    run(rotor, [hz](double x) { return x / hz; }, 20000);
     return rotor;
   };
   EXPECT_FALSE(started(19.9).slipped_ns());
@@ -122,12 +120,10 @@ TEST(Rotor, HasNoTorqueBeyondTheCurve) {
   rules.friction_nm = 0.01;
   rules.damping_ratio = 0.1;
   Rotor rotor(rules);
-  run(
-      rotor, [](double x) { return std::sqrt(x / 64000); }, 15000);  // to 62000 steps/s
+  run(rotor, [](double x) { return std::sqrt(x / 64000); }, 15000);  // to 62000 steps/s
   EXPECT_FALSE(rotor.slipped_ns());
   Rotor faster(rules);
-  run(
-      faster, [](double x) { return std::sqrt(x / 64000); }, 30000);
+  run(faster, [](double x) { return std::sqrt(x / 64000); }, 30000);
   EXPECT_TRUE(faster.slipped_ns());
 }
 

@@ -160,7 +160,9 @@ TEST(Store, MarksThatAreGoneOrOfAnotherTimeLeaveNoMotorAtRest) {
 
 TEST(Store, AnOlderCopyOfTheDatabaseLeavesNoMotorAtRest) {
   sim::SimDisk disk(1);
-  { Store store = open(disk); }
+  {
+    Store store = open(disk);
+  }
   {
     Store store = open(disk);
     ASSERT_TRUE(store.write({.records = {{"theta", standing_at(100, 0)}}}));
@@ -231,7 +233,9 @@ TEST(Store, WhatIsNoGoodDatabaseIsMovedAsideNotDeleted) {
 
 TEST(Store, AnEmptyFileIsADatabaseThatIsGone) {
   sim::SimDisk disk(1);
-  { Store store = open(disk); }
+  {
+    Store store = open(disk);
+  }
   disk.content(kDatabase).clear();
   expect_lost(open(disk).kept().at("theta"));
 }
@@ -284,7 +288,9 @@ TEST(Database, HistoryIsBoundedInTimeAndRows) {
 
 TEST(Database, AnOlderVersionIsCopiedThenBroughtUpToDate) {
   sim::SimDisk disk(1);
-  { Store store = open(disk); }
+  {
+    Store store = open(disk);
+  }
   const std::size_t now = all_versions().size();
   std::vector<const char*> newer(all_versions().begin(), all_versions().end());
   newer.push_back("ALTER TABLE setting ADD COLUMN who TEXT");

@@ -84,7 +84,7 @@ class Clients {
   Request first_of_parts(Request path);
   Request tell_array();
   Request of_some(Ask ask, std::vector<std::string> motors);
-  std::vector<std::string> motors_with(bool bushd::api::MotorState::*flag) const;
+  std::vector<std::string> motors_with(bool bushd::api::MotorState::* flag) const;
   std::optional<Request> remedy_of_pauses();
   std::size_t index_of(const std::string& motor) const;
   std::string any_motor();

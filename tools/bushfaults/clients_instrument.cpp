@@ -143,7 +143,7 @@ Request Clients::jog() {
   return joggers_.begin(some.empty() ? any_motor() : random_.pick(some).name);
 }
 
-std::vector<std::string> Clients::motors_with(bool bushd::api::MotorState::*flag) const {
+std::vector<std::string> Clients::motors_with(bool bushd::api::MotorState::* flag) const {
   std::vector<std::string> found;
   for (const auto& state : witness_.states()) {
     if (!state) continue;

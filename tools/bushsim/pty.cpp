@@ -19,7 +19,7 @@ using bushd::fail;
 using bushd::Result;
 
 Result<void> make_link(const std::string& target, const std::string& link) {
-  struct stat present {};
+  struct stat present{};
   if (::lstat(link.c_str(), &present) == 0 && !S_ISLNK(present.st_mode)) {
     return fail({.message = "is there and no symlink, so it is left alone; give another --link",
                  .file = link});

@@ -71,7 +71,7 @@ double tick_distance(const Range& range) {
 }
 
 // The whole of the curves and zero, to the next ticks upwards and downwards.
-Range range_of(const Panel& panel, double Dot::*axis, bool to_ticks) {
+Range range_of(const Panel& panel, double Dot::* axis, bool to_ticks) {
   Range range;
   for (const auto& curve : panel.curves) {
     for (const Dot& dot : curve) {

@@ -133,7 +133,7 @@ static inline void board_init(void) {
   SPDR = 0;
   __builtin_avr_delay_cycles(20);
   DIR_LATCH_PORT |= 1 << DIR_LATCH_BIT;
-  DIR_LATCH_PORT &= (uint8_t) ~(1 << DIR_LATCH_BIT);
+  DIR_LATCH_PORT &= (uint8_t)~(1 << DIR_LATCH_BIT);
   chopper_init();
 }
 #endif

@@ -34,7 +34,7 @@ void chopper_set(void* context, uint8_t motor, uint16_t ma, bool fast_decay) {
   if (fast_decay) {
     DECAY_PORT |= 1 << DECAY_BIT;
   } else {
-    DECAY_PORT &= (uint8_t) ~(1 << DECAY_BIT);
+    DECAY_PORT &= (uint8_t)~(1 << DECAY_BIT);
   }
   const bool on = (TIMSK0 & 1 << OCIE0A) != 0;
   if (on == (reference != 0)) return;

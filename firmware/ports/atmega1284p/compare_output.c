@@ -37,7 +37,7 @@ ISR(TIMER3_COMPB_vect) {
       --fall.turns;
       return;
     }
-    COMPARE_PORT &= (uint8_t) ~(1 << COMPARE_BIT);
+    COMPARE_PORT &= (uint8_t)~(1 << COMPARE_BIT);
     fall.due = false;
   }
 }
@@ -67,7 +67,7 @@ void compare_fall(uint32_t time) {
   const uint32_t now = clock_now();
   ATOMIC_BLOCK(ATOMIC_FORCEON) {
     if (!set(&fall, time, now)) {
-      COMPARE_PORT &= (uint8_t) ~(1 << COMPARE_BIT);
+      COMPARE_PORT &= (uint8_t)~(1 << COMPARE_BIT);
     } else if (!rise.due) {
       await(&fall);
       TIFR3 = 1 << OCF3B;

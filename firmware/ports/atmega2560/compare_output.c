@@ -41,7 +41,7 @@ void compare_fall(uint32_t time) {
   OCR4B = compare_for(time);
   TIFR4 = 1 << OCF4B;
   if (is_due(time)) {
-    COMPARE_PORT &= (uint8_t) ~(1 << COMPARE_BIT);
+    COMPARE_PORT &= (uint8_t)~(1 << COMPARE_BIT);
     return;
   }
   compare_falls = 1 << OCIE4B;

@@ -19,6 +19,6 @@ void eeprom_write(uint16_t address, uint8_t byte) {
 }
 
 ISR(EE_READY_vect) {
-  EECR &= (uint8_t) ~(1 << EERIE);
+  EECR &= (uint8_t)~(1 << EERIE);
   eeprom_writes = false;
 }

@@ -36,7 +36,7 @@ bushd_inputs inputs_read(void) {
   const uint8_t low = INPUT_LOW;
   const uint8_t high = INPUT_HIGH;
   const uint8_t system = (uint8_t)~INPUT_SYSTEM;
-  bushd_inputs inputs = {(uint16_t) ~((uint16_t)high << 8 | low), 0};
+  bushd_inputs inputs = {(uint16_t)~((uint16_t)high << 8 | low), 0};
   if (system & 1 << EMERGENCY_BIT) inputs.system |= BUSHD_INPUT_EMERGENCY;
   if (system & 1 << FORWARD_BIT) inputs.system |= BUSHD_INPUT_FORWARD;
   if (system & 1 << REVERSE_BIT) inputs.system |= BUSHD_INPUT_REVERSE;

@@ -60,7 +60,7 @@ static void port_set_enable(void* context, bool on) {
   if (on) {
     EN_PORT |= 1 << EN_BIT;
   } else {
-    EN_PORT &= (uint8_t) ~(1 << EN_BIT);
+    EN_PORT &= (uint8_t)~(1 << EN_BIT);
   }
 }
 

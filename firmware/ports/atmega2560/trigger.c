@@ -9,7 +9,7 @@ volatile uint16_t trigger_count;  // of the clock's timer; edge_interrupts.S
 static bool awaited;
 
 void trigger_await(bushd_edge edge) {
-  EIMSK &= (uint8_t) ~(1 << TRIGGER_INT);
+  EIMSK &= (uint8_t)~(1 << TRIGGER_INT);
   awaited = edge != BUSHD_EDGE_NONE;
   if (!awaited) return;
   // Closed to ground is active.

@@ -23,7 +23,7 @@ static uint8_t present;  // page
 static page_content content;
 
 static uint32_t record_of(uint8_t kind, uint16_t value) {
-  const uint8_t check = (uint8_t) ~(value ^ value >> 8 ^ kind);
+  const uint8_t check = (uint8_t)~(value ^ value >> 8 ^ kind);
   return value | (uint32_t)kind << 16 | (uint32_t)check << 24;
 }
 

@@ -119,7 +119,7 @@ Result<void> replace_file(const std::filesystem::path& path, std::string_view te
   const auto target = behind_links(path);
   if (!target) return fail(target.error());
   const std::filesystem::path directory = directory_of(*target);
-  struct stat old {};
+  struct stat old{};
   const bool replaces = stat(target->c_str(), &old) == 0;
   std::string temporary = (directory / (temporary_prefix(*target) + "XXXXXX")).string();
   const int fd = mkostemp(temporary.data(), O_CLOEXEC);

@@ -143,7 +143,7 @@ bool host_send(const uint8_t* reply, uint8_t* wire, size_t* size) {
   LINE_SENDING_LOW = (uint8_t)(at + 1u);
   LINE_SENDING_HIGH = (uint8_t)((at + 1u) >> 8);
   if (LINE_SENDING_LOW != line_sending_end) return false;
-  DE_PORT &= (uint8_t) ~(1 << DE_BIT);
+  DE_PORT &= (uint8_t)~(1 << DE_BIT);
   UCSR0B = 1 << TXEN0 | 1 << RXEN0 | 1 << RXCIE0;
   return true;
 }

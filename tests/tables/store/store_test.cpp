@@ -140,7 +140,7 @@ TEST_F(TableStore, LinkedTableKeepsItsLinkOwnerAndMode) {
   ASSERT_TRUE(store_.save("t", kText, with_first_code(kText, "8"), "set"));
   EXPECT_TRUE(std::filesystem::is_symlink(store_.path_of("t")));
   EXPECT_EQ(store_.read("t")->content.accel.front(), 8);
-  struct stat now {};
+  struct stat now{};
   ASSERT_EQ(stat(file.c_str(), &now), 0);
   EXPECT_EQ(now.st_mode & 07777, 0640U);
   EXPECT_EQ(now.st_uid, root ? 4321U : geteuid());

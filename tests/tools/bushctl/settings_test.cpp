@@ -81,7 +81,7 @@ TEST_F(Saving, WritesWhatIsWantedAndNothingElse) {
   ASSERT_TRUE(now) << now.error().text();
   EXPECT_EQ(now->text_sha256, saved->file_sha256);
   EXPECT_EQ(now->motors[0].soft_limits, (bushd::units::SoftLimits{-1, 2}));
-  struct stat status {};
+  struct stat status{};
   ASSERT_EQ(stat(file.path().c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777, 0640u);
 }

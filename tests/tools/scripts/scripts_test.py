@@ -26,7 +26,7 @@ class Setup(unittest.TestCase):
             pathlib.Path(self.path, name).symlink_to(f"/usr/bin/{name}")
 
     def test_without_apt_it_is_one_sentence_at_the_beginning(self):
-        for script, *arguments in (("setup",), ("setup", "--package"), ("demo",), ("package",)):
+        for script, *arguments in (("setup",), ("setup", "--package"), ("demo",), ("package",), ("format",)):
             with self.subTest(script=script, arguments=arguments):
                 ran = run(script, *arguments, path=self.path)
                 self.assertEqual(ran.returncode, 1)
@@ -57,6 +57,7 @@ class Presets(unittest.TestCase):
         self.assertGreaterEqual(len(left_out), 2)
         for option in left_out:
             self.assertEqual(stated.get(option), "ON", option)
+        self.assertEqual(stated["BUSHD_WERROR"], "$penv{BUSHD_WERROR}")
 
 
 if __name__ == "__main__":

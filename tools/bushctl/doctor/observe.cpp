@@ -102,7 +102,7 @@ FolderSeen folder_seen(const std::string& what, fs::path path) {
     seen.exists = true;
     seen.rights = file->rights;
   }
-  struct statvfs system {};
+  struct statvfs system{};
   if (statvfs(seen.path.c_str(), &system) == 0) {
     seen.free_bytes = std::uint64_t{system.f_bavail} * system.f_frsize;
     seen.free_files = system.f_favail;

@@ -53,7 +53,7 @@ std::set<std::int64_t> who_has_open(const std::string& target) {
 }  // namespace
 
 std::optional<FileSeen> file_at(const std::string& path) {
-  struct stat status {};
+  struct stat status{};
   if (::stat(path.c_str(), &status) != 0) return std::nullopt;
   return FileSeen{.rights = {.uid = status.st_uid,
                              .gid = status.st_gid,
