@@ -190,7 +190,7 @@ void Server::handle_peer(Connection connection, std::uint32_t events) {
   if (found == peers_.end()) return;
   Peer& peer = found->second;
   bool goes_on = !peer.doomed;
-  if (goes_on && (events & EPOLLOUT) != 0) goes_on = flush(peer);
+  if (goes_on && (events & EPOLLOUT) != 0 && !flush(peer)) forget_unread(peer);
   if (goes_on && (events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) goes_on = read(connection, peer);
   if (!goes_on || peer.doomed) {
     close(connection);
@@ -265,7 +265,9 @@ bool Server::read(Connection connection, Peer& peer) {
   message.msg_control = control.data();
   message.msg_controllen = control.size();
   const ssize_t n = ::recvmsg(peer.fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
-  if (n < 0) return errno == EAGAIN || errno == EINTR;
+  // ECONNRESET comes once: it has left without reading all of ours, and what it has sent comes
+  // next.
+  if (n < 0) return errno == EAGAIN || errno == EINTR || errno == ECONNRESET;
   if (n == 0) return false;
   const std::span<const std::uint8_t> bytes(buffer_.data(), static_cast<std::size_t>(n));
   bytes_left_ -= std::min(bytes_left_, bytes.size() + kPerPacket);
@@ -313,6 +315,11 @@ void Server::doom(Connection connection, Peer& peer) {
   ::shutdown(peer.fd, SHUT_RDWR);
 }
 
+void Server::forget_unread(Peer& peer) {
+  unread_bytes_ -= std::exchange(peer.unread_bytes, 0);
+  peer.unread.clear();
+}
+
 void Server::close(Connection connection) {
   const auto found = peers_.find(connection);
   if (found == peers_.end()) return;
@@ -336,7 +343,8 @@ void Server::send(Connection connection, std::shared_ptr<const std::vector<std::
   peer.unread_bytes += size;
   unread_bytes_ += size;
   if (waited) return;
-  if (!flush(peer)) return doom(connection, peer);
+  // It has left. What it has sent before, a stop perhaps, is still to be read; then it is closed.
+  if (!flush(peer)) return forget_unread(peer);
   if (!peer.unread.empty()) watch(connection, peer, EPOLL_CTL_MOD);
 }
 

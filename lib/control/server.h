@@ -105,6 +105,7 @@ class Server {
   // One packet. Returns whether the connection may go on.
   bool read(Connection connection, Peer& peer);
   bool flush(Peer& peer);
+  void forget_unread(Peer& peer);
   void doom(Connection connection, Peer& peer);
   void close(Connection connection);
   void watch(Connection connection, const Peer& peer, int operation) const;

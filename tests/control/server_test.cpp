@@ -286,6 +286,38 @@ TEST_F(ServerTest, ClosingWithinAHandlerIsSafe) {
   send(last_, bytes("LATE"));
 }
 
+// A client that has its answer leaves, while the daemon sends what has happened since.
+TEST_F(ServerTest, WhoHasLeftIsNoInvalidMessage) {
+  open();
+  Peer peer(path_);
+  settle();
+  peer.leave();
+  send(last_, bytes("STATE"));
+  settle();
+  EXPECT_EQ(closed_, 1);
+  EXPECT_EQ(server_->dropped(), 0u);
+}
+
+TEST_F(ServerTest, WhatSomebodyHasSentWhoHasLeftIsTaken) {
+  open();
+  Peer heard_before(path_);
+  settle();
+  send(last_, bytes("STATE"));  // is never read
+  ASSERT_TRUE(heard_before.send(bytes("MOVE")));
+  heard_before.leave();
+  settle();
+  Peer heard_behind(path_);
+  settle();
+  ASSERT_TRUE(heard_behind.send(bytes("MOVE")));
+  ASSERT_TRUE(heard_behind.send(bytes("STOP")));
+  heard_behind.leave();
+  send(last_, bytes("STATE"));
+  settle();
+  EXPECT_EQ(heard_, (std::vector<std::string>{"MOVE", "MOVE", "STOP"}));
+  EXPECT_EQ(closed_, 2);
+  EXPECT_EQ(server_->dropped(), 0u);
+}
+
 TEST_F(ServerTest, AThousandConnectionsSurviveAndOneMoreIsTurnedAway) {
   rlimit files{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &files), 0);
