@@ -4,7 +4,9 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <map>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -148,15 +150,22 @@ Result<std::string> edited(std::string_view text, std::span<const Edit> edits,
                            const std::string& path) {
   const auto config = parse(text, path);
   if (!config) return fail(config.error());
+  // One may need another: a velocity is of a motor that people move. Keys are in that order.
+  std::vector<Edit> in_order(edits.begin(), edits.end());
+  std::ranges::stable_sort(in_order, {}, &Edit::key);
+  std::map<std::string, Settings> changed;  // by motor
   std::string out(text);
-  for (Edit edit : edits) {
+  for (Edit& edit : in_order) {
     const auto motor = std::ranges::find(config->motors, edit.motor, &Motor::name);
     if (motor == config->motors.end()) {
       return fail(Error{.message = "has no motor \"" + edit.motor + "\"", .file = path});
     }
-    const auto settings = with(settings_of(*motor, config->mcu_of(*motor)), edit.key, edit.value);
+    Settings& now =
+        changed.try_emplace(edit.motor, settings_of(*motor, config->mcu_of(*motor))).first->second;
+    auto settings = with(now, edit.key, edit.value);
     if (!settings) return fail(edit.motor + ": " + settings.error().message);
-    edit.value = text_of(*settings, edit.key);
+    now = std::move(*settings);
+    edit.value = text_of(now, edit.key);
     auto next = edited_once(out, edit, path);
     if (!next) return next;
     out = std::move(*next);

@@ -67,6 +67,17 @@ TEST(Edit, VelocityAndCurrentsAreInlineTables) {
               HasSubstr("its MCU does not drive it by phases"));
 }
 
+// Who moves it and how fast, as 'bushctl config --save' writes them together.
+TEST(Edit, AValueMayNeedAnotherOneOfTheSameTime) {
+  const std::string velocity =
+      "{ min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 }";
+  const std::string both = "local = true\nvelocity = " + velocity + "\n";
+  expect("", {{"theta", SettingKey::kLocal, "true"}, {"theta", SettingKey::kVelocity, velocity}},
+         both);
+  expect("", {{"theta", SettingKey::kVelocity, velocity}, {"theta", SettingKey::kLocal, "true"}},
+         both);
+}
+
 TEST(Edit, AKeyThatIsMissingStandsBehindTheOthersOfItsMotor) {
   expect("", {{"theta", kOffset, "-1"}, {"theta", kSoftLimits, "[1, 2]"}},
          "offset = -1\nsoft_limits = [1, 2]\n");
