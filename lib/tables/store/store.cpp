@@ -151,9 +151,17 @@ Result<std::uint32_t> Store::number_of(const History& history, const std::string
                   name, at, name));
 }
 
+std::optional<Stored> Store::without_history(const std::string& name, std::string_view at) const {
+  auto found = read(name);
+  const bool is_it =
+      found && found->content.revision > 0 && std::to_string(found->content.revision) == at;
+  return is_it ? std::optional(std::move(*found)) : std::nullopt;
+}
+
 Result<Stored> Store::read(const std::string& name, std::string_view at) const {
   std::error_code ignored;
   if (!std::filesystem::exists(history_path_, ignored)) {
+    if (auto found = without_history(name, at)) return std::move(*found);
     // Opening it would make one, where nobody has changed a table yet.
     return fail(Error{
         .message = fmt::format("table \"{}\" has no history, so no revision \"{}\"", name, at),
@@ -167,6 +175,7 @@ Result<Stored> Store::read(const std::string& name, std::string_view at) const {
   auto text = history->text(name, *number);
   if (!text) return fail(text.error());
   if (!*text) {
+    if (auto found = without_history(name, at)) return std::move(*found);
     return fail(fmt::format("table \"{}\" has no revision {}; \"bushtab log {}\" lists them", name,
                             *number, name));
   }

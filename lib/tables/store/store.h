@@ -45,7 +45,8 @@ class Store {
   Result<std::uint32_t> save(const std::string& name, const std::string& from,
                              const std::string& text, const std::string& note);
 
-  // `at` is a revision's number or a tag.
+  // `at` is a revision's number or a tag. A file that came without its history is the revision that
+  // it says.
   Result<Stored> read(const std::string& name, std::string_view at) const;
   Result<std::vector<Revision>> log(const std::string& name) const;
   // `at` empty: the newest revision.
@@ -56,6 +57,7 @@ class Store {
                               const std::string& text, const std::string& note);
   Result<std::uint32_t> number_of(const History& history, const std::string& name,
                                   std::string_view at) const;
+  std::optional<Stored> without_history(const std::string& name, std::string_view at) const;
   // Ends what a crash has left: an announced revision is confirmed, unless the file is still the
   // one before. Preconditions: the lock is held, in a transaction.
   Result<void> settle(History& history, const std::string& name) const;

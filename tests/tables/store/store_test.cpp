@@ -102,6 +102,24 @@ TEST_F(TableStore, ChangesByOtherMeansAreRecordedBeforeTheNext) {
   EXPECT_EQ(store_.read("t", "2")->text, by_hand);
 }
 
+// As that of a table made in another folder, from where only its file was copied.
+TEST_F(TableStore, AFileWithoutHistoryIsTheRevisionThatItSays) {
+  std::string text = kText;
+  text.insert(text.find("time_unit"), "revision = 3\n");
+  directory_.write("t.toml", text);
+  ASSERT_TRUE(store_.read("t", "3"));
+  EXPECT_EQ(store_.read("t", "3")->text, text);
+  EXPECT_THAT(store_.read("t", "2").error().text(), HasSubstr("has no history, so no revision"));
+  EXPECT_FALSE(std::filesystem::exists(directory_.path() / "history.sqlite"));
+  ASSERT_TRUE(store_.create("another", kText, "new"));
+  ASSERT_TRUE(store_.read("t", "3"));
+  EXPECT_THAT(store_.read("t", "2").error().text(), HasSubstr("no revision 2"));
+  // What the history has counts: the file may have been changed by hand.
+  ASSERT_TRUE(store_.save("t", text, with_first_code(text, "8"), "set"));
+  directory_.write("t.toml", with_first_code(text, "7"));
+  EXPECT_EQ(store_.read("t", "3")->text, text);
+}
+
 TEST_F(TableStore, TagsNameRevisionsAndMayMove) {
   ASSERT_TRUE(store_.create("t", kText, "new"));
   const std::string text = store_.read("t")->text;
