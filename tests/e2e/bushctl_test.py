@@ -7,7 +7,7 @@ import signal
 import sys
 import unittest
 
-from rig import FAR, MOTORS, TOP, EndToEndTest, program
+from rig import FAR, GIVE_UP_S, MOTORS, TOP, EndToEndTest, program
 
 sys.path.insert(0, str(TOP / "tests/tools/bushtab"))
 from terminal import Terminal
@@ -227,6 +227,24 @@ class Bushctl(EndToEndTest):
         shell.wait_for("the daemon has ended")
         shell.send("that\r")
         shell.wait_for("got: that")
+
+    def test_status_waits_for_programs_that_start(self):
+        self.write_config()
+        status = self.start_bushctl("status", "--wait-s", GIVE_UP_S)
+        self.start_bushd()
+        self.start_bushsim()
+        self.assertEqual(status.process.wait(GIVE_UP_S), 0, status.said())
+        self.assertEqual(status.said().count("READY"), 2)
+
+    def test_status_tells_what_it_has_waited_for_in_vain(self):
+        self.assertRegex(self.bushctl("status", "--wait-s", "0.01").stderr, "^bushctl: waited 0.01 s; no control socket")
+        self.write_config()
+        bushd = self.start_bushd()
+        self.wait_until("the daemon to answer", lambda: self.mcu_states() is not None)
+        told = self.bushctl("status", "--wait-s", "0.01")
+        self.assertEqual(told.returncode, 1)
+        self.assertRegex(told.stderr, "waited 0.01 s; MCU hall:1 is OFFLINE")
+        self.assertEqual(bushd.end(), 0)
 
     def test_watch_ends_after_a_count(self):
         self.bring_up()

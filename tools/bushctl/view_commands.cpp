@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "health_view.h"
+#include "readiness.h"
 #include "render.h"
 #include "screen.h"
 #include "watch.h"
@@ -82,11 +83,18 @@ void add_status(CommandLine& line) {
   struct Options {
     bool json = false;
     double timeout_s = 4;
+    double wait_s = 0;
   };
   const auto options = std::make_shared<Options>();
   Command command = line.add("status", "Show all motors and MCUs");
-  command.flag("--json", &options->json, "Print JSON");
+  command.flag("--json", &options->json, "Print JSON")
+      .number("--wait-s", &options->wait_s, 0.01, 3600.0,
+              "First wait so long at most until the daemon answers and all MCUs take moves");
   add_timeout(command, &options->timeout_s).run([&line, options] {
+    if (options->wait_s > 0) {
+      const int code = wait_until_ready(line.connection(), milliseconds(options->wait_s));
+      if (code != kDone) return code;
+    }
     return with_client(line.connection(), [&](Client& client) {
       return show_status(client, milliseconds(options->timeout_s), options->json);
     });
