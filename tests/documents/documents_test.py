@@ -45,6 +45,8 @@ class Documents(unittest.TestCase):
 
     def test_every_page_can_be_reached_from_the_index(self):
         index = DOCS / "README.md"
+        entries = re.findall(r"^- \[[^\]]*\]\(([^)#]+)\)", index.read_text(), re.MULTILINE)
+        self.assertEqual([page for page in set(entries) if entries.count(page) > 1], [], "docs/README.md has them twice")
         listed = {path for _, path, _ in links(index)}
         for page in sorted(DOCS.glob("*.md")):
             with self.subTest(page=page.name):
@@ -53,6 +55,17 @@ class Documents(unittest.TestCase):
         for page in sorted((DOCS / "decisions").glob("*.md")):
             with self.subTest(page=page.name):
                 self.assertIn(page, decisions, "docs/design.md does not list it")
+
+    def test_tables_have_heads_and_headings_stand_alone(self):
+        """A row behind an empty line is text, not a row; so is a heading right behind text for some readers."""
+        for page in PAGES:
+            lines = ["", *prose(page).splitlines(), ""]
+            for number, (before, line, behind) in enumerate(zip(lines, lines[1:], lines[2:]), 1):
+                with self.subTest(page=str(page.relative_to(SOURCE)), line=number):
+                    if line.startswith("|") and not before.startswith("|"):
+                        self.assertRegex(behind, r"^\|( *:?-+:? *\|)+$", "a table begins with a head and a line of hyphens")
+                    if line.startswith("#"):
+                        self.assertEqual((before, behind), ("", ""), "a heading has empty lines around it")
 
     def test_files_that_the_recipes_name_are_there(self):
         named = re.findall(

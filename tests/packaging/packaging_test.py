@@ -7,6 +7,7 @@ import fnmatch
 import os
 import pathlib
 import re
+import shutil
 import stat
 import subprocess
 import tempfile
@@ -89,6 +90,15 @@ class Layout(unittest.TestCase):
                     text = page.read_text()
                     self.assertRegex(text, r"\A('\\\" t\n)?\.TH ")
                     self.assertNotRegex(text, r"@[A-Z]+@")
+                    self.assertTrue(text.isascii(), "troff itself reads no UTF-8")
+
+    def test_manual_pages_give_no_warnings(self):
+        if not shutil.which("groff"):
+            self.skipTest("no groff (package groff-base)")
+        for page in (self.prefix / "share/man").rglob("*.[1-8]"):
+            with self.subTest(page.name):
+                ran = subprocess.run(["groff", "-man", "-t", "-ww", "-Tutf8", page], capture_output=True, text=True, check=False)
+                self.assertEqual((ran.returncode, ran.stderr), (0, ""))
 
 
 class Flash(unittest.TestCase):

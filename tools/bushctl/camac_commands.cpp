@@ -270,11 +270,15 @@ void add_camac_commands(CommandLine& line) {
   const auto options = std::make_shared<CamacOptions>();
   line.add("camac", "Make a cycle of a CAMAC crate, or read and write a module's memory")
       .footer(
-          "camac N A F [DATA]: one cycle; numbers are decimal, or hexadecimal with 0x.\n"
-          "camac dump STATION: the memory of a BUSHD-1 or BUSHD-2; with --page the codes of a "
-          "program of BUSHD-2 as a table file.\n"
-          "camac load STATION PAGE TABLE: the codes of a table as a program of BUSHD-2, with "
-          "--steps the number of steps as well.")
+          "bushctl camac N A F [DATA]               one cycle; numbers are decimal, or "
+          "hexadecimal\n"
+          "                                         with 0x\n"
+          "bushctl camac dump STATION               the memory of a BUSHD-1 or BUSHD-2; with "
+          "--page the\n"
+          "                                         codes of a program of BUSHD-2 as a table file\n"
+          "bushctl camac load STATION PAGE TABLE    the codes of a table as a program of BUSHD-2, "
+          "with\n"
+          "                                         --steps the number of steps as well")
       .words("N", &options->words, "N A F [DATA], dump STATION, or load STATION PAGE TABLE",
              Command::Needed::kYes)
       .number("--crate", &options->crate, 1u, 62u, "Number of the crate")

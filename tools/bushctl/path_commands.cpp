@@ -63,7 +63,7 @@ Command& describe(Command& command, const std::shared_ptr<PathOptions>& options)
       .choice(
           "--corners", &options->corners, {"continuous", "exact"},
           "Pass the points at speeds at which no motor jumps by more than it starts with, or rest "
-          "at each (default: continuous)")
+          "at each")
       .option("--speed", &options->speed, "Not faster than this, in each motor's unit per second");
 }
 

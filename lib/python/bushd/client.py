@@ -185,8 +185,8 @@ class Client:
     ) -> model.MoveResult | Motion:
         """Moves motors of one bus along a straight line: at any moment each has made the same share of its way.
 
-            client.move_line({"gap": 2.0, "centre": -0.5})      # to positions
-            client.move_line(by={"x": 10.0, "y": 4.0}, duration_s=30)
+            client.move_line({"theta": 2.0, "phi": -0.5})      # to positions
+            client.move_line(by={"theta": 10.0, "phi": 4.0}, duration_s=30)
 
         speed: no motor exceeds it, each in its own unit.
         duration_s: not shorter than this; refused where the motors cannot be so slow, or so quick.
