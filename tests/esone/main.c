@@ -2,8 +2,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "esone/bushd_esone.h"
-#include "esone/program.h"
+#include "bushd_esone.h"
+#include "program.h"
 
 int main(int argc, char** argv) {
   const int line = argc == 2 ? run_program(atoi(argv[1])) : 1;

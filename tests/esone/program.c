@@ -1,8 +1,8 @@
-#include "esone/program.h"
+#include "program.h"
 
 #include <string.h>
 
-#include "esone/bushd_esone.h"
+#include "bushd_esone.h"
 
 #define CHECK(holds) \
   if (!(holds)) return __LINE__

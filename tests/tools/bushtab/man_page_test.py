@@ -4,9 +4,7 @@
 import os
 import pathlib
 import re
-import shlex
 import subprocess
-import tempfile
 import unittest
 
 PAGE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"]) / "docs/man/bushtab.1"
@@ -57,7 +55,6 @@ def descriptions_in(section):
 class ManPage(unittest.TestCase):
     def setUp(self):
         text = PAGE.read_text().replace(r"\-", "-")
-        self.examples = re.search(r"\.SH EXAMPLES\n\.nf\n(.*?)\.fi\n", text, re.DOTALL)[1].splitlines()
         self.options = text.split(".SH OPTIONS\n")[1].split("\n.SH ")[0]
         sections = text.split(".SH COMMANDS\n")[1].split("\n.SH ")[0].split(".SS ")[1:]
         self.commands = {section.split("\n")[0]: section for section in sections}
@@ -78,16 +75,6 @@ class ManPage(unittest.TestCase):
                 with self.subTest(f"{name} {option}"):
                     self.assertTrue(entry.endswith(described[option]), f"{entry}\n{described[option]}")
                     self.assertRegex(entry.removesuffix(described[option]).strip(), rf"\A{TYPE.pattern}\Z")
-
-    def test_examples_work_in_an_empty_folder(self):
-        self.assertGreaterEqual(len(self.examples), 3)
-        with tempfile.TemporaryDirectory() as directory:
-            for line in self.examples:
-                with self.subTest(line):
-                    program, *arguments = shlex.split(line)
-                    self.assertEqual(program, "bushtab")
-                    done = subprocess.run([os.environ["BUSHTAB"], *arguments], capture_output=True, text=True, cwd=directory)
-                    self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
 
     def test_operands_are_the_same(self):
         for name, section in self.commands.items():
