@@ -5,6 +5,9 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
+
+#include "times.h"
 
 namespace bushfaults {
 namespace {
@@ -12,6 +15,28 @@ namespace {
 constexpr std::int64_t kLongestMove = 6000;
 constexpr std::uint32_t kClientsStream = 100;  // of randomness
 constexpr std::uint32_t kShutterStream = 421;
+using bushd::sim::TimeNs;
+
+bool begins_motion(CommandKind kind) {
+  switch (kind) {
+    case CommandKind::kMove:
+    case CommandKind::kGroupMove:
+    case CommandKind::kRetarget:
+    case CommandKind::kHome:
+    case CommandKind::kArm:
+    case CommandKind::kUserMove:
+    case CommandKind::kSpeed:
+    case CommandKind::kLegMove:
+    case CommandKind::kJog:
+    case CommandKind::kLine:
+    case CommandKind::kPath:
+    case CommandKind::kArray:
+    case CommandKind::kArmLine:
+      return true;
+    default:
+      return false;
+  }
+}
 
 }  // namespace
 
@@ -311,6 +336,8 @@ Request Clients::compose(CommandKind kind) {
       return tell_array();
     case CommandKind::kCamac:
       return of_program();
+    case CommandKind::kChased:
+      return chased();
     case CommandKind::kShutter:
       return programs_.next_of_shutter(
           witness_.positions().plant_steps(ShutterPlace::motor(config_)->value),
@@ -332,6 +359,32 @@ std::optional<Request> Clients::next() {
   ++sent_by_kind_[static_cast<std::size_t>(chosen)];
   if (chosen == CommandKind::kAgain) return std::nullopt;
   return compose(chosen);
+}
+
+// A stop at every phase of what it stops: before it is taken, planned or begun, in ramps, at speed,
+// and while it settles.
+Request Clients::chased() {
+  constexpr TimeNs kLatestNs = 4 * kSecond;
+  std::optional<Request> motion;
+  for (int tries = 0; tries < 20 && !motion; ++tries) {
+    const CommandKind kind = choose();
+    if (begins_motion(kind)) motion = compose(kind);
+  }
+  if (!motion) motion = move(1);
+  Request end = make(Ask::kStop);
+  const auto which = random_.below(10);
+  if (which == 0) end.ask = Ask::kEmergencyStop;
+  if (which == 1 || which == 2) end.ask = Ask::kPause;
+  if (which == 3) end.ask = Ask::kHold;
+  if (end.ask != Ask::kEmergencyStop && !random_.one_in(4)) {
+    for (const std::string& name : motion->motors) {
+      if (!end.names(name)) end.add(name, 0);
+    }
+  }
+  if (random_.one_in(2)) end.client = motion->client;
+  const TimeNs after_ns = random_.one_in(2) ? 0 : random_.magnitude(kMs, kLatestNs);
+  later_.push_back({.after_ns = after_ns, .due_ns = 0, .request = std::move(end)});
+  return *motion;
 }
 
 Request Clients::one_of_flood(std::size_t client) {

@@ -62,6 +62,7 @@ class Clients {
   Request stop();
   Request set(const std::vector<Choice>& motors);
   Request switch_drivers();
+  Request chased();
   Request nonsense();
   Request home();
   Request arm();

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "small_world.h"
+#include "times.h"
 
 namespace bushfaults {
 namespace {
@@ -17,6 +18,11 @@ constexpr std::uint32_t kHostStream = 200;  // of randomness; garblers have the 
 constexpr bushd::sim::TimeNs kMaxLatencyNs = 16'000'000;
 
 constexpr bushd::sim::TimeNs kStartAgainNs = 100'000'000;
+
+// One that is asked to end is watched for so long at least: nothing begins meanwhile. systemd kills
+// one that takes longer than the other.
+constexpr bushd::sim::TimeNs kEndWatchedNs = 6 * kSecond;
+constexpr bushd::sim::TimeNs kEndsInNs = 20 * kSecond;
 
 }  // namespace
 
@@ -114,8 +120,8 @@ void Host::step() {
 }
 
 bool Host::anything_due() const {
-  return now_ns_ >= wake_ns_ || !messages_.empty() || !disk_.empty() ||
-         (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) ||
+  return (ends_at_ns_ && now_ns_ >= *ends_at_ns_) || now_ns_ >= wake_ns_ || !messages_.empty() ||
+         !disk_.empty() || (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) ||
          (kept_ && kept_->next_ns() <= now_ns_) || (small_ != nullptr && small_->due(now_ns_));
 }
 
@@ -151,6 +157,27 @@ void Host::run(TimeNs now_ns) {
   }
   daemon_->carry_out_some();
   step();
+  end_if_due();
+}
+
+void Host::end(TimeNs now_ns, TimeNs gone_ns) {
+  now_ns_ = now_ns;
+  if (!daemon_ || ends_at_ns_) return;
+  ends_at_ns_ = now_ns + kEndWatchedNs;
+  gone_ns_ = gone_ns;
+  witness_.daemon_ends(now_ns);
+  core().shut_down(now_us());
+  step();
+}
+
+// As the daemon's own loop does it (daemon/event_loop.cpp).
+bool Host::end_if_due() {
+  if (!ends_at_ns_ || now_ns_ < *ends_at_ns_) return false;
+  const bool rests =
+      core().at_rest() && core().settled() && (small_ == nullptr || !small_->any_open());
+  if (!rests && now_ns_ < *ends_at_ns_ - kEndWatchedNs + kEndsInNs) return false;
+  kill(now_ns_, now_ns_ + gone_ns_);
+  return true;
 }
 
 void Host::check(const std::optional<std::string>& wrong) {
@@ -165,6 +192,7 @@ void Host::give(const bushd::lcm::Hello& hello) {
 }
 
 void Host::give(const Request& request) {
+  witness_.arrives(request);
   const bool usable = request.damage == Damage::kNone && bushd::api::is_client_id(request.client);
   const std::uint64_t dropped = daemon_->dropped();
   recent_.note(now_ns_, text_of(request));
@@ -272,6 +300,7 @@ Host::TimeNs Host::next_ns() const {
   if (now_ns_ < paused_until_ns_) return std::min(next, paused_until_ns_);
   if (!inbox_.empty()) next = std::min(next, inbox_.front().due_ns);
   if (kept_) next = std::min(next, kept_->next_ns());
+  if (ends_at_ns_) next = std::min(next, *ends_at_ns_);
   return std::max(std::min(next, wake_ns_), now_ns_ + 1000);
 }
 
@@ -318,6 +347,7 @@ void Host::kill(TimeNs now_ns, TimeNs until_ns) {
   starts_ns_ = daemon_ ? until_ns : std::max(starts_ns_, until_ns);
   if (small_ != nullptr) small_->daemon_gone(now_ns, false);
   daemon_.reset();
+  ends_at_ns_.reset();
   messages_.clear();
   disk_.clear();
   paused_until_ns_ = 0;
@@ -338,6 +368,7 @@ Host::TimeNs Host::faults_over_ns() const {
   if (kept_) over = std::max(over, kept_->faults_over_ns());
   if (!plugged_) over = std::max(over, back_ns_);
   if (!daemon_) over = std::max(over, starts_ns_);
+  if (ends_at_ns_) over = std::max(over, *ends_at_ns_ - kEndWatchedNs + kEndsInNs + gone_ns_);
   return over;
 }
 

@@ -63,6 +63,8 @@ class Host final : public bushd::daemon::Outputs {
   void unplug(TimeNs now_ns, TimeNs until_ns);
   void pause(TimeNs now_ns, TimeNs until_ns);
   void kill(TimeNs now_ns, TimeNs until_ns);
+  // The daemon is asked to end, and is gone so long when it has.
+  void end(TimeNs now_ns, TimeNs gone_ns);
   // The PC has no power until then.
   void cut_power(TimeNs now_ns, TimeNs until_ns);
   // When the faults above are over, garblings that wait for bytes excepted.
@@ -99,6 +101,7 @@ class Host final : public bushd::daemon::Outputs {
   void give(const bushd::lcm::Hello& hello);
   void give(const Request& request);
   void plug_in();
+  bool end_if_due();
   void take_in();
   void deliver();
   void step();
@@ -116,7 +119,9 @@ class Host final : public bushd::daemon::Outputs {
   std::unique_ptr<Kept> kept_;
   std::unique_ptr<DaemonRun> daemon_;  // none: killed
   std::int64_t run_number_ = 0;
-  TimeNs starts_ns_ = 0;  // when the next daemon starts, or this one has started
+  TimeNs starts_ns_ = 0;                // when the next daemon starts, or this one has started
+  std::optional<TimeNs> ends_at_ns_{};  // it has been asked to, and is watched until then
+  TimeNs gone_ns_ = 0;                  // for so long, then
   TimeNs paused_until_ns_ = 0;
   TimeNs said_state_ns_ = 0;
   TimeNs wake_ns_ = 0;

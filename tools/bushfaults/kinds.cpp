@@ -1,5 +1,7 @@
 #include "kinds.h"
 
+#include "sim/random.h"
+
 namespace bushfaults {
 namespace {
 
@@ -25,17 +27,18 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"lost-answers", 300, "1..16 answers do not reach the clients"},
     {"number-leaps", 120, "a client leaves numbers out: a window of them, or far more"},
     {"reused-numbers", 120, "a request has a number that its client used, or left out, before"},
-    {"limit-switches", 0, "a motor's limit switch is active for 5 ms .. 2 s"},
-    {"emergency-inputs", 0, "an MCU's emergency input is active for 5 ms .. 2 s"},
-    {"triggers", 0, "an edge at the trigger input of one MCU or of all"},
-    {"slow-requests", 0, "a request is 1 ms .. 10 s late, after later ones of its client"},
-    {"late-repeats", 0, "a request is repeated up to half an hour later"},
-    {"stale-repeats", 0, "a request that an earlier daemon has received is repeated"},
-    {"floods", 0, "50 .. 2000 requests at once, of up to 200 clients"},
-    {"crowds", 0, "likewise, of up to 2000 clients"},
+    {"limit-switches", 0, "a motor's limit switch is active for 5 ms .. 2 s", 600},
+    {"emergency-inputs", 0, "an MCU's emergency input is active for 5 ms .. 2 s", 60},
+    {"triggers", 0, "an edge at the trigger input of one MCU or of all", 900},
+    {"slow-requests", 0, "a request is 1 ms .. 10 s late, after later ones of its client", 300},
+    {"late-repeats", 0, "a request is repeated up to half an hour later", 300},
+    {"stale-repeats", 0, "a request that an earlier daemon has received is repeated", 100},
+    {"floods", 0, "50 .. 2000 requests at once, of up to 200 clients", 4},
+    {"crowds", 0, "likewise, of up to 2000 clients", 2},
     {"second-daemons", 12, "another daemon for the same MCUs starts, for 0.1 .. 30 s"},
-    {"power-cuts", 0, "the PC loses power for 10 ms .. 3 s, mostly with some MCUs or all"},
-    {"disk-faults", 0, "the disk fails, or takes up to 2 s for a thing, for 10 ms .. 5 s"},
+    {"power-cuts", 0, "the PC loses power for 10 ms .. 3 s, mostly with some MCUs or all", 20},
+    {"disk-faults", 0, "the disk fails, or takes up to 2 s for a thing, for 10 ms .. 5 s", 20},
+    {"ends", 0, "the daemon is asked to end, as by SIGTERM; another starts when it has", 20},
 }};
 
 constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
@@ -49,25 +52,28 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"clears", 500, "of faults"},
     {"repeats", 1900, "a command that was sent before is repeated"},
     {"nonsense", 1700, "commands that no client should send"},
-    {"homings", 0, "of 1 .. 4 motors; half of all have a switch then, which bounces"},
-    {"armings", 0, "1 .. 8 motors wait for the trigger"},
-    {"disarmings", 0, "of one motor or of all"},
-    {"confirmations", 0, "that motors stand where they are shown, right or wrong"},
+    {"homings", 0, "of 1 .. 4 motors; half of all have a switch then, which bounces", 200},
+    {"armings", 0, "1 .. 8 motors wait for the trigger", 200},
+    {"disarmings", 0, "of one motor or of all", 60},
+    {"confirmations", 0, "that motors stand where they are shown, right or wrong", 60},
     {"user-moves", 0,
-     "moves and new targets in user units; most motors have a unit then, half limits"},
-    {"user-sets", 0, "positions set in user units: of the offset, or of the dial"},
-    {"speeds", 0, "moves and new targets with a speed, in steps or user units"},
+     "moves and new targets in user units; most motors have a unit then, half limits", 900},
+    {"user-sets", 0, "positions set in user units: of the offset, or of the dial", 200},
+    {"speeds", 0, "moves and new targets with a speed, in steps or user units", 600},
     {"leg-moves", 0,
-     "moves and new targets of motors with backlash; every second motor has it then"},
-    {"jogs", 0, "of one motor, renewed and changed until they are ended or their client dies"},
-    {"motor-pauses", 0, "motors are paused, resumed, held and released"},
-    {"settings", 0, "other offsets, directions and soft limits of motors at rest"},
-    {"lines", 0, "motors at rest move along a straight line"},
-    {"camac-blocks", 0, "programs load, start, stop and read a BUSHD-2, and initialise its crate"},
-    {"paths", 0, "motors at rest move along a path, past its points or to rest at each"},
-    {"arrays", 0, "motors at rest follow positions in time, told before or while they move"},
-    {"shutter-blocks", 0, "programs step and open the shutter of a BUSHD-1; wants --triggers"},
-    {"line-armings", 0, "2 .. 5 motors wait for the trigger, on one line; wants --triggers"},
+     "moves and new targets of motors with backlash; every second motor has it then", 600},
+    {"jogs", 0, "of one motor, renewed and changed until they are ended or their client dies", 600},
+    {"motor-pauses", 0, "motors are paused, resumed, held and released", 600},
+    {"settings", 0, "other offsets, directions and soft limits of motors at rest", 200},
+    {"lines", 0, "motors at rest move along a straight line", 900},
+    {"camac-blocks", 0, "programs load, start, stop and read a BUSHD-2, and initialise its crate",
+     300},
+    {"paths", 0, "motors at rest move along a path, past its points or to rest at each", 500},
+    {"arrays", 0, "motors at rest follow positions in time, told before or while they move", 500},
+    {"shutter-blocks", 0, "programs step and open the shutter of a BUSHD-1; wants --triggers", 200},
+    {"line-armings", 0, "2 .. 5 motors wait for the trigger, on one line; wants --triggers", 300},
+    {"chased", 0,
+     "a motion with a stop, an emergency stop, a pause or a hold right behind it, or soon", 600},
 }};
 
 template <std::size_t kSize>
@@ -77,7 +83,25 @@ std::array<double, kSize> rates(const std::array<KindInfo, kSize>& kinds) {
   return all;
 }
 
+template <std::size_t kSize>
+void add_all(std::array<double, kSize>& rates, const std::array<KindInfo, kSize>& kinds,
+             bushd::sim::Random& random) {
+  for (std::size_t i = 0; i < kSize; ++i) {
+    const auto most = static_cast<std::int64_t>(kinds[i].most_of_all);
+    const std::int64_t made_up = most > 0 ? random.magnitude(1, most) : 0;
+    if (rates[i] == 0) rates[i] = static_cast<double>(made_up);
+  }
+}
+
+constexpr std::uint32_t kRatesStream = 431;  // of randomness
+
 }  // namespace
+
+void add_all_kinds(FaultRates& faults, CommandRates& commands, std::uint64_t seed) {
+  bushd::sim::Random random(seed, kRatesStream);
+  add_all(faults, kFaults, random);
+  add_all(commands, kCommands, random);
+}
 
 const KindInfo& info(FaultKind kind) {
   return kFaults[static_cast<std::size_t>(kind)];

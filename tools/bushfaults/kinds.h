@@ -44,8 +44,9 @@ enum class FaultKind : std::uint8_t {
   kSecondDaemon,
   kPowerCut,
   kDiskFault,
+  kEnd,
 };
-inline constexpr std::size_t kFaultKinds = 30;
+inline constexpr std::size_t kFaultKinds = 31;
 
 // What clients send.
 enum class CommandKind : std::uint8_t {
@@ -77,13 +78,15 @@ enum class CommandKind : std::uint8_t {
   kArray,
   kShutter,
   kArmLine,
+  kChased,
 };
-inline constexpr std::size_t kCommandKinds = 27;
+inline constexpr std::size_t kCommandKinds = 28;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary
   double per_hour;        // by default
   std::string_view what;
+  double most_of_all = 0;  // of one that is 0 by default: at most, if there are all kinds
 };
 
 const KindInfo& info(FaultKind kind);
@@ -94,6 +97,9 @@ using FaultRates = std::array<double, kFaultKinds>;
 using CommandRates = std::array<double, kCommandKinds>;
 FaultRates usual_fault_rates();
 CommandRates usual_command_rates();
+// Kinds that are 0 get a rate by the seed, each a moderate one: a daemon that is always stopped
+// proves nothing.
+void add_all_kinds(FaultRates& faults, CommandRates& commands, std::uint64_t seed);
 
 inline double rate(const FaultRates& rates, FaultKind kind) {
   return rates[static_cast<std::size_t>(kind)];

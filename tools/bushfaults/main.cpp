@@ -74,6 +74,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", BUSHD_VERSION);
   bushfaults::Options options;
   bool json = false;
+  bool all_kinds = false;
   std::string seed = "fresh";
   bushfaults::Ways& ways = options.ways;
   app.add_option("--seed", seed, "Seed, a number; `fresh`: another one each time, printed")
@@ -102,6 +103,8 @@ int run(int argc, char** argv) {
   app.add_option("--crystal-ppm", options.crystal_ppm, "Largest error of the MCUs' clocks")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
+  app.add_flag("--all-kinds", all_kinds,
+               "All kinds at once: those whose rate is 0 get one by the seed");
   app.add_flag("--json", json, "Print the summary as a JSON object");
   add_small(app, options.small);
   add_rates<bushfaults::FaultKind>(app, options.fault_rates, "Faults per hour");
@@ -116,6 +119,10 @@ int run(int argc, char** argv) {
                bushd::printable(seed));
     return kUsage;
   }
+  if (all_kinds) {
+    bushfaults::add_all_kinds(options.fault_rates, options.command_rates, options.seed);
+  }
+  options.all_kinds = all_kinds;
   auto config =
       bushfaults::make_installation(options.motors, options.mcus, options.ways, options.seed);
   if (!config) {

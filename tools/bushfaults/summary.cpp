@@ -153,10 +153,10 @@ std::string story(const World& world, const Options& options) {
   const Violation& violation = *world.witness().violation();
   return fmt::format(
       "VIOLATION at {} s of virtual time: {}\nWhat led to it:\n{}"
-      "Again: bushfaults --seed {} --hours {} --motors {} --mcus {} {}{} and the same rates\n",
+      "Again: bushfaults --seed {} --hours {} --motors {} --mcus {} {}{}{} and the same rates\n",
       in_seconds(violation.time_ns), violation.what, world.recent().text(), options.seed,
-      options.hours, options.motors, options.mcus, small_text(options.small),
-      ways_text(world.config()));
+      options.hours, options.motors, options.mcus, options.all_kinds ? "--all-kinds " : "",
+      small_text(options.small), ways_text(world.config()));
 }
 
 }  // namespace bushfaults

@@ -58,7 +58,18 @@ Witness::Motor* Witness::find(const std::string& name) {
   return const_cast<Motor*>(std::as_const(*this).find(name));
 }
 
+void Witness::daemon_ends(TimeNs now_ns) {
+  beginnings_.daemon_ends(now_ns);
+  stop_accepted({.client = {}, .ask = Ask::kStop});
+}
+
+void Witness::arrives(const Request& request) {
+  arrivals_.arrives(request);
+}
+
 void Witness::daemon_started(TimeNs now_ns) {
+  arrivals_.daemon_started();
+  beginnings_.other_daemon();
   promise_.daemon_started();
   none_waits_ns_ = now_ns;
   asked_.clear();
@@ -68,6 +79,7 @@ void Witness::daemon_started(TimeNs now_ns) {
     motor.over = motor.stops = motor.pauses = motor.held = false;
     motor.idle_checks = 0;
     motor.held_at.reset();
+    motor.stopped_at.reset();
   }
   std::fill(states_.begin(), states_.end(), std::nullopt);
   positions_.daemon_started();
@@ -81,6 +93,8 @@ void Witness::pressed(TimeNs now_ns, std::size_t motor) {
 }
 
 void Witness::carried_out(TimeNs now_ns, const Request& request) {
+  arrivals_.carried_out(request);
+  if (request.ask == Ask::kClearFaults) beginnings_.faults_are_cleared();
   asked_[key_of(request.id())] =
       Asked{.request = request, .since_ns = now_ns, .due_since_ns = now_ns};
 }

@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "api/snapshot.h"
+#include "arrivals.h"
+#include "beginnings.h"
 #include "config/config.h"
 #include "crate_model.h"
 #include "positions.h"
@@ -43,11 +45,17 @@ class Witness {
   void violated(TimeNs now_ns, const std::string& what);
   const std::optional<Violation>& violation() const { return violation_; }  // the first
 
+  void daemon_ends(TimeNs now_ns);     // it has been asked to, and begins nothing any more
   void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
   // A second daemon talks on the line: it may take MCUs over, and with them what they move.
-  void second_daemon(TimeNs now_ns) { second_ns_ = now_ns; }
+  void second_daemon(TimeNs now_ns) {
+    second_ns_ = now_ns;
+    beginnings_.other_daemon();
+  }
   // Its limit switch is, or was until now, active.
   void pressed(TimeNs now_ns, std::size_t motor);
+  // At the daemon, where it may wait for its turn.
+  void arrives(const Request& request);
   // Before the core gets it; after that come the replies that it makes at once.
   void carried_out(TimeNs now_ns, const Request& request);
   void reply(TimeNs now_ns, const Key& key, const bushd::api::Reply& reply);
@@ -144,6 +152,12 @@ class Witness {
     TimeNs set_ns = -1;   // when somebody said where it stands, the last time
     int idle_checks = 0;  // of the deadlines, while no motion of it was open
     std::optional<std::int64_t> held_at{};
+    TimeNs asked_ns = -1;  // when somebody asked for a motion of it, the last time
+    std::optional<std::int64_t> stopped_at{};  // where it stood when a stop was done, until then
+    void is_asked_for(TimeNs now_ns) {
+      asked_ns = now_ns;
+      stopped_at.reset();
+    }
     bool moves() const { return move && !over; }
     bool stands_paused() const { return move && over && pauses; }
   };
@@ -264,6 +278,7 @@ class Witness {
   // What is asked of one motor of a line is asked of all.
   bool concerns(const Request& request, const Motor& motor) const;
   void stop_accepted(const Request& request);
+  void stop_is_done(const Asked& asked, const std::string& reason);
   void pause_accepted(TimeNs now_ns, const Request& request);
   void hold_accepted(const Request& request);
   void paused(TimeNs now_ns, const Key& key, const std::string& reason);
@@ -292,6 +307,8 @@ class Witness {
   const bushd::config::Config& config_;
   const bushd::sim::Plant& plant_;
   Recent& recent_;
+  Arrivals arrivals_;
+  Beginnings beginnings_;
   Positions positions_;
   Starts starts_;
   Units units_;

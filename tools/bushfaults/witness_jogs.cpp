@@ -53,6 +53,19 @@ void Witness::stop_accepted(const Request& request) {
   }
 }
 
+// What it names stands, unless it says otherwise, and makes no step until somebody asks for one.
+void Witness::stop_is_done(const Asked& asked, const std::string& reason) {
+  for (const char* otherwise : {"unknown", "lost", "new target", "not waited for"}) {
+    if (reason.find(otherwise) != std::string::npos) return;
+  }
+  for (Motor& motor : motors_) {
+    const bool named =
+        asked.request.ask == Ask::kEmergencyStop || asked.request.names_or_all(motor.name);
+    if (!named || is_shutter(motor) || motor.asked_ns >= asked.since_ns) continue;
+    motor.stopped_at = plant_steps(motor);
+  }
+}
+
 // Where some of a line wait no more, those that have begun are stopped.
 void Witness::disarm_accepted(const Request& request) {
   for (const Motor& motor : motors_) {
@@ -69,6 +82,7 @@ void Witness::pause_accepted(TimeNs now_ns, const Request& request) {
     if (!concerns(request, motor) || !motor.move) continue;
     Asked& asked = asked_.at(*motor.move);
     if (request.ask == Ask::kResume) {
+      motor.is_asked_for(now_ns);
       if (std::exchange(motor.pauses, false)) motor.goes_on |= motor.over;
       asked.due_since_ns = now_ns;
     } else if (asked.jog) {
@@ -255,9 +269,14 @@ void Witness::configured(TimeNs now_ns, const Asked& asked, const api::Completed
 
 void Witness::watch(TimeNs now_ns) {
   watch_ways();
+  for (std::size_t i = 0; i < motors_.size(); ++i) {
+    const auto wrong = beginnings_.watch(now_ns, i, plant_steps(motors_[i]));
+    if (wrong) violated(now_ns, motors_[i].name + *wrong);
+  }
   const bool second = second_ns_ >= 0 && now_ns - second_ns_ < 5 * kSecond;
   for (Motor& motor : motors_) {
     if (second) motor.held_at.reset();
+    if (second) motor.stopped_at.reset();
     const std::int64_t stands = plant_steps(motor);
     if (motor.range && second_ns_ < motor.range->since_ns &&
         (stands < motor.range->low - motor.own_ramp_excess ||
@@ -265,6 +284,10 @@ void Witness::watch(TimeNs now_ns) {
       violated(now_ns, fmt::format("{} is at {}, and its limits are {} and {}, in steps since the "
                                    "beginning",
                                    motor.name, stands, motor.range->low, motor.range->high));
+    }
+    if (motor.stopped_at && *motor.stopped_at != stands) {
+      violated(now_ns, fmt::format("{} is said to be stopped, at {}, and moves to {}", motor.name,
+                                   *motor.stopped_at, stands));
     }
     if (motor.held_at && *motor.held_at != stands) {
       violated(now_ns, fmt::format("{} is held at {}, and moves to {}", motor.name, *motor.held_at,

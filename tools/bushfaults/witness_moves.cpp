@@ -38,6 +38,8 @@ bool Witness::End::agrees(const api::MotorResult& result) const {
 void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   const Request& request = asked.request;
   check_limits(now_ns, asked);
+  if (const auto wrong = arrivals_.accepted(request)) violated(now_ns, *wrong);
+  if (request.ask == Ask::kEmergencyStop) beginnings_.emergency_stop(now_ns);
   if (request.is_stop()) stop_accepted(request);
   if (request.ask == Ask::kDisarm) disarm_accepted(request);
   if (request.ask == Ask::kPause || request.ask == Ask::kResume) pause_accepted(now_ns, request);
@@ -65,6 +67,7 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   Motor& motor = *find(request.motors[i]);
   const std::int64_t stands = plant_steps(motor);
   if (motor.held) violated(now_ns, motor.name + " is held, and may move: " + text_of(request));
+  motor.is_asked_for(now_ns);
   forget_unbegun(motor);
   std::optional<std::int64_t> target;
   if (request.ask == Ask::kMoveBy || request.ask == Ask::kArm) {
@@ -186,6 +189,7 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
   if (request.ask == Ask::kSetPosition && done) position_set(request);
   if (request.ask == Ask::kConfigure) configured(now_ns, asked, completed);
   if (request.ask == Ask::kPause) paused(now_ns, key, completed.reason);
+  if (request.is_stop() && done) stop_is_done(asked, completed.reason);
   if (request.ask == Ask::kJog && asked.jog) jogged(now_ns, asked, completed);
   if (request.ask == Ask::kCamac) {
     crate_answered(now_ns, request, std::get<api::CamacResult>(completed.detail));

@@ -328,6 +328,10 @@ void World::strike(FaultKind kind) {
       length_ns = random.magnitude(100 * kMs, 3 * kSecond);
       host_.pause(now_ns_, now_ns_ + length_ns);
       break;
+    case FaultKind::kEnd:
+      length_ns = random.magnitude(10 * kMs, 3 * kSecond);
+      host_.end(now_ns_, length_ns);
+      break;
     case FaultKind::kKill:
       length_ns = random.magnitude(10 * kMs, 3 * kSecond);
       host_.kill(now_ns_, now_ns_ + length_ns);

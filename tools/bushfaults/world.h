@@ -46,6 +46,7 @@ struct Options {
   FaultRates fault_rates = usual_fault_rates();
   CommandRates command_rates = usual_command_rates();
   bool keep_positions = false;
+  bool all_kinds = false;  // as it was said
   SmallOptions small;
   std::int64_t crystal_ppm = 50;
 };
