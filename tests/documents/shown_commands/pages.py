@@ -50,7 +50,7 @@ class Shown:
 def is_template(text):
     first = text.splitlines()[0]
     words = [re.sub(r"[\[\](),]", "", word) for word in re.sub(r"'[^']*'|\"[^\"]*\"", "", first).split()[1:]]
-    words = [word for word in words if "=" not in word or word == word.upper()]
+    words = [word for word in words if "=" not in word or re.fullmatch("[A-Z]+=[A-Z]+(?:\\.\\.\\.)?", word)]
     return "..." in first or " [" in first or any(PLACEHOLDER.fullmatch(word.removesuffix("...")) for word in words)
 
 
