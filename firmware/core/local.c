@@ -176,8 +176,8 @@ bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
   // A key that moves others would be forgotten.
   if (first && (mcu->local.held & mcu->autonomous) != 0) return BUSHD_E_STATE;
   const bool of_keypad = settings->keypad != message->keypad;
-  take_away(mcu, mcu->local.held &
-                     (uint16_t) ~(mcu->local.by_keypad ? message->keypad : message->motors));
+  take_away(
+      mcu, mcu->local.held & (uint16_t)~(mcu->local.by_keypad ? message->keypad : message->motors));
   *settings = *message;
   mcu->local.configuring = false;
   if (first) {

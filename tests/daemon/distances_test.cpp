@@ -22,8 +22,7 @@ class Distances : public testing::Test {
   explicit Distances(const std::string& toml = hall(1, 2)) : lab(toml) { lab.connect(); }
 
   // Refused with this reason, and nobody's motion is another one for it.
-  void expect_refused(
-      const std::string& why, const std::function<void()>& then = [] {}) {
+  void expect_refused(const std::string& why, const std::function<void()>& then = [] {}) {
     const Answer answer = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {10}));
     EXPECT_EQ(answer.result, "refused");
     EXPECT_THAT(answer.reason, HasSubstr("m01: " + why));

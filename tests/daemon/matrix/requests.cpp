@@ -82,9 +82,7 @@ const std::vector<Row>& requests() {
        }},
       {"stop", [](const Name& m, const Name&, Random&) -> api::Request { return api::Stop{{m}}; }},
       {"stop, named twice",
-       [](const Name& m, const Name&, Random&) -> api::Request {
-         return api::Stop{{m, m}};
-       }},
+       [](const Name& m, const Name&, Random&) -> api::Request { return api::Stop{{m, m}}; }},
       {"stop, and of nobody",
        [](const Name& m, const Name&, Random&) -> api::Request {
          return api::Stop{{m, "nobody"}};

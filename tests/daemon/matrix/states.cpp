@@ -43,10 +43,7 @@ const std::vector<State>& states() {
   static const std::vector<State> kStates{
       {"rest", "c", false, "d", [](WatchedLab&) {}},
       {"rest with a home switch", "a", false, "d", [](WatchedLab&) {}},
-      {"asked for just now", "c", false, "d",
-       [](WatchedLab& lab) {
-         move(lab, {{"c", 900}});
-       }},
+      {"asked for just now", "c", false, "d", [](WatchedLab& lab) { move(lab, {{"c", 900}}); }},
       {"moving", "c", true, "d",
        [](WatchedLab& lab) {
          move(lab, {{"c", 2500}});
@@ -177,9 +174,7 @@ const std::vector<State>& states() {
          lab.ask(api::Hold{{"c"}});
        }},
       {"arming", "c", false, "d",
-       [](WatchedLab& lab) {
-         lab.ask(api::Arm{.delay_us = 100, .motors = {{"c", 400}}});
-       }},
+       [](WatchedLab& lab) { lab.ask(api::Arm{.delay_us = 100, .motors = {{"c", 400}}}); }},
       {"armed", "c", false, "d",
        [](WatchedLab& lab) {
          lab.ask(api::Arm{.delay_us = 100, .motors = {{"c", 400}, {"d", -90}}});
