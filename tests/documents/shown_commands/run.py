@@ -122,9 +122,8 @@ class Page:
             raise Failed(f"{command}\nprinted nothing like {note['prints']}:\n{output}")
 
     def run_program(self, shown, note):
-        text = re.sub("^", " " * note.get("indent", 0), shown.text, flags=re.MULTILINE)
         source = self.folder / f"program.{EXTENSIONS[shown.kind]}"
-        source.write_text(note.get("before", "") + text + "\n" + note.get("after", ""))
+        source.write_text(note.get("before", "") + shown.text + "\n" + note.get("after", ""))
         self.shell.must(note.get("shell", "true"))
         command = note.get("as", f"python3 {source.name}" if shown.kind == "python" else "./program")
         self.judge(command, *self.shell.run(command), note)

@@ -24,7 +24,6 @@ Keys of a world file, all optional:
     shown     its first line
     before    source text before it
     after     source text behind it
-    indent    columns by which it is indented then
     shell     shell commands that come before it is run: one that makes `./program` of `program.EXTENSION`, if it needs that
     as        in place of `./program`, or `python3 program.py`
     exit, prints"""
