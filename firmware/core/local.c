@@ -151,7 +151,7 @@ void bushd_mcu_forget_presses(bushd_mcu* mcu, uint8_t system_inputs) {
 }
 
 void bushd_mcu_wait_for_local(bushd_mcu* mcu) {
-  mcu->local.configuring = (mcu->config.disabled_capabilities & BUSHD_CAN_LOCAL) == 0;
+  mcu->local.configuring = (mcu->local.settings.motors | mcu->local.settings.keypad) != 0;
 }
 
 // Motors that are taken away from those who move them.
