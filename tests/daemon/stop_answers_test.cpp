@@ -90,7 +90,8 @@ TEST(StopAnswers, OfAnMcuThatIsOfflineNothingIsDone) {
 // A rack without power is no reason for every stop to fail.
 TEST(StopAnswers, OfAllMotorsNameWhatRestedWhenItWasLost) {
   Lab lab(hall(2, 2) +
-          "[[bus]]\nname = \"annex\"\nport = \"/dev/annex\"\nbaud = 500000\n[[mcu]]\nbus = "
+          "[[bus]]\nname = \"annex\"\nport = \"/dev/annex\"\nbaud = 500000\ntick_us = 2560\n"
+          "format = \"fine\"\n[[mcu]]\nbus = "
           "\"annex\"\naddress = 1\n[[motor]]\nname = \"far\"\nmcu = "
           "\"annex:1\"\noutput = 0\ngroup = \"axes\"\n");
   lab.connect();
