@@ -238,7 +238,8 @@ bushd::api::Asker Host::carry_out(const bushd::api::Asker& asker,
   }
   witness_.carried_out(now_ns_, *asked);
   return {.session = std::make_shared<Overhearing>(*this, asker, key_of(asked->id())),
-          .number = asker.number};
+          .number = asker.number,
+          .after_stops = asker.after_stops};
 }
 
 void Host::hear(const std::optional<bushd::lcm::DaemonMessage>& message) {

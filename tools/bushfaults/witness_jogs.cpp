@@ -96,8 +96,14 @@ void Witness::pause_accepted(TimeNs now_ns, const Request& request) {
 
 void Witness::paused(TimeNs now_ns, const Key& key, const std::string& reason) {
   if (reason.find("not waited for") != std::string::npos) return;
-  for (const Motor& motor : motors_) {
+  // "paused: 1 motor; not paused, at their targets: m13, m14"
+  const std::size_t left = reason.find("not paused");
+  for (Motor& motor : motors_) {
     if (motor.paused_by != key || !motor.pauses || !motor.moves()) continue;
+    if (left != std::string::npos && reason.find(motor.name, left) != std::string::npos) {
+      motor.pauses = false;
+      continue;
+    }
     // If another one of its line does not go on, all ramp down for good.
     if (asked_.at(*motor.move).request.line) continue;
     violated(now_ns, motor.name + " is said to be paused, and moves");
