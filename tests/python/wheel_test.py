@@ -163,7 +163,6 @@ class Installed(unittest.TestCase):
         network = [TOP / "tests/tools/with-loopback-multicast"]
         list(self.in_each("-B", HERE / "client_test.py", "Documentation", before=network))
 
-    @unittest.skipUnless(shutil.which("mypy"), "mypy is not there")
     def test_checkers_find_its_types(self):
         with tempfile.TemporaryDirectory() as folder:
             program = pathlib.Path(folder) / "program.py"

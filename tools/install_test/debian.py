@@ -34,13 +34,25 @@ def release_of_this_pc():
     return number if number in RELEASES else list(RELEASES)[-1]
 
 
-def mirror_of_this_pc():
-    """From where this PC has its packages; none named: debootstrap knows one."""
-    for file in [pathlib.Path("/etc/apt/sources.list"), *pathlib.Path("/etc/apt/sources.list.d").glob("*")]:
-        text = file.read_text() if file.is_file() else ""
-        found = re.search(r"^deb (?:\[.*?\] )?(\S*debian\S*)", text, re.MULTILINE) or re.search(r"^URIs: (\S*debian\S*)", text, re.MULTILINE)
-        if found:
-            return [found[1]]
+def sources_of(text):
+    """(address, components) of each source of binary packages, in either form of sources.list(5)."""
+    for line in re.findall(r"^deb\s+(.*)", text, re.MULTILINE):
+        address, _, *components = re.sub(r"^\[.*?\]\s*", "", line).split("#")[0].split() + ["", ""]
+        yield address, components
+    for paragraph in re.split(r"\n\s*\n", text):
+        fields = {name.lower(): value.split() for name, value in re.findall(r"^([A-Za-z-]+):\s*(.*)", paragraph, re.MULTILINE)}
+        if "deb" in fields.get("types", []) and fields.get("enabled") != ["no"]:
+            for address in fields.get("uris", []):
+                yield address, fields.get("components", [])
+
+
+def mirror_of_this_pc(etc=pathlib.Path("/etc")):
+    """From where this PC has its packages: a folder of the name debian, with the component main; none: debootstrap knows one."""
+    for file in [etc / "apt/sources.list", *sorted(etc.glob("apt/sources.list.d/*"))]:
+        text = file.read_text() if file.suffix in (".list", ".sources") and file.is_file() else ""
+        for address, components in sources_of(text):
+            if re.search(r"/debian/?$", address) and "main" in components:
+                return [address]
     return []
 
 

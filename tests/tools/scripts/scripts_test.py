@@ -5,10 +5,13 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import tempfile
 import unittest
 
 SOURCE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"])
+sys.path.insert(0, str(SOURCE / "tools"))
+from install_test import debian
 
 
 def run(script, *arguments, path):
@@ -48,13 +51,48 @@ class Setup(unittest.TestCase):
                 self.assertIn(package, listed)
 
 
+class Mirror(unittest.TestCase):
+    """From where tools/test-on and tools/test-install make a Debian."""
+
+    def mirror(self, **files):
+        with tempfile.TemporaryDirectory() as folder:
+            etc = pathlib.Path(folder)
+            (etc / "apt/sources.list.d").mkdir(parents=True)
+            for name, text in files.items():
+                (etc / "apt/sources.list.d" / name.replace("_", ".")).write_text(text)
+            return debian.mirror_of_this_pc(etc)
+
+    def test_only_the_folder_debian_with_main_is_one(self):
+        others = (
+            "deb https://packages.example.org/debian-tools stable main\n"
+            "deb http://deb.debian.org/debian-security trixie-security main\n"
+            "deb [arch=amd64] https://download.example.org/linux/debian trixie stable\n"
+            "# deb http://old.example.org/debian trixie main\n"
+        )
+        self.assertEqual(self.mirror(a_list=others), [])
+        self.assertEqual(self.mirror(a_list=others, b_list="deb [signed-by=/x y=z] http://one.example.org/debian/ trixie main contrib\n"),
+                         ["http://one.example.org/debian/"])
+
+    def test_either_form_and_the_first_file_by_name(self):
+        off = "Types: deb\nEnabled: no\nURIs: http://off.example.org/debian\nSuites: trixie\nComponents: main\n"
+        sources = "Types: deb-src\nURIs: http://src.example.org/debian\nSuites: trixie\nComponents: main\n"
+        on = "Types: deb deb-src\nURIs: http://x.example.org/other http://on.example.org/debian\nSuites: trixie\nComponents: main\n"
+        last = "deb http://last.example.org/debian trixie main\n"
+        self.assertEqual(self.mirror(a_sources=f"{off}\n{sources}\n{on}", b_list=last, a_save=last), ["http://on.example.org/debian"])
+        self.assertEqual(self.mirror(c_sources=on, b_list=last), ["http://last.example.org/debian"])
+
+
 class Presets(unittest.TestCase):
     def test_each_configure_states_what_others_may_have_left_out(self):
         """tools/demo leaves out tests and benchmarks, and a cache keeps what nobody states."""
         base = next(preset for preset in json.loads((SOURCE / "CMakePresets.json").read_text())["configurePresets"] if preset["name"] == "base")
         stated = base["cacheVariables"]
-        left_out = re.findall(r"-D(BUSHD_\w+)=", (SOURCE / "tools/demo").read_text())
-        self.assertGreaterEqual(len(left_out), 2)
+        told = "".join(page.read_text() for page in [SOURCE / "tools/demo", *SOURCE.glob("*.md"), *SOURCE.glob("docs/*.md")])
+        configures = re.findall(r"cmake --preset (?:\\\n|[^\n`&])*", told)
+        self.assertGreaterEqual(len(configures), 3)
+        # With -B it is another folder, which no preset finds.
+        left_out = {option for line in configures if " -B " not in line for option in re.findall(r"-D(BUSHD_\w+)=", line)}
+        self.assertLessEqual({"BUSHD_TESTS", "BUSHD_BENCHMARKS"}, left_out)
         for option in left_out:
             self.assertEqual(stated.get(option), "ON", option)
         self.assertEqual(stated["BUSHD_WERROR"], "$penv{BUSHD_WERROR}")
