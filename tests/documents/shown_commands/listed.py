@@ -3,6 +3,7 @@
 import fnmatch
 import os
 import pathlib
+import re
 import tomllib
 
 FILE = pathlib.Path(__file__).resolve().parent / "not_run.toml"
@@ -10,8 +11,8 @@ SOURCE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"])
 
 
 class Listed:
-    """Entries `[[not_run]]`: `reason`, `commands` (patterns of the shell, of a command's first line), `pages` (absent: all), and `by`:
-    the file that runs them in its own way, where there is one."""
+    """Entries `[[not_run]]`: `reason`, `commands` (patterns of the shell, of a command's first line), `pages` (absent: all), and who
+    runs them in its own way, if anybody: `by`, a file that holds each of them, or `reads`, one that takes them from the page."""
 
     def __init__(self):
         self.entries = tomllib.loads(FILE.read_text())["not_run"]
@@ -31,5 +32,20 @@ class Listed:
     def unused(self):
         return [(entry["reason"], pattern) for entry in self.entries for pattern in entry["commands"] if (entry["reason"], pattern) not in self.used]
 
-    def missing_files(self):
-        return [entry["by"] for entry in self.entries if "by" in entry and not (SOURCE / entry["by"]).exists()]
+    def not_there(self):
+        """What `by` and `reads` claim, and the file does not have."""
+        for entry in self.entries:
+            if by := entry.get("by"):
+                held = words_of((SOURCE / by).read_text())
+                for pattern in entry["commands"]:
+                    if words_of(pattern.removeprefix("sudo ").split("*")[0]) not in held:
+                        yield f"{by} does not have: {pattern}"
+            if reads := entry.get("reads"):
+                for page in entry["pages"]:
+                    if pathlib.Path(page).name not in (SOURCE / reads).read_text():
+                        yield f"{reads} does not read {page}"
+
+
+def words_of(text):
+    """Of a command line, or of a program that has it as a list; with a line's continuation."""
+    return re.sub(r"[\s\"',()\\]+", " ", text).rstrip()
