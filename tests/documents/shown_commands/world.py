@@ -112,6 +112,7 @@ class Shell:
 
     def run_in_terminal(self, command, typed):
         """(exit code, what it has printed): a terminal, at which somebody types when conditions hold."""
+        self._environment = self._exported()
         log = self._next(command)
         self.log = log
         process, terminal = pty.fork()
@@ -142,6 +143,12 @@ class Shell:
             raise Failed(f"{command}\ncame to its end before {typed[0][0]}: {printed(log)}")
         code = os.waitstatus_to_exitcode(status)
         return (code if code >= 0 else 128 - code), printed(log)
+
+    def _exported(self):
+        """What bash gives to its programs by now."""
+        file = self._logs / "exported"
+        self.must(f"env -0 >{file}")
+        return dict(line.split("=", 1) for line in file.read_text().split("\0") if line)
 
     def _holds(self, condition, output):
         if condition.startswith("$ "):
