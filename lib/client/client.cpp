@@ -83,7 +83,7 @@ Result<Opened> open_link(const ClientOptions& options) {
   if (options.way != Way::kLcm) {
     std::optional<Error> first;
     for (const std::string& path : socket_paths(options)) {
-      auto link = open_socket(path);
+      auto link = open_socket(path, options.another);
       if (link) return Opened{.link = std::move(*link)};
       if (!first) first = link.error();
       if (barred.empty() && is_barred(path)) barred = link.error().text();

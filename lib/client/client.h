@@ -37,6 +37,7 @@ struct ClientOptions {
   std::string url = {};     // of LCM (lcm_url)
   std::string prefix = kDefaultPrefix;            // of the channels, [lcm] prefix in bushd.toml
   std::string program = "client";                 // begins the client_id
+  std::string another = kNameAnother;             // how a user names another daemon, for errors
   int interrupt_fd = -1;                          // once readable, waiting ends; -1: never
   std::chrono::milliseconds resend_every{300};    // until the daemon has answered
   std::chrono::milliseconds answer_within{3000};  // then it is given up

@@ -29,7 +29,12 @@ class Link {
 };
 
 Result<std::unique_ptr<Link>> open_lcm(const std::string& url, const std::string& prefix);
-Result<std::unique_ptr<Link>> open_socket(const std::string& path);
+
+// What every client heeds.
+inline constexpr const char* kNameAnother = "$BUSHD_CONTROL";
+// `another`: how a user names another daemon, for the error.
+Result<std::unique_ptr<Link>> open_socket(const std::string& path,
+                                          const std::string& another = kNameAnother);
 
 // There is a socket at this path, or a folder that hides it, to which this user has no right.
 bool is_barred(const std::string& path);

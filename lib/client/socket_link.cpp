@@ -27,39 +27,35 @@ std::string no_right(const std::string& path) {
   const group* entry = ::stat(path.c_str(), &status) == 0 ? ::getgrgid(status.st_gid) : nullptr;
   if (entry != nullptr && entry->gr_gid == 0) {
     return "this user has no right to the control socket: it is for root only. Set [control] group "
-           "in "
-           "bushd.toml, and restart bushd";
+           "in bushd.toml, and restart bushd";
   }
   if (entry == nullptr) return "this user has no right to the control socket";
   return fmt::format(
       "this user has no right to the control socket: it is for the group {0}. Run 'sudo usermod "
-      "-aG "
-      "{0} USER', then log in again",
+      "-aG {0} USER', then log in again",
       entry->gr_name);
 }
 
 // There is no daemon behind this path, as connect() says.
-std::string no_daemon(const std::string& path, int error) {
-  constexpr const char* kStart =
+std::string no_daemon(const std::string& path, int error, const std::string& another) {
+  const std::string start =
       "Start it with 'sudo systemctl start bushd', or 'bushd --config FILE'; for another daemon "
-      "use "
-      "--socket PATH ($BUSHD_CONTROL), or --lcm";
+      "use " +
+      another;
   if (error == ENOENT || error == ENOTDIR) {
-    return fmt::format("no control socket at {}: bushd is not running. {}", path, kStart);
+    return fmt::format("no control socket at {}: bushd is not running. {}", path, start);
   }
   if (error == ECONNREFUSED) {
-    return fmt::format("nobody listens at the control socket {}: bushd has ended. {}", path,
-                       kStart);
+    return fmt::format("nobody listens at the control socket {}: bushd has ended. {}", path, start);
   }
   if (error == EAGAIN) {
     return fmt::format(
         "bushd takes no connection at {}: it hangs, or others take all of its time; its log may "
-        "tell "
-        "why",
+        "tell why",
         path);
   }
   return fmt::format("no bushd at the control socket {}: {}. {}", path, std::strerror(error),
-                     kStart);
+                     start);
 }
 
 class SocketLink : public Link {
@@ -114,7 +110,7 @@ class SocketLink : public Link {
 
 }  // namespace
 
-Result<std::unique_ptr<Link>> open_socket(const std::string& path) {
+Result<std::unique_ptr<Link>> open_socket(const std::string& path, const std::string& another) {
   sockaddr_un address{};
   if (path.size() >= sizeof address.sun_path) {
     return fail(Error{.message = "the path of the control socket is too long", .file = path});
@@ -129,7 +125,7 @@ Result<std::unique_ptr<Link>> open_socket(const std::string& path) {
   if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int error = errno;
     if (error == EACCES) return fail(Error{.message = no_right(path), .file = path});
-    return fail(no_daemon(path, error));
+    return fail(no_daemon(path, error, another));
   }
   return link;
 }

@@ -62,8 +62,10 @@ TEST_F(OpenTest, WithoutASocketBushdIsNotRunning) {
         error_of({.way = way}),
         AllOf(HasSubstr("no control socket at " + path_.string() + ": bushd is not running"),
               HasSubstr("sudo systemctl start bushd"), HasSubstr("bushd --config FILE"),
-              HasSubstr("--socket PATH"), Not(HasSubstr("LCM"))));
+              HasSubstr("for another daemon use $BUSHD_CONTROL"), Not(HasSubstr("--socket")),
+              Not(HasSubstr("LCM")), Not(HasSubstr("--lcm"))));
   }
+  EXPECT_THAT(error_of({.another = "--bus NAME"}), HasSubstr("for another daemon use --bus NAME"));
   // A part of the path is a file.
   std::ofstream(path_) << "x";
   EXPECT_THAT(error_of({.socket = (path_ / "control").string()}),

@@ -18,7 +18,10 @@ namespace bushctl {
 
 bushd::client::ClientOptions Connection::options() const {
   using Way = bushd::client::ClientOptions::Way;
-  bushd::client::ClientOptions options{.url = url, .prefix = prefix, .program = "bushctl"};
+  bushd::client::ClientOptions options{.url = url,
+                                       .prefix = prefix,
+                                       .program = "bushctl",
+                                       .another = "--socket PATH ($BUSHD_CONTROL), or --lcm"};
   options.socket = socket;
   if (!socket.empty()) {
     options.way = Way::kSocket;
