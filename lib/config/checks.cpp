@@ -48,8 +48,7 @@ Result<void> check_step_period(const Loading& loading, std::size_t index) {
   Error error = mcu.emission.step_at;
   error.message = fmt::format(
       "is {}: room for {} steps in the {} us tick of bus \"{}\", but motor \"{}\" makes up to {} "
-      "by "
-      "table \"{}\"; allowed: {} or less. Or use a slower table",
+      "by table \"{}\"; allowed: {} or less. Or use a slower table",
       mcu.emission.settings.step_us, room, bus.tick_us, bus.name, motor.name, steps,
       config.table_of(motor).name(), (bus.tick_us - dir_setup_us) / steps);
   return fail(std::move(error));

@@ -45,8 +45,7 @@ std::string fault_text(const bushd_report& report) {
   if (faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; run 'bushctl clear'";
   if (faults & BUSHD_FAULT_EEPROM) {
     return "its stored settings were unreadable, defaults are in use; if its unique id is 0 in "
-           "'bushctl "
-           "health', write that anew (docs/firmware.md), then run 'bushctl clear'";
+           "'bushctl health', write that anew (docs/firmware.md), then run 'bushctl clear'";
   }
   if (faults & BUSHD_FAULT_SYNC) return "out of step with the bus";
   if (faults & BUSHD_FAULT_LINK) return "nothing more reached it in motion";

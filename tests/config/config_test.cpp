@@ -480,8 +480,7 @@ INSTANTIATE_TEST_SUITE_P(
                          "tick_us = 10000"),
                 37, "motor[1].group",
                 "makes up to 201 steps in the 10000 us tick of bus \"roof\"; allowed: 127. Use a "
-                "slower "
-                "table or tick_us = 6349 or less"}),
+                "slower table or tick_us = 6349 or less"}),
     kNames);
 
 }  // namespace

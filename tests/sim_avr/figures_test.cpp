@@ -120,8 +120,7 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
   EXPECT_GE(steps_per_s, load.goal_steps_per_s);
   std::printf(
       "ATmega2560 %s, %d steps a tick%s: %.0f steps/s of 16 motors; tick %.0f us (%.0f "
-      "interrupts), "
-      "%.0f steps in all, "
+      "interrupts), %.0f steps in all, "
       "pulses from %.2f us, jitter %.0f cycles, %zu bytes of stack never used\n",
       load.format == BUSHD_FORMAT_FINE ? "fine" : "coarse", load.steps,
       polls != 0 ? ", answering" : "", steps_per_s, chip_tick_ns / 1000, entries,

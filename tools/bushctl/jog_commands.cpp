@@ -115,8 +115,8 @@ void add_jog_commands(CommandLine& line) {
           "bushctl jog NAME SPEED    at this speed in the motor's unit per second, negative: the "
           "other way, 0: end the jog of whoever jogs it\n"
           "bushctl jog NAME          by keys: left and right jog until another key stops, or a "
-          "held "
-          "one is let go; up and down move by a step; + - change the speed, * / the step; q ends\n"
+          "held one is let go; up and down move by a step; + - change the speed, * / the step; "
+          "q ends\n"
           "The motor ramps down at its soft limit, and when this program ends, however it ends.")
       .words("NAME", &options->words, "The motor, and its speed", Command::Needed::kYes)
       .flag("--steps", &options->steps, "Numbers are steps, not the motor's unit")

@@ -71,11 +71,9 @@ void add_move(CommandLine& line) {
           "Both are in the motor's unit, or in steps of a motor without one, and may be negative; "
           "the nearest step counts. A motor that moves is given a new target; a distance then "
           "counts from its present one. With --wait the exit code is 0 only if every motor reached "
-          "its "
-          "target.\n"
+          "its target.\n"
           "With --line motors of one bus move along a straight line: at any moment each of them "
-          "has "
-          "made the same share of its way. Stops, pauses and limits of one act on all.\n"
+          "has made the same share of its way. Stops, pauses and limits of one act on all.\n"
           "NAME --to POSITION --speed-at AT:SPEED [--speed-at AT:SPEED...] moves one motor, from "
           "each of these positions on not faster than that, until the next one; it makes no last "
           "approach for backlash.")
@@ -137,10 +135,9 @@ void add_arm(CommandLine& line) {
           "bushctl arm --delay-us US --line NAME DISTANCE [NAME DISTANCE...], or NAME --to "
           "POSITION\n"
           "Motors at rest. Those of one MCU begin in the same slot, three ticks and the delay "
-          "after "
-          "the edge at its trigger input. With --line they move along a straight line, as with "
-          "move --line, on MCUs that can make it; each MCU goes by the edge at its own input. With "
-          "--wait the exit code is 0 only if every motor "
+          "after the edge at its trigger input. With --line they move along a straight line, as "
+          "with move --line, on MCUs that can make it; each MCU goes by the edge at its own input. "
+          "With --wait the exit code is 0 only if every motor "
           "reached its target.")
       .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'650'000,
                             "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
@@ -231,10 +228,9 @@ void add_home(CommandLine& line) {
   line.add("home", "Home motors at their switches")
       .footer(
           "As the configuration's 'home' says. Those of one MCU are homed one after the other; "
-          "with "
-          "--all those of one 'order' are homed together, the lowest first, and one that is not "
-          "found ends the others. With --wait the exit code is 0 only if every motor has found its "
-          "switch; 'bushctl stop' ends it, and with --wait Ctrl-C (with --all it stops all "
+          "with --all those of one 'order' are homed together, the lowest first, and one that is "
+          "not found ends the others. With --wait the exit code is 0 only if every motor has found "
+          "its switch; 'bushctl stop' ends it, and with --wait Ctrl-C (with --all it stops all "
           "motors).")
       .words("NAME", &options->motors, "Motors", Command::Needed::kNo)
       .flag("--all", &options->all, "All motors with a home switch, by their order")

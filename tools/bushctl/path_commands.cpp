@@ -50,15 +50,13 @@ Command& describe(Command& command, const std::shared_ptr<PathOptions>& options)
   return command
       .footer(
           "The first line of FILE names motors of one bus, each further one has a position of "
-          "each, "
-          "in its unit:\n"
+          "each, in its unit:\n"
           "  x, y\n"
           "  0, 0\n"
           "  10, 0.5\n"
           "The motors move from where they stand to the first of these points and on from point to "
           "point, along straight lines and by one run. Stops, pauses and limits of one of them "
-          "ramp "
-          "all down along the path. No last approach for backlash is made.")
+          "ramp all down along the path. No last approach for backlash is made.")
       .option("FILE", &options->file, "Points, CSV")
       .choice(
           "--corners", &options->corners, {"continuous", "exact"},

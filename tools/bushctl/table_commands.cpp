@@ -187,8 +187,7 @@ void add_use(CommandLine& line) {
       .footer(
           "TABLE is NAME, NAME@REVISION or NAME@TAG, as for bushtab. Motors that move keep their "
           "table; once those of the group's MCUs stand, the MCUs get the new one, and the next "
-          "move "
-          "is by it. It stays in service when the daemon is started again.")
+          "move is by it. It stays in service when the daemon is started again.")
       .option("GROUP", &request->group, "The group")
       .option("TABLE", &request->table, "Table of the group from the next move on")
       .run([&line, request] {

@@ -70,8 +70,7 @@ std::string summary_text(const World& world, double processor_s) {
   const SecondDaemon::Counts& second = world.second_daemons();
   text += fmt::format(
       "second     daemons: {} found the first on their network, {} ran; {} of their moves "
-      "accepted, "
-      "{} refused\n",
+      "accepted, {} refused\n",
       second.found_other, second.ran, second.moves_accepted, second.moves_refused);
   text += "moves      by result\n";
   for (const auto& [result, count] : world.witness().moves_by_result()) {
@@ -103,8 +102,7 @@ std::string summary_text(const World& world, double processor_s) {
     const Witness& witness = world.witness();
     text += fmt::format(
         "ways       {} lines and paths reached, {:.1f} steps off them at most; {} of them changed "
-        "at "
-        "different ticks, {} apart at most\n",
+        "at different ticks, {} apart at most\n",
         witness.ways(), witness.worst_off_way(), witness.ways_apart(), witness.most_ticks_apart());
   }
   text += fmt::format("skew       {:.1f} us between MCUs in step, at most\n",

@@ -243,8 +243,7 @@ class Inspector {
     worst.diagnostic.index = index;
     worst.diagnostic.message = fmt::format(
         "the speed jumps from {:.6g} to {:.6g} steps/s within a step, and the rotor catches up "
-        "{:.3g} "
-        "steps/s, {:.3g} with the safety factor: {}. {}",
+        "{:.3g} steps/s, {:.3g} with the safety factor: {}. {}",
         from_hz, to_hz, greatest_hz, worst.diagnostic.limit, outcome(worst),
         from_hz > 0 ? "Use a shorter time unit, or put codes in between"
                     : "Put slower codes before it");
