@@ -161,10 +161,11 @@ class SerialPulse(EndToEndTest):
     def test_the_commands_of_the_document(self):
         document = (TOP / "docs" / "heritage.md").read_text()
         block = document.split("<!-- serial-pulse: begin -->")[1].split("<!-- serial-pulse: end -->")[0]
-        bushsim, bushd, bushctl = [line.strip().rstrip("& ") for line in block.strip().splitlines()]
+        export, bushsim, bushd, bushctl = [line.strip().rstrip("& ") for line in block.strip().splitlines()]
         config = TOP / "tools" / "examples" / "serial-pulse.toml"
-        text = config.read_text().replace("/tmp/bushd-com1", str(self.file("port")))
-        self.file("x.toml").write_text(text + f'[control]\npath = "{self.file("control")}"\n[state]\npath = ""\n')
+        text = config.read_text()
+        self.assertIn(f'path = "{export.removeprefix("export BUSHD_CONTROL=")}"', text)
+        self.file("x.toml").write_text(text.replace("/tmp/bushd-com1", str(self.file("port"))).replace("/tmp/bushd-control", str(self.file("control"))))
 
         def here(command):
             command = command.replace("tools/examples/serial-pulse.toml", str(self.file("x.toml")))
