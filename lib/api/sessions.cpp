@@ -102,11 +102,13 @@ Sessions::Ruling Sessions::rule(std::int64_t session, const std::string& client_
 void Sessions::note_stop(Known& session, std::int64_t number, std::uint64_t stops) {
   std::erase_if(session.stops,
                 [&](const auto& stop) { return !session.numbers.holds(stop.first); });
-  session.stops.emplace(number, stops);
+  // What is asked for before it was so before the stops with higher numbers, too.
+  const auto next = session.stops.upper_bound(number);
+  if (next != session.stops.end()) stops = std::min(stops, next->second);
+  session.stops.emplace_hint(next, number, stops);
   if (session.stops.size() <= kMostStops) return;
   const auto oldest = session.stops.begin();
-  const auto next = std::next(oldest);
-  next->second = std::min(next->second, oldest->second);
+  std::next(oldest)->second = oldest->second;
   session.stops.erase(oldest);
 }
 

@@ -100,7 +100,8 @@ class Sessions {
     std::map<std::int64_t, Answer> answers{};
     std::list<std::int64_t> by_age{};  // numbers of `answers`, oldest first
     std::size_t bytes = 0;
-    // Numbers of requests that end motion, and how many had arrived before each.
+    // Numbers of requests that end motion, and how many had arrived before the first one of those
+    // from each on: these do not fall as numbers rise.
     std::map<std::int64_t, std::uint64_t> stops{};
   };
   using Iterator = std::unordered_map<std::int64_t, Known>::iterator;

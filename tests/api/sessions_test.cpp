@@ -382,6 +382,17 @@ TEST(Sessions, AFloodOfClientsForgetsTheLongestSilentAndRunsNothingTwice) {
   }
 }
 
+// Requests 6 and 7 are lost and repeated after 10: what comes late is older than both stops.
+TEST(Sessions, AStopThatComesLateHidesNoLaterOne) {
+  Sessions sessions(1);
+  const std::int64_t session = sessions.open("scan", 1);
+  EXPECT_EQ(sessions.rule(session, "scan", 10, Stop{{"a"}}, 4).after_stops, 4u);
+  EXPECT_EQ(sessions.rule(session, "scan", 7, Stop{{"b"}}, 5).after_stops, 4u);
+  EXPECT_EQ(sessions.rule(session, "scan", 6, Move{}, 6).after_stops, 4u);
+  EXPECT_EQ(sessions.rule(session, "scan", 8, Move{}, 6).after_stops, 4u);
+  EXPECT_EQ(sessions.rule(session, "scan", 11, Move{}, 6).after_stops, 6u);
+}
+
 TEST(Sessions, ForgottenSessionsLeaveNoBytesBehind) {
   Sessions sessions(1, {.sessions = 2, .idle_sessions = 1});
   for (int i = 0; i < 100; ++i) {
