@@ -148,6 +148,9 @@ class Lines final : public Service {
                  const std::vector<std::size_t>& indices, std::uint32_t to);
 
   std::optional<Precedence::Overtaken> overtaken(const Incoming& path) const;
+  // Precondition: the installation has its motors.
+  std::optional<Precedence::Overtaken> overtaken(const std::string& client, const api::Asker& asker,
+                                                 const api::MovePath& part) const;
   Result<Incoming> begin_points(const api::Asker& asker, const api::MovePath& request) const;
   Result<void> same_scales(const Incoming& incoming) const;
   Result<void> add_points(Incoming& incoming, const api::MovePath& request) const;
@@ -199,6 +202,8 @@ class Lines final : public Service {
   std::map<std::uint64_t, Line> lines_;
   PathPoints path_points_;
   std::map<std::string, Incoming> incoming_;  // by client
+  // Paths of which a stop has ended all, and points are still to come; by client.
+  std::map<std::string, Precedence::Overtaken> ended_;
   std::list<Coming> coming_;
   std::uint64_t last_number_ = 0;
 };

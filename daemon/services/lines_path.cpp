@@ -64,11 +64,22 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
   const auto motors = installation_.find(request.motors);
   if (!motors) return refuse(motors.error());
   const auto last = path_points_.take(client, request);
-  if (request.first_row == 0) incoming_.erase(client);
+  if (request.first_row == 0) {
+    incoming_.erase(client);
+    ended_.erase(client);
+  }
   if (!last) return refuse(last.error());
-  std::erase_if(incoming_, [&](const auto& one) {
+  const auto is_dropped = [&](const auto& one) {
     return one.first != client && !path_points_.has(one.first);
-  });
+  };
+  std::erase_if(incoming_, is_dropped);
+  std::erase_if(ended_, is_dropped);
+  if (const auto by = overtaken(client, asker, request)) {
+    incoming_.erase(client);
+    ended_.erase(client);
+    if (!*last) ended_.emplace(client, *by);
+    return open_.not_begun(asker, *by);
+  }
   auto incoming = incoming_.find(client);
   Result<void> good;
   if (incoming == incoming_.end()) {
@@ -78,12 +89,6 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
     } else {
       good = fail(begun.error());
     }
-  }
-  // A stop since its first points has ended all of it: those that come still, too.
-  const auto by = good && !request.dry_run ? overtaken(incoming->second) : std::nullopt;
-  if (by) {
-    if (*last) incoming_.erase(incoming);
-    return open_.not_begun(asker, *by);
   }
   if (good) good = same_scales(incoming->second);
   if (good) good = add_points(incoming->second, request);
@@ -116,6 +121,18 @@ std::optional<Precedence::Overtaken> Lines::overtaken(const Incoming& path) cons
   return open_.precedence().overtaken(path.after_stops, path.line.motors);
 }
 
+// A stop since its first points has ended all of it: those that come still, too.
+std::optional<Precedence::Overtaken> Lines::overtaken(const std::string& client,
+                                                      const api::Asker& asker,
+                                                      const api::MovePath& part) const {
+  if (part.dry_run) return std::nullopt;
+  if (const auto ended = ended_.find(client); ended != ended_.end()) return ended->second;
+  if (const auto path = incoming_.find(client); path != incoming_.end()) {
+    return overtaken(path->second);
+  }
+  return open_.precedence().overtaken(asker.after_stops, *installation_.find(part.motors));
+}
+
 void Lines::end_overtaken(std::int64_t) {
   std::erase_if(coming_, [this](const Coming& coming) {
     const auto by = coming.dry_run ? std::nullopt : overtaken(coming.path);
@@ -130,7 +147,6 @@ Result<Lines::Incoming> Lines::begin_points(const api::Asker& asker,
   incoming.after_stops = asker.after_stops;
   Line& line = incoming.line;
   line.motors = *installation_.find(request.motors);
-  if (!request.dry_run && overtaken(incoming)) return incoming;
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
   std::vector<motion::Path::Motor> motors;

@@ -70,6 +70,9 @@ Result<bool> PathPoints::take(const std::string& client, const MovePath& part) {
   const auto rows = static_cast<std::int32_t>(part.positions.size() / part.motors.size());
   if (part.motors != first.motors || part.rows != first.rows || part.speeds.empty() == has_speeds) {
     why = "it is of other motors, or of another number of points, than before";
+  } else if (part.dry_run != first.dry_run) {
+    why = first.dry_run ? "it is to move, and the points before are of a dry run"
+                        : "it is a dry run, and the points before are to move";
   } else if (part.first_row != taken) {
     why = fmt::format("points from {} on where those from {} on were to come", part.first_row + 1,
                       taken + 1);
