@@ -35,16 +35,15 @@ void Arrays::request(std::int64_t now_us, const api::Asker& asker, const api::Fo
   take_rows(now_us, asker, request);
 }
 
-std::optional<Precedence::Overtaken> Arrays::overtaken(const api::Asker& asker,
-                                                       const Array& array) const {
-  const std::uint64_t after = array.followed ? asker.after_stops : array.after_stops;
-  return open_.precedence().overtaken(after, array.motors());
+std::optional<Precedence::Overtaken> Arrays::overtaken(const Array& array) const {
+  if (array.followed) return std::nullopt;
+  return open_.precedence().overtaken(array.after_stops, array.motors());
 }
 
 void Arrays::end_overtaken(std::int64_t) {
   std::erase_if(jobs_, [this](const Job& job) {
     Array& array = *job.array;
-    const auto by = overtaken(job.asker, array);
+    const auto by = overtaken(array);
     if (!by) return false;
     array.waits = false;
     array.spoilt = true;
@@ -131,14 +130,36 @@ Result<void> Arrays::may_go_on(const Array& array, const api::Follow& request) c
   return {};
 }
 
+// One of its motors that does not follow it any more, once it runs.
+std::optional<MotorId> Arrays::no_more(const Array& array) const {
+  if (!array.followed) return std::nullopt;
+  for (const MotorId id : array.motors()) {
+    if (!follows(array, id) || installation_[id].axis().stopping()) return id;
+  }
+  return std::nullopt;
+}
+
+// A stop since these rows were sent has ended the motion of the array that they are of.
+std::optional<api::Reply> Arrays::stopped(const api::Asker& asker, const Array& array) const {
+  const auto off = no_more(array);
+  const auto by =
+      off ? open_.precedence().overtaken(asker.after_stops, array.motors()) : std::nullopt;
+  if (!by) return std::nullopt;
+  return api::Completed{.outcome = api::Outcome::kStopped,
+                        .reason = installation_[*off].name() +
+                                  " does not follow the array any more; " +
+                                  installation_[by->motor].name() + " was stopped by " + by->by,
+                        .detail = {}};
+}
+
 // What has been sent to an MCU cannot be changed any more.
 Result<void> Arrays::has_time(std::int64_t now_us, const Array& array) const {
   if (!array.followed) return {};
+  if (const auto off = no_more(array)) {
+    return fail(installation_[*off].name() + " does not follow the array any more");
+  }
   for (const MotorId id : array.motors()) {
     const Mcu& mcu = installation_.mcu_of(id);
-    if (!follows(array, id) || installation_[id].axis().stopping()) {
-      return fail(installation_[id].name() + " does not follow the array any more");
-    }
     const motion::Tick queued = mcu.earliest_start(now_us, installation_[id].output());
     if (installation_[id].axis().runs_out_before(queued)) {
       return fail(fmt::format(
@@ -213,9 +234,13 @@ void Arrays::take_rows(std::int64_t now_us, const api::Asker& asker, const api::
     array = *begun;
     array->after_stops = asker.after_stops;
   }
-  if (const auto by = overtaken(asker, *array)) {
+  if (const auto by = overtaken(*array)) {
     array->dropped = request.part == api::Follow::Part::kLastRows;
     return open_.not_begun(asker, *by);
+  }
+  if (const auto reply = stopped(asker, *array)) {
+    array->spoilt = true;
+    return asker.answer(*reply);
   }
   auto taken = may_go_on(*array, request);
   if (taken) taken = has_time(now_us, *array);
@@ -296,8 +321,9 @@ void Arrays::end_job(std::int64_t now_us) {
   if (array.followed) {
     if (const auto time = has_time(now_us, array); !time) {
       array.spoilt = true;
-      return job.asker.answer(api::Completed{
-          .outcome = api::Outcome::kFault, .reason = time.error().text(), .detail = {}});
+      const auto reply = stopped(job.asker, array);
+      return job.asker.answer(reply.value_or(api::Completed{
+          .outcome = api::Outcome::kFault, .reason = time.error().text(), .detail = {}}));
     }
     accept_rows(array);
   }
@@ -401,8 +427,7 @@ void Arrays::run(std::int64_t now_us, const api::Asker& asker, const api::Follow
     return asker.answer(api::Refused{"no such array is loaded; tell its rows first"});
   }
   Array& array = *found;
-  const auto by = array.followed ? std::nullopt : overtaken(asker, array);
-  if (by) {
+  if (const auto by = overtaken(array)) {
     arrays_.erase(found);
     return open_.not_begun(asker, *by);
   }

@@ -78,8 +78,11 @@ class Arrays final : public Service {
     int tries = 0;
   };
 
-  // A stop ends an array that does not run yet, with all parts that are still to come.
-  std::optional<Precedence::Overtaken> overtaken(const api::Asker& asker, const Array& array) const;
+  // A stop ends an array that does not run yet, with all parts that are still to come. One that
+  // runs is ended by what ends the motion of its motors.
+  std::optional<Precedence::Overtaken> overtaken(const Array& array) const;
+  std::optional<MotorId> no_more(const Array& array) const;
+  std::optional<api::Reply> stopped(const api::Asker& asker, const Array& array) const;
   std::list<Array>::iterator find(const api::Asker& asker, std::int64_t number);
   Result<std::list<Array>::iterator> begin(const api::Asker& asker, const api::Follow& request);
   Result<void> may_go_on(const Array& array, const api::Follow& request) const;
