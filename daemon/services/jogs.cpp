@@ -14,8 +14,10 @@ std::string ms_text(std::int64_t us) {
   return std::to_string(us / 1000) + " ms";
 }
 
+// Of one that begins, changes or renews a jog. What ends one is not refused for any of it.
 Result<void> in_range(const api::Jog& request) {
   using Jog = api::Jog;
+  if (request.per_s == 0 && !request.renew) return {};
   if (request.keepalive_ms < Jog::kLeastKeepaliveMs ||
       request.keepalive_ms > Jog::kMostKeepaliveMs) {
     return fail("keepalive time of " + std::to_string(request.keepalive_ms) +
@@ -23,15 +25,13 @@ Result<void> in_range(const api::Jog& request) {
                 std::to_string(Jog::kMostKeepaliveMs) + " ms");
   }
   if (!request.steps_after) return {};
-  if (request.per_s != 0) {
-    return fail("steps after the stop event belong to the request that ends the jog, of speed 0");
-  }
-  if (*request.steps_after < 0 || *request.steps_after > motion::Motor::kMaxPosition) {
-    return fail(std::to_string(*request.steps_after) +
-                " steps after the stop event; allowed: 0 to " +
-                std::to_string(motion::Motor::kMaxPosition));
-  }
-  return {};
+  return fail("steps after the stop event belong to the request that ends the jog, of speed 0");
+}
+
+Result<void> check_steps_after(std::int64_t steps) {
+  if (steps >= 0 && steps <= motion::Motor::kMaxPosition) return {};
+  return fail(std::to_string(steps) + " steps after the stop event; allowed: 0 to " +
+              std::to_string(motion::Motor::kMaxPosition));
 }
 
 }  // namespace
@@ -165,14 +165,22 @@ void Jogs::end(std::int64_t now_us, const api::Asker& asker, MotorId id, const a
   });
   asker.answer(api::Accepted{});
   const auto found = jogs_.find(id);
-  if (found == jogs_.end())
-    return asker.answer(api::done(installation_[id].name() + " does not jog"));
+  const std::string& name = installation_[id].name();
+  const auto good = request.steps_after ? check_steps_after(*request.steps_after) : Result<void>();
+  const auto answer_now = [&](const std::string& what) {
+    asker.answer(good ? api::done(name + " " + what)
+                      : api::Completed{.outcome = api::Outcome::kFault,
+                                       .reason = name + ": " + good.error().text() + "; it " + what,
+                                       .detail = {}});
+  };
+  if (found == jogs_.end()) return answer_now("does not jog");
   Jog& jog = found->second;
-  if (jog.waiting.size() >= kMostWaiting) {
+  if (!good) answer_now("is ramped down at once");
+  if (good && jog.waiting.size() >= kMostWaiting) {
     jog.waiting.front().answer(api::done("carried out; its end is not waited for"));
     jog.waiting.erase(jog.waiting.begin());
   }
-  jog.waiting.push_back(asker);
+  if (good) jog.waiting.push_back(asker);
   // What is done at once is not put off.
   if (is_stopped_by_others(id, jog) || (jog.ends && !jog.after)) return;
   const bool own = jog.opened_by.is_same_client(asker);
@@ -180,7 +188,8 @@ void Jogs::end(std::int64_t now_us, const api::Asker& asker, MotorId id, const a
   jog.let_go = own;
   const OpenMoves::Saying ended{own ? api::Outcome::kDone : api::Outcome::kStopped,
                                 own ? "ended by its client" : "ended by " + text_of(asker)};
-  if (request.steps_after && !jog.after) return end_after(now_us, id, *request.steps_after, ended);
+  if (good && request.steps_after && !jog.after)
+    return end_after(now_us, id, *request.steps_after, ended);
   jog.after.reset();
   ramp_down(now_us, id, ended);
 }

@@ -291,10 +291,12 @@ TEST(Jogs, ThatCannotBeAreRefusedWithTheFigure) {
   for (const double bad : {std::nan(""), HUGE_VAL}) reason({.motor = "m01", .per_s = bad});
   EXPECT_THAT(reason({.motor = "m01", .per_s = 1, .keepalive_ms = 49}), HasSubstr("50 to 10000"));
   EXPECT_THAT(reason({.motor = "m01", .per_s = 1, .steps_after = 5}), HasSubstr("of speed 0"));
-  EXPECT_THAT(reason({.motor = "m01", .steps_after = -5}), HasSubstr("allowed: 0 to"));
   EXPECT_THAT(reason({.motor = "m17", .per_s = 1}), HasSubstr("no motor"));
   EXPECT_THAT(reason({.motor = "m01", .renew = true}), HasSubstr("no jog of this client"));
   EXPECT_EQ(lab.wait(lab.send(jog(0))).reason, "m01 does not jog");
+  const Answer end = lab.wait(lab.send(ended_after(-5)));
+  EXPECT_EQ(end.result, "fault");
+  EXPECT_THAT(end.reason, testing::AllOf(HasSubstr("allowed: 0 to"), HasSubstr("does not jog")));
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
@@ -338,7 +340,8 @@ TEST(Jogs, OfALongWayGoOnAsLongAsTheyAreRenewed) {
   Lab lab(lab_with(""));
   lab.connect();
   const auto first = lab.send(jog(0.5));
-  EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") == 2; }, 6));
+  EXPECT_TRUE(keep_going(
+      lab, [&] { return lab.shaft_steps("m01") == 2; }, 6));
   lab.send(jog(0));
   EXPECT_EQ(lab.wait(first, 10).result, "done");
 }
