@@ -253,6 +253,10 @@ void HomingQueue::found(Mcu& mcu) {
   if (!installation_.config()[task.motor].home->then || !task.ended_by.empty()) {
     return end(mcu, Outcome::kReached, "homed");
   }
+  // A pause lets homing go on; what comes after it is another motion.
+  if (const auto by = open_.precedence().overtaken(task.after_stops, {task.motor})) {
+    return end(mcu, Outcome::kReached, "homed; it does not move on, stopped by " + by->by);
+  }
   outputs_.log(LogLevel::kInfo, task.motor, installation_[task.motor].name() + ": homed; moves on");
   task.phase = Phase::kFound;
 }
@@ -375,7 +379,8 @@ bool HomingQueue::end_if_waiting(MotorId id, const std::string& because) {
   if (task == queue.end()) return false;
   if (task->phase == Phase::kFound) {
     installation_[id].end_homing(true);
-    end(installation_.mcu_of(id), Outcome::kStopped, "homed; " + because);
+    end(installation_.mcu_of(id), Outcome::kStopped,
+        "homed; " + (because == kNotItsTurn ? "stopped before it moved on" : because));
     return true;
   }
   if (task->phase != Phase::kWaiting) return false;
