@@ -48,15 +48,22 @@ Result<void> LcmFront::subscribe() {
   for (const std::string_view channel : lcm::client_channels()) {
     if (channel == "SUBSCRIBE") continue;  // all hear everything here
     const bool apart = setup_.stops != nullptr && lcm::is_urgent_channel(channel);
-    lcm::Transport& transport = apart ? *setup_.stops : setup_.transport;
-    const auto subscribed =
-        transport.subscribe_bytes(setup_.prefix + "_" + std::string(channel),
-                                  [this, channel, &transport](lcm::Payload payload) {
-                                    on_message(channel, payload, transport.received_utime_us());
-                                  });
-    if (!subscribed) return subscribed;
+    if (const auto all = listen(setup_.transport, channel, apart ? Takes::kOthers : Takes::kAll);
+        !all) {
+      return all;
+    }
+    if (!apart) continue;
+    if (const auto stops = listen(*setup_.stops, channel, Takes::kStops); !stops) return stops;
   }
   return {};
+}
+
+Result<void> LcmFront::listen(lcm::Transport& transport, std::string_view channel, Takes takes) {
+  return transport.subscribe_bytes(setup_.prefix + "_" + std::string(channel),
+                                   [this, channel, takes, &transport](lcm::Payload payload) {
+                                     on_message(channel, payload, transport.received_utime_us(),
+                                                takes);
+                                   });
 }
 
 void LcmFront::handle() {
@@ -68,8 +75,12 @@ std::uint64_t LcmFront::dropped() const {
   return dropped_;
 }
 
-void LcmFront::on_message(std::string_view channel, lcm::Payload payload, std::int64_t utime_us) {
+void LcmFront::on_message(std::string_view channel, lcm::Payload payload, std::int64_t utime_us,
+                          Takes takes) {
   const auto message = lcm::decode_client_message(channel, payload);
+  const auto* request = message ? std::get_if<api::Request>(&message->content) : nullptr;
+  const bool is_other = request != nullptr && !api::ends_motion(*request);
+  if (takes != Takes::kAll && is_other != (takes == Takes::kOthers)) return;
   if (!message || !api::is_client_id(message->id.client_id)) {
     ++dropped_;
     return;
@@ -111,6 +122,8 @@ void LcmFront::on_request(const lcm::ClientMessage& message, std::size_t bytes,
   const auto& request = std::get<api::Request>(message.content);
   Book book{&sessions_, id.session};
   auto ruling = sessions_.rule(id.session, id.client_id, id.number, request, reception_.stops());
+  // One that its session does not know of is not ordered by its number.
+  const std::int64_t stream = ruling.record ? id.session : 0;
   if (ruling.carry_out && !ruling.record) {
     book = book_without_session(message);
     if (book.sessions != nullptr) {
@@ -127,7 +140,7 @@ void LcmFront::on_request(const lcm::ClientMessage& message, std::size_t bytes,
        .number = id.number,
        .after_stops = ruling.after_stops},
       request, bytes,
-      Arrival{.earliest_ns = came_ns, .latest_ns = came_ns + kNsPerUs - 1, .stream = id.session});
+      Arrival{.earliest_ns = came_ns, .latest_ns = came_ns + kNsPerUs - 1, .stream = stream});
 }
 
 void LcmFront::answer(const lcm::RequestId& id, const Book& book, const api::Reply& reply) {

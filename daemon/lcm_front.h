@@ -17,8 +17,9 @@ class LcmFront : public Listener {
  public:
   struct Setup {
     lcm::Transport& transport;
-    // For channels of what ends motion, with nothing else before it; null: `transport` takes those
-    // too.
+    // For what ends motion, with nothing else before it; null: `transport` takes that too. What
+    // else comes on the same channels, as the beginnings of jogs, is heard on both and taken from
+    // `transport`.
     lcm::Transport* stops = nullptr;
     std::string prefix;
     bool commands = true;    // false: publishes only
@@ -43,8 +44,11 @@ class LcmFront : public Listener {
  private:
   class LcmSession;
 
+  enum class Takes { kAll, kStops, kOthers };
+  Result<void> listen(lcm::Transport& transport, std::string_view channel, Takes takes);
   // `utime_us`: when it came.
-  void on_message(std::string_view channel, lcm::Payload payload, std::int64_t utime_us);
+  void on_message(std::string_view channel, lcm::Payload payload, std::int64_t utime_us,
+                  Takes takes);
   void on_description(lcm::Payload payload);
   void on_request(const lcm::ClientMessage& message, std::size_t bytes, std::int64_t utime_us);
   // Where the answers to a request are kept, and under which session; null: nowhere.

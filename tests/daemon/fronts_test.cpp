@@ -207,6 +207,53 @@ TEST_F(LcmFrontTest, AMoveThatCameBeforeAStopIsAfterNoneThoughItIsReadLater) {
               ElementsAre("jog after 1", "pause after 2", "stop after 3", "list tables after 0"));
 }
 
+// The beginning of a jog comes on both transports, as its end does.
+TEST_F(LcmFrontTest, AJogDoesNotOvertakeWhatItsSessionAskedForBefore) {
+  const auto stops = std::move(*lcm::Transport::open("memq://"));
+  StopCount counted;
+  std::vector<std::string> taken;
+  Reception reception(counted, [&](const api::Asker& asker, const api::Request& request) {
+    taken.push_back(std::string(api::name_of(request)) + " " + std::to_string(asker.number) +
+                    " after " + std::to_string(asker.after_stops));
+  });
+  LcmFront front(
+      {.transport = *transport_, .stops = stops.get(), .prefix = "OTHER", .run = 1, .seed = 9},
+      reception, publishing_, [] { return std::int64_t{1}; });
+  EXPECT_TRUE(front.subscribe());
+  const auto say_other = [&](const lcm::Packet& packet, bool on_both = false) {
+    for (lcm::Transport* to : {transport_.get(), stops.get()}) {
+      if (to == stops.get() && !on_both) continue;
+      EXPECT_TRUE(to->publish_bytes("OTHER_" + packet.channel, packet.payload));
+    }
+  };
+  const auto carry_out = [&] {
+    while (readable(transport_->fd()) || readable(stops->fd())) front.handle();
+    while (!reception.idle()) reception.carry_out_next();
+    return std::exchange(taken, {});
+  };
+  say_other(*lcm::encode(0, lcm::Hello{.client_id = "scan", .nonce = 1}));
+  carry_out();
+  // As the front has opened it.
+  const std::int64_t session = api::Sessions(9).open("scan", 1);
+  const auto say = [&](std::int64_t number, const api::Request& request, bool on_both = false) {
+    say_other(*lcm::encode(1, {.session = session, .client_id = "scan", .number = number}, request),
+              on_both);
+  };
+  const auto jog = [](double per_s) {
+    return api::Request(api::Jog{.motor = "m", .per_s = per_s});
+  };
+  say(1, api::Move{});
+  say(2, jog(5), true);
+  EXPECT_THAT(carry_out(), ElementsAre("move 1 after 0", "jog 2 after 0"));
+  say(3, api::Move{});
+  say(4, jog(0), true);
+  EXPECT_THAT(carry_out(), ElementsAre("jog 4 after 1", "move 3 after 0"));
+  // A stop by a number that is another request's is none of its session: its time counts.
+  say(5, api::Move{});
+  say(4, api::Stop{}, true);
+  EXPECT_THAT(carry_out(), ElementsAre("stop 4 after 2", "move 5 after 1"));
+}
+
 TEST_F(LcmFrontTest, WhatIsNoMessageIsCounted) {
   EXPECT_TRUE(transport_->publish_bytes("LAB_MOVE", std::vector<std::uint8_t>(20, 0xFF)));
   settle();
