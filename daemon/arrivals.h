@@ -1,5 +1,6 @@
 // Which stop a message came before, though it is read after it: stops are read before all others.
-// No clock of its own: messages bring the times at which the kernel got them.
+// No clock of its own: messages bring the times at which the kernel got them, and who reads them
+// the time at which that is done.
 #pragma once
 
 #include <cstddef>
@@ -18,20 +19,23 @@ struct Arrival {
 
 class Arrivals {
  public:
-  // Nothing waits longer to be read, unless the clock was set meanwhile.
-  static constexpr std::int64_t kMostUnreadNs = 60'000'000'000;
+  // What had arrived when a stop is read is read by then: what comes later has come after the stop,
+  // even if the kernel's clock was set back meanwhile. How long both had waited does not matter.
+  static constexpr std::int64_t kMostUnreadUs = 60'000'000;
   static constexpr std::size_t kMost = 64;
 
-  // A request that ends motion is read; it has this number (Precedence::count).
-  void stopped(const Arrival& arrival, std::uint64_t number);
+  // A request that ends motion is read, at this time of a clock that nobody sets; it has this
+  // number (StopCount::count).
+  void stopped(const Arrival& arrival, std::uint64_t number, std::int64_t now_us);
   // Another request is read, and so many stops have been: after how many it has arrived. Where the
   // times do not tell, it came before.
-  std::uint64_t after_stops(const Arrival& arrival, std::uint64_t stops) const;
+  std::uint64_t after_stops(const Arrival& arrival, std::uint64_t stops, std::int64_t now_us) const;
 
  private:
   struct Stop {
     Arrival arrival;
     std::uint64_t number;  // the first of those that it stands for
+    std::int64_t read_us;
   };
   std::deque<Stop> stops_;  // as read, the newest last
 };

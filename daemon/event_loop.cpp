@@ -42,10 +42,12 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
       core_(config, *this, master_number(run_)),
       publishing_(run_, config.state_parts(), config.buses.size(),
                   {.now_us = now_us, .unix_us = unix_time_us}),
-      reception_(core_.counted_stops(),
-                 [this](const api::Asker& asker, const api::Request& request) {
-                   core_.request(now_us(), with_log(asker, request), request);
-                 }),
+      reception_(
+          core_.counted_stops(),
+          [this](const api::Asker& asker, const api::Request& request) {
+            core_.request(now_us(), with_log(asker, request), request);
+          },
+          Reception::Limits(), now_us),
       lcm_front_({.transport = fronts.lcm,
                   .stops = fronts.stops,
                   .prefix = config.lcm.prefix,

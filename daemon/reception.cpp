@@ -17,12 +17,12 @@ void Reception::take(api::Asker asker, api::Request request, std::size_t bytes,
   }
   if (api::ends_motion(request)) {
     asker.after_stops = counted_.count();
-    if (arrival) arrivals_.stopped(*arrival, asker.after_stops);
+    if (arrival) arrivals_.stopped(*arrival, asker.after_stops, now_us());
     return carry_out_(asker, request);
   }
   const std::uint64_t stops = counted_.stops();
-  asker.after_stops =
-      std::min(asker.after_stops, arrival ? arrivals_.after_stops(*arrival, stops) : stops);
+  asker.after_stops = std::min(asker.after_stops,
+                               arrival ? arrivals_.after_stops(*arrival, stops, now_us()) : stops);
   if (requests_ >= limits_.requests || bytes_ + bytes > limits_.bytes) {
     return asker.answer(
         api::Refused{"the daemon has " + std::to_string(requests_) +

@@ -32,11 +32,17 @@ class Reception {
   };
   using CarryOut = std::function<void(const api::Asker&, const api::Request&)>;
 
-  // Both outlive it.
+  // Never goes back; nobody sets it.
+  using Clock = std::function<std::int64_t()>;
+
+  // Both outlive it. `now_us`: for arrivals (arrivals.h); without it time stands still.
   Reception(StopCount& counted, CarryOut carry_out)
       : Reception(counted, std::move(carry_out), Limits()) {}
-  Reception(StopCount& counted, CarryOut carry_out, Limits limits)
-      : limits_(limits), counted_(counted), carry_out_(std::move(carry_out)) {}
+  Reception(StopCount& counted, CarryOut carry_out, Limits limits, Clock now_us = {})
+      : limits_(limits),
+        counted_(counted),
+        carry_out_(std::move(carry_out)),
+        now_us_(std::move(now_us)) {}
 
   // Carries out what ends motion before it returns. Others wait, or are refused. `bytes`: of its
   // message; `arrival`: when that came, where it may have been read after later ones. An asker who
@@ -64,12 +70,14 @@ class Reception {
     std::size_t bytes = 0;
   };
 
+  std::int64_t now_us() const { return now_us_ ? now_us_() : 0; }
   bool takes_more(const Client& client, std::size_t bytes) const;
 
   Limits limits_;
   StopCount& counted_;
   Arrivals arrivals_;
   CarryOut carry_out_;
+  Clock now_us_;
   std::unordered_map<std::string, Client> clients_;  // that have something waiting
   std::list<std::string> turns_;                     // the next one first
   std::size_t requests_ = 0;
