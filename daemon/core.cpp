@@ -109,6 +109,13 @@ void Core::pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus&
 }
 
 void Core::request(std::int64_t now, const api::Asker& as_counted, const api::Request& as_asked) {
+  // Where a computed axis would go is asked where its motors stand: after a stop, elsewhere.
+  const auto* move = std::get_if<api::Move>(&as_asked);
+  if (move != nullptr && !move->dry_run) {
+    const auto by =
+        open_moves_.precedence().overtaken(as_counted.after_stops, pseudo_axes_.motors_of(*move));
+    if (by) return open_moves_.not_begun(as_counted, *by);
+  }
   const auto of_motors = pseudo_axes_.of_motors(as_asked);
   if (!of_motors) return as_counted.answer(api::Refused{of_motors.error().text()});
   const api::Request& request = *of_motors ? **of_motors : as_asked;
@@ -203,6 +210,7 @@ void Core::shut_down(std::int64_t now_us) {
   end_overtaken(now_us);
   open_moves_.stopped_by(all, by);
   stops_.stop(now_us, all);
+  for (const BusId bus : installation_.buses()) installation_[bus].master.enable_no_more();
 }
 
 void Core::end_overtaken(std::int64_t now_us) {

@@ -98,6 +98,18 @@ std::string PseudoAxes::motors_text(const config::Pseudo& pseudo) const {
   return text;
 }
 
+std::vector<MotorId> PseudoAxes::motors_of(const api::Move& move) const {
+  std::vector<MotorId> motors;
+  for (const api::MotorAmount& amount : move.motors) {
+    const auto place = find(amount.motor);
+    if (!place) continue;
+    for (const MotorId motor : installation_.config().pseudos[place->pseudo].motors) {
+      if (std::ranges::find(motors, motor) == motors.end()) motors.push_back(motor);
+    }
+  }
+  return motors;
+}
+
 Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& request) const {
   using Answer = Result<std::optional<api::Request>>;
   if (size() == 0) return std::nullopt;

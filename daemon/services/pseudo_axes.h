@@ -28,6 +28,9 @@ class PseudoAxes {
   // cannot be asked of a computed axis.
   Result<std::optional<api::Request>> of_motors(const api::Request& request) const;
 
+  // From which the axes are computed that it names.
+  std::vector<MotorId> motors_of(const api::Move& move) const;
+
   // As parts 0 .. size()-1. `motor`: what is published of each motor.
   using StateOf = std::function<api::MotorState(MotorId)>;
   api::StateSnapshot state(std::size_t index, const StateOf& motor) const;

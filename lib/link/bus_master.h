@@ -107,6 +107,9 @@ class BusMaster {
   virtual void emergency_stop(bushd_stop_mode mode) = 0;
   // Binds an MCU that is not online to a stop that is not cleared.
   virtual void bind_to_stop(McuIndex mcu, bushd_stop_mode mode) = 0;
+  // The daemon ends: drivers of MCUs that come from now on are not enabled by the setup, since
+  // their motors would move to be settled.
+  virtual void enable_no_more() {}
 
   // --- What is asked of an MCU, and answered in later reports
 

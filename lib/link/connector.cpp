@@ -286,7 +286,7 @@ std::uint8_t Connector::first_actions(McuIndex mcu, bool may_clear) const {
   if (link.taken_over && !bound) faults &= ~unsigned{BUSHD_FAULT_EMERGENCY};
   const bool clear = may_clear && (faults & kPeoplesFaults) == 0;
   std::uint8_t actions = clear ? BUSHD_CONTROL_CLEAR_FAULTS : 0;
-  if (link.powered.value_or(true) && (faults & kFaultsWithoutEnable) == 0) {
+  if (enables_ && link.powered.value_or(true) && (faults & kFaultsWithoutEnable) == 0) {
     actions |= BUSHD_CONTROL_ENABLE;
   }
   return actions;
@@ -343,7 +343,7 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
     link.stop_now = true;
   } else if (!link.setup_written || !link.queue.empty() || !in_step) {
     return;
-  } else if (report.state != BUSHD_STATE_BUSY || !*link.powered) {
+  } else if (report.state != BUSHD_STATE_BUSY || !*link.powered || !enables_) {
     view.phase = McuPhase::kOnline;
     view.detail.clear();
     link.was_online = link.taken_over = false;

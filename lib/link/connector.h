@@ -48,6 +48,8 @@ class Connector {
   // It binds all MCUs, or this one, until they have carried out CLEAR_FAULTS.
   void emergency_stop(bushd_stop_mode mode);
   void bind_to_stop(McuIndex mcu, bushd_stop_mode mode);
+  // The setup enables no drivers from now on.
+  void enable_no_more() { enables_ = false; }
 
   // Requests beside the setup.
   SetupQueue& queue(McuIndex mcu) { return links_[mcu].queue; }
@@ -116,6 +118,7 @@ class Connector {
   FrameWriter& writer_;
   Listener& listener_;
   PerMcu<Link> links_;
+  bool enables_ = true;
   std::uint16_t salt_ = 0;
   std::vector<bushd_identity> identities_;  // that the last IDENTIFY was answered with
   std::size_t turn_ = 0;                    // whose request is sent next

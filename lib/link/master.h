@@ -80,6 +80,7 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   // Within two ticks of hearing it.
   void emergency_stop(bushd_stop_mode mode) override;
   void bind_to_stop(McuIndex mcu, bushd_stop_mode mode) override;
+  void enable_no_more() override { connector_.enable_no_more(); }
 
   void reconfigure(McuIndex mcu, McuSetup setup) override;
   Result<void> check_room(McuIndex mcu, const McuSetup& setup) const override;

@@ -117,6 +117,19 @@ TEST_F(Connecting, TwoAtOneAddressAreBothNamed) {
   EXPECT_EQ(identify(2'000'000), 8) << "in slots again";
 }
 
+// Drivers that come on are settled by a step there and back: no daemon that ends begins that.
+TEST_F(Connecting, WhoEndsEnablesNoDrivers) {
+  connector.enable_no_more();
+  find();
+  connector.follow_report(0, kFirst, false);
+  EXPECT_THAT(setup_requests(), testing::Contains(BUSHD_MSG_CONTROL));
+  EXPECT_EQ(last_payload, Bytes{BUSHD_CONTROL_CLEAR_FAULTS});
+  report().flags = BUSHD_FLAG_CONFIGURED;
+  report().state = BUSHD_STATE_BUSY;
+  connector.follow_report(1000, kFirst, true);
+  EXPECT_EQ(mcus[kFirst].view.phase, McuPhase::kOnline);
+}
+
 TEST_F(Connecting, SetupEndsOnlineOnceItIsInStepAndDriversAreOn) {
   find();
   connector.follow_report(0, kFirst, false);
