@@ -109,7 +109,8 @@ void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
 uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction) {
   const uint32_t at =
       (uint32_t)mcu->motor[m].position_steps + (uint32_t)mcu->slot_buffer[mcu->front].steps[m];
-  return direction > 0 ? INT32_MAX - at : INT32_MAX + at;
+  if (direction > 0) return INT32_MAX - at;
+  return at == (uint32_t)INT32_MIN ? 0 : INT32_MAX + at;
 }
 
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,

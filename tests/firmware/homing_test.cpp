@@ -240,7 +240,9 @@ TEST_P(Homing, StoppedBeforeItBeginsItMakesNoStep) {
   put({-200, -1});
   const std::vector<std::function<void()>> stops = {
       [&] { rig.emergency(BUSHD_STOP_RAMP); },
-      [&] { EXPECT_EQ(rig.home({kHomed, -1, 0, 0, 400, kSlow, 0}), BUSHD_OK); },
+      [&] {
+        EXPECT_EQ(rig.home({kHomed, -1, 0, 0, 400, kSlow, 0}), BUSHD_OK);
+      },
   };
   for (const auto& stop : stops) {
     ASSERT_EQ(rig.home(command()), BUSHD_OK);
@@ -405,6 +407,9 @@ TEST_P(Homing, IsRefusedWhereItsStepsAreNotCounted) {
       EXPECT_EQ(report.motor[kHomed].position_steps, side * (INT32_MAX - kAll) + direction * 5000);
     }
   }
+  // Below it no step is counted.
+  ASSERT_EQ(rig.set_position(kHomed, INT32_MIN), BUSHD_OK);
+  EXPECT_EQ(rig.home(command(-1)), BUSHD_E_FORMAT);
 }
 
 }  // namespace
