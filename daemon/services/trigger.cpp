@@ -1,5 +1,6 @@
 #include "daemon/services/trigger.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -92,21 +93,30 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
 void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
   auto [motors, unknown] = installation_.find_known(request.motors, false);
   if (motors.empty()) return asker.answer(api::Refused{unknown});
+  // Of all motors, those count that were lost while they waited or moved.
+  const bool may_begin =
+      !request.motors.empty() || std::ranges::any_of(motors, [this](MotorId motor) {
+        return installation_[motor].lost_in_motion();
+      });
+  const std::string mcus = installation_.not_online(motors);
+  const std::string away =
+      mcus.empty() ? "" : "; not online, so it is unknown whether they stand:" + mcus;
   std::erase_if(motors,
                 [this](MotorId motor) { return !installation_[motor].is<motion::Armed>(); });
   open_moves_.stopped_by(motors, text_of(asker));
   for (const McuId mcu : installation_.mcus_of(motors)) installation_[mcu].disarm();
-  if (!unknown.empty()) {
-    return asker.answer(api::Completed{.outcome = api::Outcome::kFault,
-                                       .reason = "what waits is being disarmed; " + unknown,
-                                       .detail = {}});
+  if (!unknown.empty() || (may_begin && !mcus.empty())) {
+    return asker.answer(api::Completed{
+        .outcome = unknown.empty() ? api::Outcome::kLink : api::Outcome::kFault,
+        .reason = "what waits is being disarmed" + away + (unknown.empty() ? "" : "; " + unknown),
+        .detail = {}});
   }
   asker.answer(api::Accepted{});
   if (open_.size() >= kMaxOpen) {
     open_.front().asker.answer(api::done("carried out; its end is not waited for"));
     open_.pop_front();
   }
-  open_.push_back({.asker = asker, .motors = std::move(motors)});
+  open_.push_back({.asker = asker, .motors = std::move(motors), .done = "done" + away});
 }
 
 void Trigger::follow() {

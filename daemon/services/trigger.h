@@ -37,7 +37,7 @@ class Trigger final : public Service {
   struct Disarming {
     api::Asker asker;
     std::vector<MotorId> motors;  // that wait still
-    std::string done = "done";
+    std::string done;
   };
   Result<std::vector<MotorId>> motors_of(const api::Arm& request) const;
   std::vector<std::int64_t> steps_of(const std::vector<MotorId>& motors,

@@ -189,9 +189,10 @@ TEST(StopParts, ADisarmingTellsWhichMcusAreAway) {
   lab.run_for(1);
   const Answer named = lab.wait(lab.send(api::Disarm{{"m01"}}));
   EXPECT_EQ(named.result, "link");
-  EXPECT_THAT(named.reason,
-              HasSubstr("not online, so it is unknown whether their motors wait: hall:1"));
-  EXPECT_EQ(lab.wait(lab.send(api::Disarm{})).result, "done") << "none was lost in motion";
+  EXPECT_THAT(named.reason, HasSubstr("not online, so it is unknown whether they stand: hall:1"));
+  const Answer all = lab.wait(lab.send(api::Disarm{}));
+  EXPECT_EQ(all.result, "done") << "none was lost in motion";
+  EXPECT_THAT(all.reason, HasSubstr("not online"));
 }
 
 std::string hall_with_home() {
