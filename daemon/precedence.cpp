@@ -1,12 +1,24 @@
 #include "daemon/precedence.h"
 
 #include <algorithm>
+#include <concepts>
 #include <utility>
 
 #include "base/overloaded.h"
-#include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
+namespace {
+
+// Requests are named all: a new one has to be placed.
+template <class Request, class... Of>
+concept OneOf = (std::same_as<Request, Of> || ...);
+
+}  // namespace
+
+std::string text_of(const api::Asker& asker) {
+  if (!asker.session) return "SIGHUP";
+  return "command " + std::to_string(asker.number) + " of " + asker.session->text();
+}
 
 Precedence::Precedence(const Installation& installation) : installation_(installation) {
   for ([[maybe_unused]] const MotorId motor : installation.motors()) {
@@ -26,26 +38,32 @@ void Precedence::note(const api::Asker& asker, const api::Request& request) {
   const auto with_lines = [this](const api::MotorNames& names, bool groups) {
     return installation_.with_lines(installation_.find_known(names, groups).motors);
   };
-  std::visit(Overloaded{[&](const api::Stop& r) { note(newest_, with_lines(r.motors, false)); },
-                        [&](const api::EmergencyStop&) {
-                          const auto all = with_lines({}, false);
-                          note(newest_, all);
-                          note(emergency_stops_, all);
-                        },
-                        [&](const api::Pause& r) { note(newest_, with_lines(r.motors, true)); },
-                        [&](const api::Hold& r) {
-                          const auto motors = installation_.find_known(r.motors, true).motors;
-                          note(newest_, motors);
-                          note(holds_, motors);
-                        },
-                        [&](const api::Disarm& r) {
-                          note(newest_, installation_.find_known(r.motors, false).motors);
-                        },
-                        [&](const api::Jog& r) {
-                          note(newest_, installation_.find_known({r.motor}, false).motors);
-                        },
-                        [](const auto&) {}},
-             request);
+  std::visit(
+      Overloaded{[&](const api::Stop& r) { note(newest_, with_lines(r.motors, false)); },
+                 [&](const api::EmergencyStop&) {
+                   const auto all = with_lines({}, false);
+                   note(newest_, all);
+                   note(emergency_stops_, all);
+                 },
+                 [&](const api::Pause& r) { note(newest_, with_lines(r.motors, true)); },
+                 [&](const api::Hold& r) {
+                   const auto motors = installation_.find_known(r.motors, true).motors;
+                   note(newest_, motors);
+                   note(holds_, motors);
+                 },
+                 [&](const api::Disarm& r) {
+                   note(newest_, installation_.find_known(r.motors, false).motors);
+                 },
+                 [&](const api::Jog& r) {
+                   note(newest_, installation_.find_known({r.motor}, false).motors);
+                 },
+                 [](const OneOf<api::Move, api::Enable, api::Disable, api::ClearFaults,
+                                api::SetPosition, api::UseTable, api::ReloadTables, api::Home,
+                                api::Arm, api::PositionCompare, api::ListTables, api::GetTable,
+                                api::SetTable, api::Confirm, api::GetHistory, api::Resume,
+                                api::Release, api::Configure, api::MoveLine, api::MovePath,
+                                api::Camac, api::Follow, api::ArmLine> auto&) {}},
+      request);
 }
 
 void Precedence::note_all(const std::string& by) {
@@ -107,7 +125,14 @@ std::optional<Precedence::Overtaken> Precedence::overtaken(const api::Asker& ask
             return find(emergency_stops_, asker.after_stops,
                         installation_.find_known(r.motors, false).motors);
           },
-          [](const auto&) { return Answer(); }},
+          // Of these only who lets them wait knows the motors.
+          [](const OneOf<api::MovePath, api::Follow, api::Camac> auto&) { return Answer(); },
+          [](const OneOf<api::Stop, api::EmergencyStop, api::Pause, api::Hold, api::Disarm,
+                         api::Enable, api::Disable, api::SetPosition, api::UseTable,
+                         api::ReloadTables, api::PositionCompare, api::ListTables, api::GetTable,
+                         api::SetTable, api::Confirm, api::GetHistory, api::Configure> auto&) {
+            return Answer();
+          }},
       request);
 }
 

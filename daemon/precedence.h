@@ -20,6 +20,9 @@
 
 namespace bushd::daemon {
 
+// Who asked, in a sentence: "command 7 of bushctl-1".
+std::string text_of(const api::Asker& asker);
+
 class Precedence {
  public:
   explicit Precedence(const Installation& installation);

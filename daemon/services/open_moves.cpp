@@ -4,11 +4,6 @@
 
 namespace bushd::daemon {
 
-std::string text_of(const api::Asker& asker) {
-  if (!asker.session) return "SIGHUP";
-  return "command " + std::to_string(asker.number) + " of " + asker.session->text();
-}
-
 std::string_view word(OpenMoves::Purpose purpose) {
   switch (purpose) {
     case OpenMoves::Purpose::kMove:

@@ -18,9 +18,6 @@
 
 namespace bushd::daemon {
 
-// Who asked, in a sentence: "command 7 of bushctl-1".
-std::string text_of(const api::Asker& asker);
-
 class OpenMoves {
  public:
   explicit OpenMoves(Installation& installation)
@@ -69,8 +66,8 @@ class OpenMoves {
   // Which requests have been ended before they had a motor under way.
   Precedence& precedence() { return precedence_; }
   const Precedence& precedence() const { return precedence_; }
-  // Answers a request that a stop has ended before it was carried out: it was never accepted. Its
-  // motors may be under way for others.
+  // Answers a request that a stop has ended before it was carried out; it may have been accepted.
+  // Its motors may be under way for others.
   void not_begun(const api::Asker& asker, const Precedence::Overtaken& overtaken) const;
 
   bool empty() const { return book_.empty(); }
