@@ -27,6 +27,7 @@
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/lines.h"
 #include "daemon/services/link_faults.h"
+#include "daemon/services/local_inputs.h"
 #include "daemon/services/motor_settings.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
@@ -113,6 +114,7 @@ class Core {
   IdleDrivers idle_drivers_;
   HomingQueue homing_;
   Travels travels_;
+  LocalInputs local_inputs_;
   Stops stops_;
   Jogs jogs_;
   Pauses pauses_;

@@ -170,6 +170,7 @@ class Mcu {
   void end_travel(Output output) { master_.end_travel(on_bus_, output.value); }
   // Precondition: it is not online.
   void bind_to_stop(bushd_stop_mode mode) { master_.bind_to_stop(on_bus_, mode); }
+  void inhibit_local(std::uint16_t outputs) { master_.inhibit_local(on_bus_, outputs); }
   void control(std::uint8_t actions) { master_.control(on_bus_, actions); }
   void set_position(Output output, std::int32_t position_steps) {
     master_.set_position(on_bus_, output.value, position_steps);

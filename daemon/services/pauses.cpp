@@ -13,8 +13,12 @@ std::string count_text(std::size_t motors) {
 }  // namespace
 
 Pauses::Pauses(Installation& installation, Interlocks& interlocks, Moves& moves,
-               OpenMoves& open_moves)
-    : installation_(installation), interlocks_(interlocks), moves_(moves), open_(open_moves) {
+               LocalInputs& local_inputs, OpenMoves& open_moves)
+    : installation_(installation),
+      interlocks_(interlocks),
+      moves_(moves),
+      open_(open_moves),
+      local_inputs_(local_inputs) {
   interlocks_.add([this](MotorId motor) -> Result<void> {
     if (!installation_[motor].is_held()) return {};
     return fail("it is held; run 'bushctl release NAME'");
@@ -132,11 +136,12 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Ho
   open_.stopped_by(armed, text_of(asker));
   moves_.stop(now_us, armed);
   installation_.changed = true;
-  const std::string held = "held: " + count_text(motors.size());
-  asker.answer(unknown.empty() ? api::done(held)
-                               : api::Completed{.outcome = api::Outcome::kFault,
-                                                .reason = held + "; " + unknown,
-                                                .detail = {}});
+  if (open_holds_.size() >= kMaxOpen) {
+    open_holds_.front().asker.answer(api::done("held; what their MCUs say is not waited for"));
+    open_holds_.pop_front();
+  }
+  open_holds_.push_back({.asker = asker, .motors = motors, .unknown = unknown});
+  answer_holds();
 }
 
 void Pauses::request(std::int64_t, const api::Asker& asker, const api::Release& request) {
@@ -184,7 +189,33 @@ std::string Pauses::text_of_left(const Pausing& pausing) const {
   return text;
 }
 
+void Pauses::answer_holds() {
+  std::erase_if(open_holds_, [this](const Holding& holding) {
+    std::string not_held = holding.unknown.empty() ? "" : "; " + holding.unknown;
+    std::string offline;
+    for (const MotorId id : holding.motors) {
+      const motion::Motor& motor = installation_[id];
+      if (!local_inputs_.has_told(id)) return false;
+      if (!motor.is_held() || !installation_.drives()[id].moved_by_people()) continue;
+      if (const auto refusal = local_inputs_.refusal(id))
+        not_held += "; " + motor.name() + ": " + *refusal;
+      if (!installation_.mcu_of(id).online()) {
+        offline += "; MCU " + installation_.mcu_of(id).name() +
+                   " is offline: its local inputs may move " + motor.name() +
+                   " until it is online again";
+      }
+    }
+    const std::string text = "held: " + count_text(holding.motors.size()) + not_held + offline;
+    holding.asker.answer(
+        not_held.empty()
+            ? api::done(text)
+            : api::Completed{.outcome = api::Outcome::kFault, .reason = text, .detail = {}});
+    return true;
+  });
+}
+
 void Pauses::step(std::int64_t) {
+  answer_holds();
   std::erase_if(open_pauses_, [this](Pausing& pausing) {
     std::erase_if(pausing.motors,
                   [&](const auto& motor) { return has_ended(pausing, motor.first, motor.second); });

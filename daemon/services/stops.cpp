@@ -4,6 +4,14 @@
 #include <utility>
 
 namespace bushd::daemon {
+namespace {
+
+void note(std::string& text, const std::string& more) {
+  if (!text.empty() && !more.empty()) text += "; ";
+  text += more;
+}
+
+}  // namespace
 
 void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Stop& request) {
   auto [motors, unknown] = installation_.find_known(request.motors, false);
@@ -13,10 +21,15 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
   if (!in_part) asker.answer(api::Accepted{});
   open_moves_.stopped_by(motors, text_of(asker));
   Stopping stopping{.asker = asker, .done = "done" + not_online_text(motors)};
+  stop_local(stopping, motors);
   std::vector<MotorId> moving = motors;
   std::erase_if(moving, [this](MotorId motor) { return !can_be_stopped(motor); });
   stop(now_us, moving);
-  if (in_part) return asker.answer(result_in_part(motors, unknown, !moving.empty()));
+  if (in_part) {
+    const bool any_moves = !moving.empty() || !stopping.local.empty();
+    note(stopping.not_done, unknown);
+    return asker.answer(result_in_part(motors, stopping.not_done, any_moves));
+  }
   stopping.motors = std::move(moving);
   if (open_.size() >= kMaxOpen) {
     open_.front().asker.answer(api::Completed{
@@ -44,13 +57,43 @@ std::string Stops::not_online_text(const std::vector<MotorId>& motors) const {
 }
 
 // It is told at once: who does not wait for the end of a stop is to know it, too.
-api::Completed Stops::result_in_part(const std::vector<MotorId>& motors, const std::string& unknown,
+api::Completed Stops::result_in_part(const std::vector<MotorId>& motors, const std::string& not_done,
                                      bool any_moves) const {
   return {
-      .outcome = unknown.empty() ? api::Outcome::kLink : api::Outcome::kFault,
+      .outcome = not_done.empty() ? api::Outcome::kLink : api::Outcome::kFault,
       .reason = std::string(any_moves ? "what moves is being stopped" : "what is online stands") +
-                not_online_text(motors) + (unknown.empty() ? "" : "; " + unknown),
+                not_online_text(motors) + (not_done.empty() ? "" : "; " + not_done),
       .detail = {}};
+}
+
+// A stop that is the daemon's own leaves them alone: people need no daemon to move them.
+void Stops::stop_local(Stopping& stopping, const std::vector<MotorId>& motors) {
+  for (const MotorId id : motors) {
+    const motion::Motor& motor = installation_[id];
+    if (local_inputs_.move(id)) {
+      local_inputs_.stop(id);
+      stopping.local.push_back(id);
+    } else if (motor.is<motion::Local>()) {
+      note(stopping.not_done, motor.name() + ": another master moves it; 'bushctl estop' stops it");
+    }
+  }
+}
+
+void Stops::follow_local(Stopping& stopping) {
+  std::erase_if(stopping.local, [&](MotorId id) {
+    if (local_inputs_.is_stopping(id)) return false;
+    const motion::Motor& motor = installation_[id];
+    const auto refusal = local_inputs_.refusal(id);
+    if (refusal) {
+      note(stopping.not_done, motor.name() + ": " + *refusal);
+    } else if (installation_.mcu_of(id).online()) {
+      stopping.done +=
+          "; " + motor.name() + ": its local inputs must be released before they move it again";
+    } else {
+      note(stopping.not_done, motor.name() + ": its MCU went offline before it stood");
+    }
+    return true;
+  });
 }
 
 void Stops::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
@@ -86,10 +129,14 @@ void Stops::follow() {
                       (by != nullptr ? " by " + text_of(*by) : "") + " while it ran down";
       return true;
     });
-    if (!stopping.motors.empty()) return false;
+    follow_local(stopping);
+    if (!stopping.motors.empty() || !stopping.local.empty()) return false;
     installation_.changed = true;
+    const bool done = stopping.not_done.empty();
     stopping.asker.answer(
-        api::Completed{.outcome = stopping.outcome, .reason = stopping.done, .detail = {}});
+        api::Completed{.outcome = done ? stopping.outcome : api::Outcome::kFault,
+                       .reason = done ? stopping.done : "not stopped: " + stopping.not_done,
+                       .detail = {}});
     return true;
   });
 }

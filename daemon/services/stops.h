@@ -1,4 +1,4 @@
-// Ramps motors down, whatever moves them but people at their MCU.
+// Ramps motors down, whatever moves them; what it cannot stop it says.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 
 #include "daemon/service.h"
 #include "daemon/services/homing_queue.h"
+#include "daemon/services/local_inputs.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/travels.h"
 
@@ -20,11 +21,12 @@ class Stops final : public Service {
   static constexpr std::size_t kMaxOpen = 256;
 
   Stops(Installation& installation, Moves& moves, HomingQueue& homing, Travels& travels,
-        OpenMoves& open_moves)
+        LocalInputs& local_inputs, OpenMoves& open_moves)
       : installation_(installation),
         moves_(moves),
         homing_(homing),
         travels_(travels),
+        local_inputs_(local_inputs),
         open_moves_(open_moves) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Stop& request);
@@ -39,7 +41,11 @@ class Stops final : public Service {
     std::vector<MotorId> motors{};  // that do not stand yet
     std::string done = "done";      // the reason, when all stand
     api::Outcome outcome = api::Outcome::kDone;
+    std::vector<MotorId> local{};  // people move them at their MCUs
+    std::string not_done{};        // why some are not stopped
   };
+  void stop_local(Stopping& stopping, const std::vector<MotorId>& motors);
+  void follow_local(Stopping& stopping);
   bool can_be_stopped(MotorId motor) const;
   bool may_run_on(const std::vector<MotorId>& motors, bool named) const;
   std::string not_online_text(const std::vector<MotorId>& motors) const;
@@ -51,6 +57,7 @@ class Stops final : public Service {
   Moves& moves_;
   HomingQueue& homing_;
   Travels& travels_;
+  LocalInputs& local_inputs_;
   OpenMoves& open_moves_;
   std::list<Stopping> open_;
 };

@@ -196,6 +196,10 @@ class BusMaster {
   // It travels no more.
   virtual void end_travel(McuIndex, std::uint8_t) {}
 
+  // These of the motors that people move at the MCU are not theirs, until this says otherwise: one
+  // that they move ramps down. The MCU refuses to give one back that moves.
+  virtual void inhibit_local(McuIndex, std::uint16_t /*motors*/) {}
+
   // When the MCU's position compare output pulses from now on. Precondition: it has one.
   bool can_compare_position(McuIndex mcu) const { return can(mcu, BUSHD_CAN_POSITION_COMPARE); }
   virtual void position_compare(McuIndex, const bushd_position_compare&) {}

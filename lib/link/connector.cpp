@@ -100,6 +100,22 @@ void Connector::follow_stop(McuIndex mcu) {
   }
 }
 
+void Connector::inhibit_local(McuIndex mcu, std::uint16_t motors) {
+  links_[mcu].not_local = motors;
+  if (mcus_[mcu].view.phase == McuPhase::kOnline) tell_local(mcu);
+}
+
+void Connector::tell_local(McuIndex mcu) {
+  const McuRecord& record = mcus_[mcu];
+  Link& link = links_[mcu];
+  if ((record.view.identity.capabilities & BUSHD_CAN_LOCAL) == 0) return;
+  bushd_local local = record.setup.local;
+  local.motors &= static_cast<std::uint16_t>(~link.not_local);
+  local.keypad &= static_cast<std::uint16_t>(~link.not_local);
+  link.not_local_told = link.not_local;
+  link.queue.local(local);
+}
+
 bool Connector::send_due_identify(std::int64_t now_us) {
   for (const McuIndex i : mcus_.indices()) {
     if (mcus_[i].view.phase != McuPhase::kOffline || links_[i].retry_due_us > now_us) continue;
@@ -273,9 +289,7 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (const auto slot = record.setup.table_of_motor[m]) queue.assign(m, *slot);
   }
-  if (record.view.identity.capabilities & BUSHD_CAN_LOCAL) {
-    queue.local(record.setup.local);
-  }
+  tell_local(mcu);
   queue.control(first_actions(mcu, may_clear));
 }
 
@@ -347,6 +361,7 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
     view.phase = McuPhase::kOnline;
     view.detail.clear();
     link.was_online = link.taken_over = false;
+    if (link.not_local != link.not_local_told) tell_local(mcu);
     listener_.came_online(mcu);
   } else if ((report.flags & BUSHD_FLAG_CONFIGURED) != 0 &&
              (report.flags & BUSHD_FLAG_ENABLED) == 0) {

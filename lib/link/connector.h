@@ -50,6 +50,8 @@ class Connector {
   void bind_to_stop(McuIndex mcu, bushd_stop_mode mode);
   // The setup enables no drivers from now on.
   void enable_no_more() { enables_ = false; }
+  // These motors are not people's to move by LOCAL, whatever the setup says.
+  void inhibit_local(McuIndex mcu, std::uint16_t motors);
 
   // Requests beside the setup.
   SetupQueue& queue(McuIndex mcu) { return links_[mcu].queue; }
@@ -97,6 +99,8 @@ class Connector {
     bool taken_over = false;
     bushd_stop_mode stop_mode = BUSHD_STOP_RAMP;  // of the stop that binds it
     bool clearing = false;                        // people have asked it to clear its faults
+    std::uint16_t not_local = 0;       // as wanted
+    std::uint16_t not_local_told = 0;  // as told in the setup
     std::int64_t retry_due_us = 0;
     unsigned identify_attempts = 0;  // in a row without an MCU that fits
   };
@@ -111,6 +115,7 @@ class Connector {
   bool holds_its_tables(McuIndex mcu, const bushd_tables& held) const;
   std::uint8_t first_actions(McuIndex mcu, bool may_clear) const;
   void note_power(McuIndex mcu);
+  void tell_local(McuIndex mcu);
 
   const BusSetup& setup_;
   PerMcu<McuRecord>& mcus_;

@@ -115,6 +115,9 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   void follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) override;
   std::uint8_t travel(McuIndex mcu, bushd_travel message) override;
   void end_travel(McuIndex mcu, std::uint8_t motor) override;
+  void inhibit_local(McuIndex mcu, std::uint16_t motors) override {
+    connector_.inhibit_local(mcu, motors);
+  }
   void position_compare(McuIndex mcu, const bushd_position_compare& message) override;
   std::optional<BusSnapshot> snapshot(std::int64_t now_us) const override;
 

@@ -231,6 +231,63 @@ TEST_F(Homing, LocalInputsMoveAMotorAndTheDaemonFollows) {
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
+// It ramps down, stands although the button is held, and goes on with the next press.
+TEST_F(Homing, AStopEndsLocalMotionUntilTheInputIsReleased) {
+  Lab lab(with("local = true"));
+  lab.connect();
+  for (int again = 0; again < 2; ++again) {
+    hold(lab, BUSHD_INPUT_FORWARD);
+    ASSERT_TRUE(
+        lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kLocal; }, 1));
+    lab.run_for(0.3);
+    const Answer stopped = lab.wait(lab.send(Ask::kStop, {}));
+    EXPECT_EQ(stopped.result, "done");
+    EXPECT_THAT(stopped.reason, HasSubstr("m01: its local inputs must be released"));
+    const std::int64_t at = lab.shaft_steps("m01");
+    EXPECT_GT(at, 30 * (again + 1));
+    lab.run_for(2);
+    EXPECT_EQ(lab.shaft_steps("m01"), at) << "answered when it stood";
+    hold(lab, 0);
+    lab.run_for(0.1);
+  }
+  EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).reason, "done");
+}
+
+TEST_F(Homing, AHeldMotorIsNotMovedByLocalInputs) {
+  Lab lab(with("local = true"));
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(api::Hold{.motors = {"m01"}})).reason, "held: 1 motor");
+  hold(lab, BUSHD_INPUT_FORWARD);
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  // Also by an MCU that was configured meanwhile.
+  lab.unplug(0);
+  lab.run_for(0.5);
+  lab.plug(0);
+  lab.connect();
+  hold(lab, 0);
+  lab.run_for(0.1);
+  hold(lab, BUSHD_INPUT_FORWARD);
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.wait(lab.send(api::Release{.motors = {"m01"}})).result, "done");
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0) << "held all the time";
+  hold(lab, 0);
+  lab.run_for(0.1);
+  hold(lab, BUSHD_INPUT_FORWARD);
+  lab.run_for(0.5);
+  EXPECT_GT(lab.shaft_steps("m01"), 30);
+  // While it moves: it ramps down.
+  EXPECT_EQ(lab.wait(lab.send(api::Hold{.motors = {"m01"}})).reason, "held: 1 motor");
+  lab.run_for(1);
+  const std::int64_t at = lab.shaft_steps("m01");
+  lab.run_for(1);
+  EXPECT_EQ(lab.shaft_steps("m01"), at);
+}
+
 // Whoever comes first has the motor.
 TEST_F(Homing, AMoveAndAPressAtTheSameTimeNeverMix) {
   for (int ms = 0; ms < 160; ms += 8) {

@@ -19,6 +19,7 @@
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/homing_queue.h"
 #include "daemon/services/journal.h"
+#include "daemon/services/local_inputs.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/positions.h"
@@ -68,6 +69,7 @@ class LiveBench : public Bench {
   daemon::HomingQueue homing{installation, interlocks,   open_moves, moves,
                              kept,         idle_drivers, *this};
   daemon::Travels travels{installation, interlocks, open_moves, kept, idle_drivers, *this};
+  daemon::LocalInputs local_inputs{installation};
   daemon::EmergencyStop emergency_stop{installation, interlocks, homing, open_moves, kept, *this};
 
  private:

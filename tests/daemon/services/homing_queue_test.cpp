@@ -31,7 +31,7 @@ struct HomingBench : LiveBench {
     }
     connect(stops);
   }
-  Stops stops{installation, moves, homing, travels, open_moves};
+  Stops stops{installation, moves, homing, travels, local_inputs, open_moves};
 };
 
 TEST(HomingQueue, MotorsOfAnMcuAreHomedOneAfterTheOther) {
@@ -59,7 +59,8 @@ TEST(HomingQueue, StopEndsIt) {
 
 TEST(HomingQueue, AMotorWithoutAHomeIsRefusedWithTheRemedy) {
   LiveBench bench;
-  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.open_moves);
+  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.local_inputs,
+              bench.open_moves);
   bench.connect(stops);
   bench.homing.request(bench.asker(1), api::Home{{"m02"}});
   EXPECT_THAT(bench.refusal(1), HasSubstr("no home switch configured: add 'home = {...}' to motor "

@@ -17,7 +17,7 @@ struct PositionsBench : LiveBench {
   void set(std::int64_t number, std::vector<api::MotorAmount> motors) {
     positions.request(now_us(), asker(number), api::SetPosition{std::move(motors)});
   }
-  Stops stops{installation, moves, homing, travels, open_moves};
+  Stops stops{installation, moves, homing, travels, local_inputs, open_moves};
 };
 
 TEST(Positions, AreSetInTheMcusAndLogged) {

@@ -1,0 +1,108 @@
+#include "daemon/services/local_inputs.h"
+
+namespace bushd::daemon {
+namespace {
+
+std::uint16_t bit_of(const motion::Motor& motor) {
+  return static_cast<std::uint16_t>(1u << motor.output().value);
+}
+
+}  // namespace
+
+LocalInputs::LocalInputs(Installation& installation) : installation_(installation) {
+  for ([[maybe_unused]] const McuId mcu : installation.mcus()) tasks_.add();
+}
+
+bool LocalInputs::move(MotorId id) const {
+  const Mcu& mcu = installation_.mcu_of(id);
+  const motion::Motor& motor = installation_[id];
+  return mcu.online() && installation_.drives()[id].moved_by_people() &&
+         motor.is<motion::Local>() && (mcu.report().autonomous & bit_of(motor)) != 0;
+}
+
+void LocalInputs::stop(MotorId id) {
+  Mcu& mcu = installation_.mcu_of(id);
+  tasks_[mcu.id].stopping |= bit_of(installation_[id]);
+  tasks_[mcu.id].refused.reset();
+  follow(mcu);
+}
+
+bool LocalInputs::is_stopping(MotorId id) const {
+  return (tasks_[installation_.mcu_of(id).id].stopping & bit_of(installation_[id])) != 0;
+}
+
+bool LocalInputs::has_told(MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  const Mcu& mcu = installation_.mcu_of(id);
+  const bool told = (tasks_[mcu.id].inhibited & bit_of(motor)) != 0;
+  if (!installation_.drives()[id].moved_by_people() || !mcu.online()) return true;
+  return !motor.is_held() || refusal(id) || (told && !mcu.busy());
+}
+
+std::optional<std::string> LocalInputs::refusal(MotorId id) const {
+  const Mcu& mcu = installation_.mcu_of(id);
+  const auto& refused = tasks_[mcu.id].refused;
+  if (!refused) return std::nullopt;
+  return "MCU " + mcu.name() +
+         " refused to take it from its local inputs: " + bushd_status_text(*refused) +
+         "; release them, or run 'bushctl estop'";
+}
+
+std::uint16_t LocalInputs::held(const Mcu& mcu) const {
+  unsigned held = 0;
+  for (const MotorId id : mcu.motors()) {
+    const bool theirs = installation_.drives()[id].moved_by_people();
+    if (theirs && installation_[id].is_held()) held |= bit_of(installation_[id]);
+  }
+  return static_cast<std::uint16_t>(held);
+}
+
+void LocalInputs::tell(Mcu& mcu, std::uint16_t inhibited) {
+  Task& task = tasks_[mcu.id];
+  task.before = task.inhibited;
+  task.inhibited = inhibited;
+  mcu.inhibit_local(inhibited);
+}
+
+// A motor gets back to people when it rests: while it moves its MCU would refuse that.
+void LocalInputs::follow(Mcu& mcu) {
+  Task& task = tasks_[mcu.id];
+  if (!mcu.online()) return;
+  const unsigned moving = mcu.report().moving | mcu.report().autonomous;
+  if (!mcu.busy() && (task.stopping & ~moving) != 0) {
+    task.stopping &= static_cast<std::uint16_t>(moving);
+    installation_.changed = true;
+  }
+  const unsigned wanted = held(mcu) | task.stopping;
+  const unsigned more = wanted & ~task.inhibited & ~(task.refused ? moving : 0u);
+  const unsigned less = task.inhibited & ~wanted & ~moving;
+  if (more != 0) {
+    tell(mcu, static_cast<std::uint16_t>(task.inhibited | more));
+  } else if (less != 0 && !mcu.busy()) {
+    tell(mcu, static_cast<std::uint16_t>(task.inhibited & ~less));
+  }
+}
+
+void LocalInputs::step(std::int64_t) {
+  for (const McuId id : installation_.mcus()) follow(installation_[id]);
+}
+
+void LocalInputs::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
+  if (type != BUSHD_MSG_LOCAL) return;
+  Task& task = tasks_[mcu.id];
+  task.refused = status;
+  task.inhibited = task.before;
+  task.stopping = 0;
+  installation_.changed = true;
+}
+
+// It was configured with what it was told last.
+void LocalInputs::goes_online(Mcu& mcu) {
+  tasks_[mcu.id].refused.reset();
+}
+
+void LocalInputs::goes_offline(Mcu& mcu, const std::string&) {
+  tasks_[mcu.id].stopping = 0;
+}
+
+}  // namespace bushd::daemon
