@@ -62,7 +62,7 @@ Claims claims_of(const api::Request& request) {
             return r.per_s == 0 && !r.renew ? Claims{} : Claims{.moves = {r.motor}};
           },
           [](const api::Stop& r) { return Claims{.stops = or_all(r.motors)}; },
-          [](const api::EmergencyStop&) { return Claims{.stops = all(), .parts = all()}; },
+          [](const api::EmergencyStop&) { return Claims{.stops = all()}; },
           // Homing and what waits for the trigger go on; the state tells of those that are paused.
           [](const api::Pause&) { return Claims{}; },
           [](const api::Resume& r) { return Claims{.resumes = or_all(r.motors)}; },

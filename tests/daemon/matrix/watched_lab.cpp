@@ -73,7 +73,6 @@ std::int64_t WatchedLab::ask(const api::Request& request, const std::string& cli
                       .what = std::string(api::name_of(request)),
                       .moves = claims.moves,
                       .stops = claims.stops,
-                      .parts = claims.parts,
                       .resumes = claims.resumes,
                       .places = claims.places});
   for (const std::string& name : claims.programs) {
@@ -188,12 +187,10 @@ void WatchedLab::follow(Ticket& ticket) {
   for (const std::string& name : ticket.stops) {
     Watched& motor = watched_.at(name);
     motor.stopped_by = std::max(motor.stopped_by, ticket.number);
+    motor.held = false;
+    motor.local_until_us = -1;
     motor.program_until_us = -1;
     motor.orphan_until_us = -1;
-  }
-  for (const std::string& name : ticket.parts) {
-    watched_.at(name).held = false;
-    watched_.at(name).local_until_us = -1;
   }
 }
 

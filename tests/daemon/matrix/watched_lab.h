@@ -62,7 +62,6 @@ class WatchedLab : public Lab {
     std::string what{};
     std::set<std::string> moves{};    // motors
     std::set<std::string> stops{};    // motors
-    std::set<std::string> parts{};    // motors from who moves them at their MCU
     std::set<std::string> resumes{};  // motors
     std::set<std::string> places{};   // motors that may stand elsewhere on the scale then
     bool open = true;
