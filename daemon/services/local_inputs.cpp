@@ -13,11 +13,14 @@ LocalInputs::LocalInputs(Installation& installation) : installation_(installatio
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) tasks_.add();
 }
 
+bool LocalInputs::may_move(MotorId id) const {
+  return installation_.mcu_of(id).online() && installation_.drives()[id].moved_by_people();
+}
+
 bool LocalInputs::move(MotorId id) const {
-  const Mcu& mcu = installation_.mcu_of(id);
   const motion::Motor& motor = installation_[id];
-  return mcu.online() && installation_.drives()[id].moved_by_people() &&
-         motor.is<motion::Local>() && (mcu.report().autonomous & bit_of(motor)) != 0;
+  return may_move(id) && motor.is<motion::Local>() &&
+         (installation_.mcu_of(id).report().autonomous & bit_of(motor)) != 0;
 }
 
 void LocalInputs::stop(MotorId id) {
@@ -69,8 +72,8 @@ void LocalInputs::follow(Mcu& mcu) {
   Task& task = tasks_[mcu.id];
   if (!mcu.online()) return;
   const unsigned moving = mcu.report().moving | mcu.report().autonomous;
-  if (!mcu.busy() && (task.stopping & ~moving) != 0) {
-    task.stopping &= static_cast<std::uint16_t>(moving);
+  if (!mcu.busy() && (task.stopping & task.inhibited & ~moving) != 0) {
+    task.stopping &= static_cast<std::uint16_t>(moving | ~task.inhibited);
     installation_.changed = true;
   }
   const unsigned wanted = held(mcu) | task.stopping;

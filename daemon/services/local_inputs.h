@@ -16,9 +16,11 @@ class LocalInputs final : public Service {
  public:
   explicit LocalInputs(Installation& installation);
 
-  // People move it at its MCU, which is online.
+  // People may move it at its MCU, which is online.
+  bool may_move(MotorId motor) const;
+  // They do, by its last report.
   bool move(MotorId motor) const;
-  // Precondition: they do. How that goes, is_stopping() and refusal() tell.
+  // Precondition: they may. How that goes, is_stopping() and refusal() tell.
   void stop(MotorId motor);
   bool is_stopping(MotorId motor) const;
   // What is_held() says has been told its MCU, or does not concern it.

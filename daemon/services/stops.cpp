@@ -66,11 +66,16 @@ api::Completed Stops::result_in_part(const std::vector<MotorId>& motors, const s
       .detail = {}};
 }
 
-// A stop that is the daemon's own leaves them alone: people need no daemon to move them.
+// A stop that is the daemon's own leaves them alone: people need no daemon to move them. Their MCU
+// is told whether they are seen to move or not: a press may have come since its last report.
 void Stops::stop_local(Stopping& stopping, const std::vector<MotorId>& motors) {
   for (const MotorId id : motors) {
     const motion::Motor& motor = installation_[id];
-    if (local_inputs_.move(id)) {
+    if (local_inputs_.may_move(id)) {
+      if (local_inputs_.move(id)) {
+        stopping.done +=
+            "; " + motor.name() + ": its local inputs must be released before they move it again";
+      }
       local_inputs_.stop(id);
       stopping.local.push_back(id);
     } else if (motor.is<motion::Local>()) {
@@ -86,11 +91,8 @@ void Stops::follow_local(Stopping& stopping) {
     const auto refusal = local_inputs_.refusal(id);
     if (refusal) {
       note(stopping.not_done, motor.name() + ": " + *refusal);
-    } else if (installation_.mcu_of(id).online()) {
-      stopping.done +=
-          "; " + motor.name() + ": its local inputs must be released before they move it again";
-    } else {
-      note(stopping.not_done, motor.name() + ": its MCU went offline before it stood");
+    } else if (!installation_.mcu_of(id).online()) {
+      note(stopping.not_done, motor.name() + ": its MCU went offline before it was known to stand");
     }
     return true;
   });
