@@ -67,15 +67,20 @@ void LocalInputs::tell(Mcu& mcu, std::uint16_t inhibited) {
   mcu.inhibit_local(inhibited);
 }
 
+// What came before the MCU took the message says nothing.
+void LocalInputs::reports(std::int64_t, Mcu& mcu) {
+  Task& task = tasks_[mcu.id];
+  const unsigned moving = mcu.report().moving | mcu.report().autonomous;
+  if (mcu.busy() || (task.stopping & task.inhibited & ~moving) == 0) return;
+  task.stopping &= static_cast<std::uint16_t>(moving | ~task.inhibited);
+  installation_.changed = true;
+}
+
 // A motor gets back to people when it rests: while it moves its MCU would refuse that.
 void LocalInputs::follow(Mcu& mcu) {
   Task& task = tasks_[mcu.id];
   if (!mcu.online()) return;
   const unsigned moving = mcu.report().moving | mcu.report().autonomous;
-  if (!mcu.busy() && (task.stopping & task.inhibited & ~moving) != 0) {
-    task.stopping &= static_cast<std::uint16_t>(moving | ~task.inhibited);
-    installation_.changed = true;
-  }
   const unsigned wanted = held(mcu) | task.stopping;
   const unsigned more = wanted & ~task.inhibited & ~(task.refused ? moving : 0u);
   const unsigned less = task.inhibited & ~wanted & ~moving;

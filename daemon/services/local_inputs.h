@@ -31,6 +31,7 @@ class LocalInputs final : public Service {
   void goes_online(Mcu& mcu) override;
   void goes_offline(Mcu& mcu, const std::string& cause) override;
   void refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) override;
+  void reports(std::int64_t now_us, Mcu& mcu) override;
   void step(std::int64_t now_us) override;
 
  private:
