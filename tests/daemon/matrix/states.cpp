@@ -17,7 +17,7 @@ void move(WatchedLab& lab, Amounts amounts) {
 api::Follow array(api::Follow::Part part) {
   api::Follow asked{.part = part, .array = 3, .motors = {"c", "d"}};
   if (part == api::Follow::Part::kRun) return asked;
-  asked.time_s = {0, 2, 4};
+  asked.time_s = {0, 4, 8};
   asked.positions = {0, 0, 200, -90, 0, 0};
   return asked;
 }
