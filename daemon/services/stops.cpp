@@ -57,8 +57,8 @@ std::string Stops::not_online_text(const std::vector<MotorId>& motors) const {
 }
 
 // It is told at once: who does not wait for the end of a stop is to know it, too.
-api::Completed Stops::result_in_part(const std::vector<MotorId>& motors, const std::string& not_done,
-                                     bool any_moves) const {
+api::Completed Stops::result_in_part(const std::vector<MotorId>& motors,
+                                     const std::string& not_done, bool any_moves) const {
   return {
       .outcome = not_done.empty() ? api::Outcome::kLink : api::Outcome::kFault,
       .reason = std::string(any_moves ? "what moves is being stopped" : "what is online stands") +

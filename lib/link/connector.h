@@ -99,8 +99,8 @@ class Connector {
     bool taken_over = false;
     bushd_stop_mode stop_mode = BUSHD_STOP_RAMP;  // of the stop that binds it
     bool clearing = false;                        // people have asked it to clear its faults
-    std::uint16_t not_local = 0;       // as wanted
-    std::uint16_t not_local_told = 0;  // as told in the setup
+    std::uint16_t not_local = 0;                  // as wanted
+    std::uint16_t not_local_told = 0;             // as told in the setup
     std::int64_t retry_due_us = 0;
     unsigned identify_attempts = 0;  // in a row without an MCU that fits
   };

@@ -340,8 +340,7 @@ TEST(Jogs, OfALongWayGoOnAsLongAsTheyAreRenewed) {
   Lab lab(lab_with(""));
   lab.connect();
   const auto first = lab.send(jog(0.5));
-  EXPECT_TRUE(keep_going(
-      lab, [&] { return lab.shaft_steps("m01") == 2; }, 6));
+  EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") == 2; }, 6));
   lab.send(jog(0));
   EXPECT_EQ(lab.wait(first, 10).result, "done");
 }

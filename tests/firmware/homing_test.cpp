@@ -240,9 +240,7 @@ TEST_P(Homing, StoppedBeforeItBeginsItMakesNoStep) {
   put({-200, -1});
   const std::vector<std::function<void()>> stops = {
       [&] { rig.emergency(BUSHD_STOP_RAMP); },
-      [&] {
-        EXPECT_EQ(rig.home({kHomed, -1, 0, 0, 400, kSlow, 0}), BUSHD_OK);
-      },
+      [&] { EXPECT_EQ(rig.home({kHomed, -1, 0, 0, 400, kSlow, 0}), BUSHD_OK); },
   };
   for (const auto& stop : stops) {
     ASSERT_EQ(rig.home(command()), BUSHD_OK);
