@@ -44,10 +44,9 @@ TEST(Begins, NoHomingAtTheStartOfAnMcuThatComesWhileTheDaemonEnds) {
   lab.plug(1);
   EXPECT_EQ(lab.wait(move).result, "stopped");
   ASSERT_TRUE(lab.run_until([&] { return lab.core().at_rest(); }));
-  ASSERT_TRUE(lab.run_until([&] { return ready("lab:1"); }));
   lab.run_for(3);
+  EXPECT_FALSE(ready("lab:1")) << "nobody enables its drivers any more";
   EXPECT_EQ(lab.shaft_steps("far"), 0);
-  EXPECT_EQ(lab.motor("far").activity, api::Activity::kResting);
   EXPECT_TRUE(lab.core().at_rest());
 }
 

@@ -204,6 +204,8 @@ TEST(MotorSettings, OfWhoMovesAMotorAreToldToTheMcu) {
   };
   EXPECT_EQ(key(0x00, 1), 0);
   lab.expect_done("m01", "keypad", "true");
+  // A key that is held when an MCU gets the motor must be seen released for 0.5 s.
+  lab.run_for(0.6);
   // For 500 ms, 3 ms a step, and its ramps.
   EXPECT_NEAR(static_cast<double>(key(0x00, 2)), 166, 10);
   EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
