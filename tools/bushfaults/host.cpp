@@ -196,7 +196,7 @@ void Host::give(const Request& request) {
   const bool usable = request.damage == Damage::kNone && bushd::api::is_client_id(request.client);
   const std::uint64_t dropped = daemon_->dropped();
   recent_.note(now_ns_, text_of(request));
-  if (usable) witness_.promise().give(request, now_us());
+  if (usable) witness_.promise().give(request);
   daemon_->give(packet_of(now_us(), request));
   if (usable) check(witness_.promise().given());
   if (usable != (daemon_->dropped() == dropped)) {

@@ -122,18 +122,12 @@ Promise::Duty Promise::duty_of(const Request& request) {
   return session->seen.insert(number).second ? Duty::kCarryOut : Duty::kAnswerAgain;
 }
 
-void Promise::give(const Request& request, std::int64_t sent_us) {
+void Promise::give(const Request& request) {
   const Key key = key_of(request.id());
   const std::size_t kind = api_of(request).index();
-  Duty duty = duty_of(request);
+  const Duty duty = duty_of(request);
   const auto [asked, first] = asked_.try_emplace(key, Asked{.kind = kind});
   if (first) order_.push_back(key);
-  if (duty == Duty::kCarryOut && request.ends_motion()) {
-    // No session tells repetitions: one of the same time is the same message.
-    const bool again = asked->second.kind == kind && asked->second.stop_sent_us == sent_us;
-    if (again) duty = Duty::kAnswerAgain;
-    asked->second.stop_sent_us = sent_us;
-  }
   given_ = Given{.request = request, .duty = duty, .same_kind = asked->second.kind == kind};
   forget_some();
 }

@@ -30,9 +30,8 @@ class Promise {
   Wrong hear(const bushd::lcm::Welcome& welcome);
   Wrong hello_given();
 
-  // A request arrives that was sent then. What is said at once, and what is carried out at once,
-  // comes before given().
-  void give(const Request& request, std::int64_t sent_us);
+  // A request arrives. What is said at once, and what is carried out at once, comes before given().
+  void give(const Request& request);
   Wrong given();
   // The core gets it. Which one it is, unless it was not to be carried out.
   std::optional<Request> carried_out(const std::string& client, std::int64_t number);
@@ -78,7 +77,6 @@ class Promise {
     std::uint64_t accepted = 0;
     std::uint64_t refused = 0;
     std::uint64_t completed = 0;
-    std::optional<std::int64_t> stop_sent_us{};       // the newest one that ends motion
     std::optional<std::vector<std::uint8_t>> told{};  // the newest answer
     bool finished() const { return refused + completed == carried_out && carried_out > 0; }
   };
