@@ -166,7 +166,11 @@ class InMotion:
 
     def retarget_paused(self, motors, moving, aims, number):
         at = self.seen(moving)["pulses"] - self.base[moving.name]
-        made = self.make_move([moving], {moving.name: (aims[moving.name], (at, at))})
+        if self.rng.random() < 0.2:
+            # From where it is, or from its target? Nobody has said.
+            self.ask("move", "it is paused on its way", to=False, motors=[{"name": moving.name, "steps": 10}])
+            return self.resume(motors, moving, aims, number)
+        made = self.make_move([moving], {moving.name: (aims[moving.name], (at, at))}, absolute=True)
         if made is None:
             return self.resume(motors, moving, aims, number)
         request, targets, _, refused = made

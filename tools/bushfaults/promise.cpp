@@ -151,7 +151,12 @@ Promise::Wrong Promise::given() {
   if (given.carried_out) return std::nullopt;
   const Request& request = given.request;
   if (given.duty == Duty::kCarryOut) {
-    if (request.ends_motion()) return "a stop is not carried out: " + text_of(request);
+    // Its repetition may still be without an answer.
+    const bool repeated = asked_.at(key_of(request.id())).carried_out > 0;
+    if (request.ends_motion() && !repeated) {
+      return "a stop is not carried out: " + text_of(request);
+    }
+    if (request.ends_motion()) return std::nullopt;
     if (!given.refused) waiting_[request.client].push_back(request);
     return std::nullopt;
   }
@@ -232,6 +237,11 @@ Promise::Wrong Promise::hear(const lcm::ReplyMessage& message) {
   ++given_->answers;
   Asked& asked = asked_.at(key_of(message.id));
   if (given_->duty != Duty::kCarryOut) return check_again(message, asked);
+  // A stop that its session does not know may be told from its repetitions, and need not be.
+  if (given_->request.ends_motion() && asked.carried_out > 0) {
+    given_->carried_out = true;
+    return std::nullopt;
+  }
   // Too many wait already.
   if (given_->request.ends_motion() || !is_refusal(message.reply, "wait")) {
     return "said before it was carried out:" + text_of(message);

@@ -309,7 +309,10 @@ void SmallJudge::replied(TimeNs now_ns, std::int64_t number, const api::Reply& r
     const auto& result = std::get<api::Completed>(reply);
     recent_.note(now_ns,
                  fmt::format("desk #{} {}: {}", number, word(result.outcome), result.reason));
-    if (!open.accepted) violated_(now_ns, "a result before it was accepted: " + open.text);
+    // What was over before it began has a result alone.
+    if (!open.accepted && result.outcome == api::Outcome::kReached) {
+      violated_(now_ns, "reached before it was accepted: " + open.text);
+    }
     if (open.is_motion) ++results_[std::string(word(result.outcome))];
     completed(now_ns, open, result);
   }
