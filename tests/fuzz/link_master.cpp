@@ -119,6 +119,7 @@ struct SaneMcu {
   bool configured = false;
   bool synced = false;
   bool enabled = false;
+  bool stopped = false;
   std::uint32_t sync_id = 0;
   bool marked = false;
   std::int64_t marked_at_us = 0;
@@ -251,7 +252,12 @@ class Bus {
       case BUSHD_MSG_TABLE_TICKS:
       case BUSHD_MSG_TABLE_RUN:
       case BUSHD_MSG_LINE_RUN:
+        return;
       case BUSHD_MSG_EMERGENCY:
+        for (std::uint8_t address = 1; address <= kMcus; ++address) {
+          const bool to_it = frame.address == BUSHD_ADDRESS_BROADCAST || frame.address == address;
+          if (to_it) mcus_[address - 1u].stopped = true;
+        }
         return;
       case BUSHD_MSG_POLL:
         awaited_ = Awaited{polled(frame), frame.type, frame.sequence, now_us_};
@@ -355,6 +361,9 @@ class Bus {
     if (frame.type == BUSHD_MSG_CONTROL && (frame.payload[0] & BUSHD_CONTROL_ENABLE) != 0) {
       mcu->enabled = true;
     }
+    if (frame.type == BUSHD_MSG_CONTROL && (frame.payload[0] & BUSHD_CONTROL_CLEAR_FAULTS) != 0) {
+      mcu->stopped = false;
+    }
   }
 
   std::size_t fit(std::uint8_t* payload) const {
@@ -386,7 +395,8 @@ class Bus {
     const auto tick_us = static_cast<std::int64_t>(kTickNs / 1000);
     bushd_report report{};
     const bool ready = mcu.configured && mcu.synced && mcu.enabled;
-    report.state = ready ? BUSHD_STATE_READY : BUSHD_STATE_BUSY;
+    report.state = mcu.stopped ? BUSHD_STATE_FAULT : ready ? BUSHD_STATE_READY : BUSHD_STATE_BUSY;
+    report.faults = mcu.stopped ? BUSHD_FAULT_EMERGENCY : 0;
     report.flags = static_cast<std::uint8_t>(
         (mcu.configured ? BUSHD_FLAG_CONFIGURED : 0) | (mcu.synced ? BUSHD_FLAG_SYNCED : 0) |
         (mcu.enabled ? BUSHD_FLAG_ENABLED : 0) | (mcu.marked ? BUSHD_FLAG_SYNC_HEARD : 0));
