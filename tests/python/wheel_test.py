@@ -167,7 +167,11 @@ class Installed(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             program = pathlib.Path(folder) / "program.py"
             program.write_text('import bushd\nreveal_type(bushd.connect().move("theta", to=1.0))\n')
-            for version, python in self.environments.items():
+            # Debian's checker knows no Python that is newer than Debian's.
+            debians = f"{sys.version_info.major}.{sys.version_info.minor}."
+            environments = {v: python for v, python in self.environments.items() if v.startswith(debians)}
+            self.assertTrue(environments)
+            for version, python in environments.items():
                 with self.subTest(python=version):
                     command = ["mypy", "--strict", "--cache-dir=/dev/null", f"--python-executable={python}", program]
                     ran = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
