@@ -260,9 +260,10 @@ static uint32_t units_between(const bushd_ramp* ramp, uint16_t from, uint16_t to
 uint64_t bushd_run_units_left(const bushd_run* run) {
   if (bushd_run_done(run)) return 0;
   const bushd_table* table = run->table;
-  const uint16_t rise_to = run->accel_at < run->accel_end ? run->accel_end : run->accel_at;
-  return (uint64_t)run->lead_delay + units_between(&table->accel, run->accel_at, rise_to) +
-         (uint64_t)run->cruise_left * run->cruise +
+  // Where steps are left out, accel_at may lie beyond the side.
+  const bool rises = run->accel_at < run->accel_end;
+  const uint32_t rising = rises ? units_between(&table->accel, run->accel_at, run->accel_end) : 0u;
+  return (uint64_t)run->lead_delay + rising + (uint64_t)run->cruise_left * run->cruise +
          units_between(&table->decel, bushd_run_decel_end(run),
                        (uint16_t)(run->decel_left + brake_left(run))) -
          (uint64_t)(int32_t)run->since;

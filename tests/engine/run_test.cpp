@@ -340,6 +340,16 @@ TEST(Run, RampDownWaitsForNoStepThatIsFarAway) {
   EXPECT_EQ(sum(expand(&run, Format::kFine, 20'000'000, 1000).displacements), -3 * 256);
 }
 
+// More codes are left out than the other side has: nothing is read beyond it (seen by ASan).
+TEST(Run, LeavesOutMoreStepsThanTheAcceleratingSideHas) {
+  const Law law{{500}, {10000, 3000, 1000, 600, 500}, 400, 1'000'000};
+  const TestTable table(law, true);
+  bushd_run run;
+  bushd_run_start_ramp_down(&run, table.view(), 400, 0, 1);
+  EXPECT_EQ(bushd_run_steps_left(&run), 2u);
+  EXPECT_EQ(bushd_run_units_left(&run), 400u + 500u);
+}
+
 TEST(Run, TakesOverInTheMiddleOfAStep) {
   holds("taken over == definition", [] {
     const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
