@@ -155,6 +155,9 @@ void keeps_to_its_table(const std::vector<Edge>& edges, const bushd_table& table
                         std::uint32_t tick_ns,
                         const std::function<bool(const Edge&)>& rests_after = nullptr) {
   const double unit = table.time_unit_ns;
+  // A ramp-down waits for no step that is more than half a second away.
+  std::uint32_t left_out = 0;
+  while (left_out < table.decel.count && table.decel.code[left_out] * unit > 500e6) ++left_out;
   // What ticks and slots may add: each edge is within half a tick of its time, but for first ones.
   std::size_t from = 0;
   for (std::size_t j = 1; j <= edges.size(); ++j) {
@@ -178,7 +181,8 @@ void keeps_to_its_table(const std::vector<Edge>& edges, const bushd_table& table
       // at twice the speed: what a stop in the next one ends with has half the interval at least.
       const double made_up = from > 0 && i == 1 ? 0.5 : 1;
       RC_ASSERT(delay + slack >=
-                bushd_table_decel(&table, static_cast<std::uint32_t>(n - 1 - i)) * unit * made_up);
+                bushd_table_decel(&table, static_cast<std::uint32_t>(n - 1 - i) + left_out) *
+                    unit * made_up);
     }
     from = j;
   }
