@@ -240,8 +240,11 @@ void CamacShutter::end(camac::Bushd1& module, const api::Reply& reply) {
 }
 
 void CamacShutter::end_travel(camac::Bushd1& module, Motion& motion, bool done) {
-  if (done && !motion.returns) end_run(module, motion);
-  if (done) return end_run(module, motion);
+  if (done) {
+    if (!motion.returns) end_run(module, motion);
+    end_run(module, motion);
+    return module.stands();  // a module that was told to stop waits for no more than this
+  }
   const std::uint8_t stage = installation_.mcu_of(motor_).report().homing;
   const bool all = stage == BUSHD_TRAVEL_NOT_REACHED || stage == BUSHD_TRAVEL_NOT_LEFT;
   if (!motion.stopping) tell_steps(module, motion, all);

@@ -219,6 +219,32 @@ TEST(CamacShutter, AStopOfSomebodyElseIsAFault) {
   EXPECT_EQ(lab.motor("m03").position_steps, stands);
 }
 
+// What ends it comes when its last step is made, and nobody has reported that yet.
+TEST(CamacShutter, AStopAroundTheLastStepLeavesItFreeForTheNextTravel) {
+  const std::vector<camac::Naf> stops{{kShutterStation, 0, 24}, {28, 8, 26}};
+  for (const camac::Naf& stop : stops) {
+    ShutterLab lab;
+    lab.load_codes(kCodes, 200);
+    for (int ms = -12; ms <= 60; ms += 4) {
+      SCOPED_TRACE("F" + std::to_string(stop.function) + ", " + std::to_string(ms) +
+                   " ms after the last step");
+      const std::size_t before = lab.shutter().steps.size();
+      lab.permit(kAutomatic | kAllEnabled);
+      ASSERT_TRUE(lab.run_until([&] { return lab.shutter().steps.size() == before + 17; }, 5));
+      lab.run_for(kCodes.back() * 50e-6 + ms * 1e-3);
+      lab.naf(stop.station, stop.subaddress, stop.function);
+      ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }, 5));
+      lab.run_for(0.1);
+      lab.cleared_requests();
+      if (lab.shutter().position != 0) lab.wait(lab.send(Ask::kMoveTo, {"m03"}, {0}));
+      ASSERT_EQ(lab.shutter().position, 0);
+    }
+    lab.permit(kAutomatic | kAllEnabled);
+    ASSERT_TRUE(lab.wait_for_lam(5));
+    EXPECT_EQ(lab.cleared_requests() & 0x3F, kRightLimit);
+  }
+}
+
 // Nobody makes it move on, nor twice.
 TEST(CamacShutter, FaultsInBetweenEndIt) {
   ShutterLab lab;
