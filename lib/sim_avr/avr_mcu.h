@@ -171,7 +171,7 @@ class AvrMcu final : public Mcu {
   // Power stage and comparators, with the filter behind the PWM that makes their reference.
   struct Stage {
     PowerStage stage;
-    std::uint8_t duty = 0;
+    double high_share = 0;  // of the PWM
     TimeNs followed_ns = 0;
     std::array<bool, PowerStage::kPairs> trips{};
     std::array<double, PowerStage::kWindings> told_a{};  // to the sink

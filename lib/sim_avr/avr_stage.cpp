@@ -17,11 +17,25 @@ namespace {
 
 constexpr AvrPin kComparators[] = {{'D', 2}, {'D', 3}};
 constexpr AvrPin kDecay = {'A', 7};
-constexpr double kFullScaleA = 5.11;  // of 255
+constexpr double kFullScaleA = 5.11;  // of an output that is always high
+// Timer 2 in the address space of data (data sheet, "Register Summary").
+constexpr std::size_t kTccr2a = 0xB0;
+constexpr std::size_t kTccr2b = 0xB1;
+constexpr std::size_t kOcr2a = 0xB3;
 // Of the low-pass, with one pole: a new reference is there to 1 % within a tick.
 constexpr double kFilterNs = 300'000;
 constexpr TimeNs kSampleNs = 5'000;
 constexpr double kSampleA = 0.001;  // less is not told
+
+// The share of time for which OC2A is high, by the data sheet ("8-bit Timer/Counter2 with PWM"):
+// in fast PWM up to 255 (WGM22:0 = 3) that does not invert (COM2A1:0 = 2) it is set at BOTTOM and
+// cleared behind the compare match, so for OCR2A + 1 of 256 counts; with 0 as "a narrow spike". The
+// stage knows no other mode; without one the pin is low.
+double high_share(const avr_t& avr) {
+  const bool pwm = (avr.data[kTccr2a] & 0xC3) == 0x83 && (avr.data[kTccr2b] & 0x08) == 0;
+  const bool runs = (avr.data[kTccr2b] & 0x07) != 0;
+  return pwm && runs ? (avr.data[kOcr2a] + 1) / 256.0 : 0;
+}
 
 }  // namespace
 
@@ -38,7 +52,7 @@ void AvrMcu::begin_stage(const PowerStageRules& rules) {
 void AvrMcu::follow_stage() {
   PowerStage& stage = stage_->stage;
   const TimeNs now_ns = std::max(time_ns(), stage_->followed_ns);
-  const double target_a = stage_->duty * kFullScaleA / 255;
+  const double target_a = stage_->high_share * kFullScaleA;
   const auto passed_ns = static_cast<double>(now_ns - stage_->followed_ns);
   stage.set_reference(
       now_ns, target_a + (stage.reference_a() - target_a) * std::exp(-passed_ns / kFilterNs));
@@ -92,10 +106,10 @@ void AvrMcu::on_decay(avr_irq_t*, std::uint32_t value, void* param) {
   self.stage_->stage.set_fast_decay(self.stage_->followed_ns, (value & 1) != 0);
 }
 
-void AvrMcu::on_reference(avr_irq_t*, std::uint32_t value, void* param) {
+void AvrMcu::on_reference(avr_irq_t*, std::uint32_t, void* param) {
   auto& self = *static_cast<AvrMcu*>(param);
   self.follow_stage();
-  self.stage_->duty = static_cast<std::uint8_t>(value);
+  self.stage_->high_share = high_share(*self.avr_);
 }
 
 }  // namespace bushd::sim

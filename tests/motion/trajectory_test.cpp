@@ -181,8 +181,8 @@ void keeps_to_its_table(const std::vector<Edge>& edges, const bushd_table& table
       // at twice the speed: what a stop in the next one ends with has half the interval at least.
       const double made_up = from > 0 && i == 1 ? 0.5 : 1;
       RC_ASSERT(delay + slack >=
-                bushd_table_decel(&table, static_cast<std::uint32_t>(n - 1 - i) + left_out) *
-                    unit * made_up);
+                bushd_table_decel(&table, static_cast<std::uint32_t>(n - 1 - i) + left_out) * unit *
+                    made_up);
     }
     from = j;
   }

@@ -131,8 +131,8 @@ class ChopperAtSpeed : public Chopper, public testing::WithParamInterface<Drive>
   }
 };
 
-// Each cut, not only on the average. Of 50 mA three stem from the 255ths of 5.11 A (2 mA) and the
-// comparator's interrupt, which may wait for a slot's: 1 us of 24 V at 8 mH is 3 mA.
+// Each cut, not only on the average. Of 50 mA ten stem from the 256ths of 5.11 A, and three from
+// the comparator's interrupt, which may wait for a slot's: 1 us of 24 V at 8 mH is 3 mA.
 TEST_P(ChopperAtSpeed, CutsEveryWindingAtItsCurrent) {
   ASSERT_NO_FATAL_FAILURE(cruise());
   const Figures found = figures();
@@ -149,6 +149,8 @@ TEST_P(ChopperAtSpeed, CutsEveryWindingAtItsCurrent) {
   EXPECT_LE(found.ripple_a, most_ripple_a);
   // A cut in the first half of the period leaves the other half to fall in.
   EXPECT_GE(found.ripple_a, most_ripple_a / 2);
+  testing::Test::RecordProperty("least_ma", static_cast<int>(found.least_a * 1000));
+  testing::Test::RecordProperty("most_ma", static_cast<int>(found.most_a * 1000));
   testing::Test::RecordProperty("ripple_ma", static_cast<int>(found.ripple_a * 1000));
 }
 
@@ -197,6 +199,25 @@ TEST_F(Chopper, RampsCruiseAndRestHaveTheirCurrents) {
   EXPECT_EQ(master_.poll(kAddress).moving, 0);
   expect_current(kHoldMa, 20'000'000);
   EXPECT_EQ(master_.poll(kAddress).motor[0].position_steps, 600);
+}
+
+// Fast PWM that does not invert is high for OCR2A + 1 of 256 counts (data sheet of the ATmega1284P,
+// "Fast PWM Mode": set at BOTTOM, cleared on compare match), and high for good is 5.11 A. So what
+// is set is met to half of a 256th, from one of them on. After 10 ms, 33 time constants, the filter
+// is there.
+TEST_F(Chopper, TheReferenceIsTheCurrentThatIsSet) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_PHASES_HALF, BUSHD_DECAY_FAST, 100));
+  constexpr double kCountA = 5.11 / 256;
+  constexpr std::uint16_t kSetMa[] = {1, 20, 29, 31, 40, 100, 300, 1000, 1019, 2555, 5090, 5110};
+  for (const std::uint16_t ma : kSetMa) {
+    SCOPED_TRACE(std::to_string(ma) + " mA");
+    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CURRENTS, bushd_encode_currents,
+                                   bushd_currents{0, BUSHD_DECAY_FAST, ma, ma, ma}),
+              BUSHD_OK);
+    pass(10'000'000);
+    EXPECT_NEAR(avr_->power_stage().reference_a(), std::max(ma / 1000.0, kCountA),
+                kCountA / 2 + 1e-6);
+  }
 }
 
 // What is set is kept, and refused where it cannot be.

@@ -4,6 +4,7 @@
 #include <board.h>
 
 #define COUNT_CYCLES 8u
+#define PWM_COUNTS 256u
 #define COMPARATOR_INTERRUPTS (1 << INT0 | 1 << INT1)
 
 bushd_mcu_currents chopper_currents[1];
@@ -19,26 +20,26 @@ void chopper_init(void) {
   TCCR0B = 1 << CS01;
 }
 
+// OC2A is high for OCR2A + 1 of 256 counts.
 static uint8_t reference_of(uint16_t ma) {
-  if (ma == 0) return 0;
-  const uint16_t reference =
-      (uint16_t)((UINT8_MAX * (uint32_t)ma + BUSHD_MAX_CURRENT_MA / 2u) / BUSHD_MAX_CURRENT_MA);
-  return (uint8_t)(reference == 0 ? 1u : reference);
+  const uint16_t counts =
+      (uint16_t)((PWM_COUNTS * (uint32_t)ma + BUSHD_MAX_CURRENT_MA / 2u) / BUSHD_MAX_CURRENT_MA);
+  return (uint8_t)(counts == 0 ? 0u : counts - 1u);
 }
 
 void chopper_set(void* context, uint8_t motor, uint16_t ma, bool fast_decay) {
   (void)context;
   (void)motor;
-  const uint8_t reference = reference_of(ma);
-  OCR2A = reference;
+  const bool controlled = ma != 0;
+  OCR2A = reference_of(ma);
   if (fast_decay) {
     DECAY_PORT |= 1 << DECAY_BIT;
   } else {
     DECAY_PORT &= (uint8_t)~(1 << DECAY_BIT);
   }
   const bool on = (TIMSK0 & 1 << OCIE0A) != 0;
-  if (on == (reference != 0)) return;
-  if (reference != 0) {
+  if (on == controlled) return;
+  if (controlled) {
     TIFR0 = 1 << OCF0A;
     TIMSK0 = 1 << OCIE0A;
     return;

@@ -16,8 +16,8 @@
 // With interrupts off, once. The chopper is off: windings are on for as long as their phase is.
 void chopper_init(void);
 
-// As in bushd_port, for motor 0: the reference is its peak current in 255ths of 5110 mA, 1 at
-// least.
+// As in bushd_port, for motor 0: the reference is its peak current in 256ths of 5110 mA, one of
+// them at least.
 void chopper_set(void* context, uint8_t motor, uint16_t ma, bool fast_decay);
 
 // Of the core.
