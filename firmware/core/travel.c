@@ -5,8 +5,10 @@
 //     max( e + wait, a )   or  max( s + t + wait, a )
 //
 // wherever in a tick that is (bushd_run_begin_late); a is the tick after the one that is prepared
-// when the limit has been seen. It must not be active while steps of later ticks are to come, and
-// be so with one of the readings that its debouncing takes after the last step.
+// when the limit has been seen. It must not be active while steps of later ticks are to come. It
+// must be so, and the other one not, with one of the readings that debouncing takes after the last
+// step: contacts bounce for as many ticks as debouncing has, and it then counts as many and one
+// more.
 #include "firmware/core/travel.h"
 
 #include <string.h>
@@ -57,7 +59,7 @@ static void begin(bushd_mcu* mcu, bushd_travel_stage stage) {
     return;
   }
   travel->stage = (uint8_t)stage;
-  travel->readings = (uint16_t)(mcu->inputs.debounce_ticks + 2u);
+  travel->readings = (uint16_t)(2u * mcu->inputs.debounce_ticks + 2u);
   bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), travel->steps,
                   travel->direction, 0);
   if (travel->due_ns != 0) bushd_run_begin_late(&motor->made.run, travel->due_ns);
@@ -98,10 +100,10 @@ static bool is_at(const bushd_mcu* mcu, int8_t direction) {
 // All steps of the run have been made.
 static void arrive(bushd_mcu* mcu) {
   bushd_mcu_travel* travel = &mcu->travel;
-  if (!is_at(mcu, travel->direction)) {
-    if (--travel->readings == 0) end(mcu, BUSHD_TRAVEL_NOT_REACHED);
-  } else if (is_at(mcu, (int8_t)-travel->direction)) {
-    end(mcu, BUSHD_TRAVEL_NOT_LEFT);
+  const bool reached = is_at(mcu, travel->direction);
+  if (!reached || is_at(mcu, (int8_t)-travel->direction)) {
+    if (--travel->readings == 0)
+      end(mcu, reached ? BUSHD_TRAVEL_NOT_LEFT : BUSHD_TRAVEL_NOT_REACHED);
   } else if (travel->stage == BUSHD_TRAVEL_RUN) {
     plan_return(mcu);
   } else if (travel->edge == BUSHD_EDGE_NONE) {

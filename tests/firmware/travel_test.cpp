@@ -218,6 +218,52 @@ TEST_P(Travel, LimitsAreDebounced) {
   expect_ends(BUSHD_TRAVEL_DONE, 0);
 }
 
+// Contacts bounce for as long as `debounce_ticks` says, which is what it is for: the last reading
+// of that is wrong, the others are as chance has it.
+TEST_P(Travel, ArrivesAndLeavesHoweverSwitchesBounce) {
+  std::mt19937 random(11);
+  for (std::uint8_t debounce_ticks = 1; debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS;
+       ++debounce_ticks) {
+    for (const std::uint32_t way : {1u, 2u, 5u, kWay}) {
+      SCOPED_TRACE(testing::Message() << way << " steps, debounce " << int{debounce_ticks});
+      struct Contact {
+        bool closed = false;
+        bool read = false;
+        std::uint32_t changed = 0;
+      };
+      Contact right;
+      Contact left{.closed = true, .read = true};
+      std::optional<std::uint32_t> read_at;
+      right_ = way;
+      rig.sense = [&] {
+        const std::int64_t at = rig.pulses(kTraveller) + stands_;
+        const auto read = [&](Contact& contact, bool closed) {
+          if (std::exchange(contact.closed, closed) != closed) contact.changed = rig.tick();
+          const std::uint32_t since = rig.tick() - contact.changed;
+          const bool wrong = since + 1 == debounce_ticks || random() % 2 == 0;
+          contact.read = since < debounce_ticks && wrong ? !closed : closed;
+        };
+        if (std::exchange(read_at, rig.tick()) != rig.tick()) {
+          read(right, at >= right_);
+          read(left, at <= left_);
+        }
+        return bushd_inputs{
+            static_cast<std::uint16_t>((right.read ? kTravellerBit : 0) | (left.read ? kLeft : 0)),
+            0};
+      };
+      InputSettings settings;
+      settings.debounce_ticks = debounce_ticks;
+      rig.pass(40);
+      ASSERT_EQ(rig.set_inputs({}), BUSHD_OK);  // the travel of before is forgotten
+      watch(settings);
+      rig.pass(40);
+      ASSERT_EQ(request(once(way)), BUSHD_OK);
+      expect_ends(BUSHD_TRAVEL_DONE, 0);
+      if (HasFailure()) return;
+    }
+  }
+}
+
 TEST_P(Travel, EndsByFaultsAndByStops) {
   const auto in_flight = [&] {
     ASSERT_EQ(request(once()), BUSHD_OK);
