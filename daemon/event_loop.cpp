@@ -67,8 +67,9 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
   publishing_.add(lcm_front_);
   add_keypads();
   if (fronts.control == nullptr) return;
-  socket_front_ =
-      std::make_unique<SocketFront>(*fronts.control, run_, reception_, publishing_, unix_time_us);
+  socket_front_ = std::make_unique<SocketFront>(
+      *fronts.control, run_, reception_, publishing_, unix_time_us,
+      [this](const std::string& text) { log(LogLevel::kWarning, {}, text); });
   publishing_.add(*socket_front_);
 }
 
@@ -167,6 +168,7 @@ Result<void> EventLoop::run() {
                                      (socket_front_ ? socket_front_->dropped() : 0));
     keep_up(now);
     lcm_watch_.step(now);
+    if (socket_front_) socket_front_->step(now);
     tell_left_out(now);
     const bool done = core_.at_rest() && core_.settled();
     if (shut_down_by_us_ && (done || now >= *shut_down_by_us_)) break;
@@ -210,6 +212,7 @@ std::int64_t EventLoop::next_wake_us() const {
     if (port.lost) return 0;
     if (!port.serial) wake = std::min(wake, port.open_due_us);
   }
+  if (socket_front_) wake = std::min(wake, socket_front_->next_wake_us());
   if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
   return wake;
 }

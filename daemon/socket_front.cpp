@@ -25,21 +25,39 @@ class SocketFront::SocketSession : public api::Session {
 };
 
 SocketFront::SocketFront(control::Server& server, std::int64_t run, Reception& reception,
-                         Publishing& publishing, std::function<std::int64_t()> unix_us)
+                         Publishing& publishing, std::function<std::int64_t()> unix_us, Log log)
     : server_(server),
       run_(run),
       reception_(reception),
       publishing_(publishing),
-      unix_us_(std::move(unix_us)) {
+      unix_us_(std::move(unix_us)),
+      log_(std::move(log)) {
   server_.set_handlers(
       {.opened =
-           [this](Connection connection, const api::Credentials& credentials) {
-             clients_.emplace(connection, Client{.credentials = credentials});
+           [this](Connection connection, const api::Credentials& credentials,
+                  const std::string& why_stops_only) {
+             clients_.emplace(connection,
+                              Client{.credentials = credentials, .why_stops_only = why_stops_only});
            },
        .packet = [this](Connection connection, control::View packet,
                         const control::Server::Sent& sent) { on_packet(connection, packet, sent); },
        .is_urgent = lcm::is_urgent_channel,
-       .closed = [this](Connection connection) { on_closed(connection); }});
+       .closed = [this](Connection connection) { on_closed(connection); },
+       .noted = log_});
+}
+
+void SocketFront::step(std::int64_t now_us) {
+  if (now_us < look_us_) return;
+  look_us_ = now_us + kLookEveryUs;
+  if (server_.in_place()) return trouble_.clear();
+  const auto restored = server_.restore();
+  std::string trouble = restored ? "" : restored.error().text();
+  if (restored && log_) {
+    log_("control socket: its file " + server_.path() + " had been deleted; it is made again");
+  } else if (trouble != trouble_ && log_) {
+    log_("control socket: its file has been deleted, and cannot be made again: " + trouble);
+  }
+  trouble_ = std::move(trouble);
 }
 
 SocketFront::~SocketFront() {
@@ -63,9 +81,14 @@ void SocketFront::on_packet(Connection connection, control::View packet,
     for (const lcm::Packet* newest : publishing_.newest()) send(connection, *newest);
     answer(connection, id.client_id, id.number,
            api::Completed{.outcome = api::Outcome::kDone, .reason = "told", .detail = {}});
+  } else if (const auto& request = std::get<api::Request>(message->content);
+             !client.why_stops_only.empty() && !api::ends_motion(request)) {
+    answer(connection, id.client_id, id.number,
+           api::Refused{"this connection may stop motors and no more: " + client.why_stops_only +
+                        "; close some of them, and connect again"});
   } else {
-    reception_.take({.session = client.session, .number = id.number},
-                    std::get<api::Request>(message->content), packet.payload.size(),
+    reception_.take({.session = client.session, .number = id.number}, request,
+                    packet.payload.size(),
                     Arrival{.earliest_ns = sent.earliest_ns,
                             .latest_ns = sent.latest_ns,
                             .stream = -static_cast<std::int64_t>(connection)});

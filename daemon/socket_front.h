@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <string>
 
 #include "control/server.h"
 #include "daemon/publishing.h"
@@ -15,20 +16,28 @@ namespace bushd::daemon {
 
 class SocketFront : public Listener {
  public:
-  // Everything outlives this. `run` of the daemon.
+  using Log = std::function<void(const std::string&)>;
+
+  // Everything outlives this. `run` of the daemon. `log`: of what is wrong with clients, or with
+  // the socket.
   SocketFront(control::Server& server, std::int64_t run, Reception& reception,
-              Publishing& publishing, std::function<std::int64_t()> unix_us);
+              Publishing& publishing, std::function<std::int64_t()> unix_us, Log log = {});
   ~SocketFront() override;
 
   void handle() { server_.handle(); }
+  // Looks now and then whether the socket's file is there, and makes it again.
+  void step(std::int64_t now_us);
+  std::int64_t next_wake_us() const { return look_us_; }
   void hear(Topic topic, const lcm::Packet& packet) override;
   std::uint64_t dropped() const { return server_.dropped(); }
 
  private:
   using Connection = control::Server::Connection;
+  static constexpr std::int64_t kLookEveryUs = 1'000'000;
   class SocketSession;
   struct Client {
     api::Credentials credentials;
+    std::string why_stops_only;  // "": it may ask for everything
     lcm::Subscription subscription{};
     std::shared_ptr<SocketSession> session{};  // from its first message with a name on
   };
@@ -46,7 +55,10 @@ class SocketFront : public Listener {
   Reception& reception_;
   Publishing& publishing_;
   std::function<std::int64_t()> unix_us_;
+  Log log_;
   std::map<Connection, Client> clients_;
+  std::int64_t look_us_ = 0;  // when to look for the socket's file again
+  std::string trouble_;       // why it could not be made again
 };
 
 }  // namespace bushd::daemon

@@ -21,6 +21,14 @@ constexpr int kSendWithinMs = 3000;
 constexpr timeval kConnectWithin{.tv_sec = 3, .tv_usec = 0};
 constexpr int kPacketsAtOnce = 256;
 
+// Precondition: it fits.
+sockaddr_un address_of(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, path.c_str(), path.size());
+  return address;
+}
+
 // Who has a right to this socket, and how one becomes one of them.
 std::string no_right(const std::string& path) {
   struct stat status{};
@@ -58,6 +66,24 @@ std::string no_daemon(const std::string& path, int error, const std::string& ano
                      start);
 }
 
+// Whether somebody listens there still; nobody is asked.
+bool is_served(const std::string& path) {
+  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const sockaddr_un address = address_of(path);
+  const bool served =
+      ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  if (fd >= 0) ::close(fd);
+  return served;
+}
+
+std::string why_closed(const std::string& path) {
+  if (!is_served(path)) return fmt::format("the daemon has ended; it was at {}", path);
+  return fmt::format(
+      "bushd has closed this connection at {}: too many clients are connected, this one did not "
+      "read what it was sent, or the daemon has restarted; its log tells why",
+      path);
+}
+
 class SocketLink : public Link {
  public:
   SocketLink(int fd, std::string path)
@@ -86,7 +112,7 @@ class SocketLink : public Link {
       header.msg_iovlen = 1;
       const ssize_t n = ::recvmsg(fd_, &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
       if (n < 0 && (errno == EAGAIN || errno == EINTR)) return {};
-      if (n <= 0) return fail(fmt::format("the daemon has ended, or closed {}", path_));
+      if (n <= 0) return fail(why_closed(path_));
       if ((header.msg_flags & MSG_TRUNC) != 0) continue;
       const auto view = control::view_of({buffer_.data(), static_cast<std::size_t>(n)});
       if (!view) continue;
@@ -111,8 +137,7 @@ class SocketLink : public Link {
 }  // namespace
 
 Result<std::unique_ptr<Link>> open_socket(const std::string& path, const std::string& another) {
-  sockaddr_un address{};
-  if (path.size() >= sizeof address.sun_path) {
+  if (path.size() >= sizeof sockaddr_un{}.sun_path) {
     return fail(Error{.message = "the path of the control socket is too long", .file = path});
   }
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
@@ -120,8 +145,7 @@ Result<std::unique_ptr<Link>> open_socket(const std::string& path, const std::st
   auto link = std::make_unique<SocketLink>(fd, path);
   // connect() waits for room among those that a daemon has not taken yet.
   ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &kConnectWithin, sizeof kConnectWithin);
-  address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path, path.c_str(), path.size());
+  const sockaddr_un address = address_of(path);
   if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int error = errno;
     if (error == EACCES) return fail(Error{.message = no_right(path), .file = path});

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -36,6 +37,13 @@ PidLock::Attempt PidLock::take(const std::string& path) {
   // For people only: without the number the lock holds as well.
   static_cast<void>(::ftruncate(fd, 0) == 0 && ::pwrite(fd, pid.data(), pid.size(), 0) > 0);
   return {.lock = std::move(lock)};
+}
+
+bool PidLock::is_at(const std::string& path) const {
+  struct stat locked{};
+  struct stat named{};
+  return ::fstat(fd_, &locked) == 0 && ::stat(path.c_str(), &named) == 0 &&
+         locked.st_dev == named.st_dev && locked.st_ino == named.st_ino;
 }
 
 PidLock::~PidLock() {

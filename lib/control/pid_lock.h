@@ -18,6 +18,9 @@ class PidLock {
   PidLock& operator=(const PidLock&) = delete;
   ~PidLock();
 
+  // The file of this name is the locked one: nobody has deleted it.
+  bool is_at(const std::string& path) const;
+
  private:
   explicit PidLock(int fd) : fd_(fd) {}
 

@@ -1,12 +1,10 @@
 #include "control/server.h"
 
 #include <fcntl.h>
-#include <grp.h>
+#include <poll.h>
 #include <sys/epoll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -14,20 +12,18 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <utility>
 
 namespace bushd::control {
 namespace {
 
 constexpr Server::Connection kListener = 0;
-constexpr int kBacklog = 256;
 // No connection waits longer to be accepted, not even where all connect at once.
 constexpr std::int64_t kMostUnreadNs = 30'000'000'000;
 constexpr std::size_t kAcceptedAtOnce = 64;
 
-Error system_error(const std::string& what, const std::string& path) {
-  return {.message = what + ": " + std::strerror(errno), .file = path};
+std::string text_of(const api::Credentials& who) {
+  return "process " + std::to_string(who.pid) + " of user " + std::to_string(who.uid);
 }
 
 std::int64_t ns_of(const timespec& time) {
@@ -41,113 +37,52 @@ std::int64_t now_ns() {
   return ns_of(time);
 }
 
-// Closed unless it is released.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  int release() { return std::exchange(fd_, -1); }
-
- private:
-  int fd_;
-};
-
 int open_spare() {
   return ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-}
-
-Result<void> give_to_group(const std::string& path, const std::string& group) {
-  if (group.empty()) return {};
-  const struct group* entry = ::getgrnam(group.c_str());
-  if (entry == nullptr) {
-    return fail(Error{.message = "there is no group \"" + group +
-                                 "\" of users; make it, or "
-                                 "change [control] group",
-                      .file = path});
-  }
-  // A service whose unit has that group needs no right to give files away, and may have none.
-  struct stat status{};
-  if (::stat(path.c_str(), &status) == 0 && status.st_gid == entry->gr_gid) return {};
-  if (::chown(path.c_str(), static_cast<uid_t>(-1), entry->gr_gid) != 0) {
-    Error error = system_error("the socket cannot be given to group " + group, path);
-    error.message +=
-        ". Started by systemd: 'systemctl edit bushd' with [Service] and Group=" + group +
-        "; else the daemon's user has to be in that group";
-    return fail(std::move(error));
-  }
-  return {};
 }
 
 }  // namespace
 
 Result<std::unique_ptr<Server>> Server::open(const std::string& path, const std::string& group,
                                              Limits limits) {
-  sockaddr_un address{};
-  if (path.size() >= sizeof address.sun_path) {
-    return fail(Error{.message = "the path of the control socket is too long", .file = path});
+  auto listener = Listener::open(path, group);
+  if (!listener) return fail(listener.error());
+  const int epoll = ::epoll_create1(EPOLL_CLOEXEC);
+  if (epoll < 0) {
+    return fail(Error{.message = std::string("epoll: ") + std::strerror(errno), .file = path});
   }
-  std::error_code ignored;  // if it fails, so does what follows
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  if (std::filesystem::create_directory(folder, ignored)) ::chmod(folder.c_str(), 0755);
-  // Who holds the lock may replace a socket that a daemon has left behind.
-  const std::string lock_path = path + ".lock";
-  auto taken = PidLock::take(lock_path);
-  if (!taken.holder.empty()) {
-    return fail(Error{.message = "another daemon has this control socket, " + taken.holder +
-                                 "; end it, or give this one another [control] path",
-                      .file = path});
-  }
-  if (!taken.lock) {
-    return fail(
-        Error{.message = "the control socket cannot be made: " + taken.error, .file = lock_path});
-  }
-  Descriptor listener(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (listener.get() < 0) return fail(system_error("the control socket cannot be made", path));
-  address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path, path.c_str(), path.size());
-  ::unlink(path.c_str());
-  const mode_t mask = ::umask(0177);
-  const int bound =
-      ::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
-  ::umask(mask);
-  if (bound != 0) return fail(system_error("the control socket cannot be made", path));
-  if (const auto given = give_to_group(path, group); !given) return fail(given.error());
-  if (::chmod(path.c_str(), 0660) != 0 || ::listen(listener.get(), kBacklog) != 0) {
-    return fail(system_error("the control socket cannot be opened", path));
-  }
-  Descriptor epoll(::epoll_create1(EPOLL_CLOEXEC));
-  if (epoll.get() < 0) return fail(system_error("epoll", path));
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u64 = kListener;
-  if (::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, listener.get(), &event) != 0) {
-    return fail(system_error("epoll", path));
-  }
-  return std::unique_ptr<Server>(
-      new Server(path, std::move(*taken.lock), listener.release(), epoll.release(), limits));
+  auto server = std::unique_ptr<Server>(new Server(std::move(*listener), epoll, limits));
+  if (const auto watched = server->watch_listener(); !watched) return fail(watched.error());
+  return server;
 }
 
-Server::Server(std::string path, PidLock lock, int listener, int epoll, Limits limits)
-    : path_(std::move(path)),
-      lock_(std::move(lock)),
-      listener_(listener),
+Server::Server(Listener listener, int epoll, Limits limits)
+    : listener_(std::move(listener)),
       epoll_(epoll),
       spare_(open_spare()),
       limits_(limits),
+      places_(limits.places),
       buffer_(kMaxPacketBytes),
       nobody_came_ns_(now_ns()) {}
 
 Server::~Server() {
   for (const auto& [connection, peer] : peers_) ::close(peer.fd);
-  ::unlink(path_.c_str());
-  ::close(listener_);
   ::close(epoll_);
   if (spare_ >= 0) ::close(spare_);
+}
+
+Result<void> Server::watch_listener() {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = kListener;
+  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, listener_.fd(), &event) == 0) return {};
+  return fail(Error{.message = std::string("epoll: ") + std::strerror(errno), .file = path()});
+}
+
+Result<void> Server::restore() {
+  accept_all();  // who has connected by the file that is gone
+  if (auto restored = listener_.restore(); !restored) return restored;
+  return watch_listener();
 }
 
 void Server::watch(Connection connection, const Peer& peer, int operation) const {
@@ -209,20 +144,21 @@ bool Server::is_urgent(const Peer& peer) const {
 }
 
 void Server::accept_all() {
-  for (std::size_t i = 0; i < kAcceptedAtOnce; ++i) {
+  for (std::size_t i = 0; i < kAcceptedAtOnce && make_room(); ++i) {
     const std::int64_t before_ns = now_ns();
-    const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    const int fd = ::accept4(listener_.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0 && errno == EAGAIN) nobody_came_ns_ = before_ns;
     if (fd >= 0) {
       accept_one(fd);
     } else if (errno == EMFILE || errno == ENFILE) {
       // A connection that is not accepted would wake the loop for ever.
       ::close(std::exchange(spare_, -1));
-      const int turned_away = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
+      const int turned_away = ::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC);
       if (turned_away >= 0) ::close(turned_away);
       spare_ = open_spare();
       if (turned_away < 0) return;
       ++dropped_;
+      note("a connection was turned away: bushd may open no more files; raise LimitNOFILE");
     } else if (errno != ECONNABORTED && errno != EINTR) {
       return;
     }
@@ -232,14 +168,17 @@ void Server::accept_all() {
 void Server::accept_one(int fd) {
   ucred credentials{};
   socklen_t size = sizeof credentials;
-  if (peers_.size() >= limits_.connections ||
-      ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) {
+  if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) {
     ::close(fd);
     ++dropped_;
     return;
   }
+  const api::Credentials who{
+      .pid = credentials.pid, .uid = credentials.uid, .gid = credentials.gid};
   const Connection connection = ++last_;
-  Peer& peer = peers_.emplace(connection, Peer{.fd = fd}).first->second;
+  const bool first_for_stops = !places_.any_for_stops();
+  const std::string why_stops_only = places_.take(connection, who);
+  Peer& peer = peers_.emplace(connection, Peer{.fd = fd, .who = who}).first->second;
   const int on = 1;
   static_cast<void>(::setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on));
   int waiting = 0;
@@ -248,10 +187,28 @@ void Server::accept_one(int fd) {
   }
   peer.connected_after_ns = nobody_came_ns_;
   watch(connection, peer, EPOLL_CTL_ADD);
-  if (handlers_.opened) {
-    handlers_.opened(connection,
-                     {.pid = credentials.pid, .uid = credentials.uid, .gid = credentials.gid});
+  if (!why_stops_only.empty() && first_for_stops) {
+    note(why_stops_only + "; further connections may stop motors and no more");
   }
+  if (handlers_.opened) handlers_.opened(connection, who, why_stops_only);
+}
+
+bool Server::make_room() {
+  if (places_.has_room()) return true;
+  pollfd listener{.fd = listener_.fd(), .events = POLLIN, .revents = 0};
+  if (::poll(&listener, 1, 0) <= 0) return true;  // nobody comes
+  const auto goes = places_.who_goes([this](Connection connection) {
+    int waiting = 0;
+    return ::ioctl(peers_.at(connection).fd, FIONREAD, &waiting) == 0 && waiting > 0;
+  });
+  if (!goes) return false;
+  ++dropped_;
+  close(*goes);
+  return true;
+}
+
+void Server::note(const std::string& text) const {
+  if (handlers_.noted) handlers_.noted("control socket: " + text);
 }
 
 bool Server::read(Connection connection, Peer& peer) {
@@ -303,6 +260,7 @@ void Server::reject(Connection connection) {
   ++dropped_;
   const auto found = peers_.find(connection);
   if (found != peers_.end() && ++found->second.bad >= limits_.bad_packets) {
+    note(text_of(found->second.who) + " sends what is no message; its connection is closed");
     doom(connection, found->second);
   }
 }
@@ -311,6 +269,7 @@ void Server::doom(Connection connection, Peer& peer) {
   if (std::exchange(peer.doomed, true)) return;
   ++dropped_;
   doomed_.push_back(connection);
+  forget_unread(peer);
   // Wakes the loop, should this not be within handle().
   ::shutdown(peer.fd, SHUT_RDWR);
 }
@@ -326,6 +285,7 @@ void Server::close(Connection connection) {
   unread_bytes_ -= found->second.unread_bytes;
   ::close(found->second.fd);  // takes it out of the epoll set
   peers_.erase(found);
+  places_.give_back(connection);
   if (handlers_.closed) handlers_.closed(connection);
 }
 
@@ -333,19 +293,33 @@ void Server::send(Connection connection, std::shared_ptr<const std::vector<std::
   const auto found = peers_.find(connection);
   if (found == peers_.end() || found->second.doomed) return;
   Peer& peer = found->second;
-  const std::size_t size = packet->size();
   const bool waited = !peer.unread.empty();
-  if (peer.unread_bytes + size > limits_.unread_bytes ||
-      unread_bytes_ + size > limits_.unread_bytes_in_all) {
-    return doom(connection, peer);
-  }
+  peer.unread_bytes += packet->size();
+  unread_bytes_ += packet->size();
   peer.unread.push_back(std::move(packet));
-  peer.unread_bytes += size;
-  unread_bytes_ += size;
-  if (waited) return;
-  // It has left. What it has sent before, a stop perhaps, is still to be read; then it is closed.
+  // It may have read since. If it has left, what it has sent before, a stop perhaps, is still to be
+  // read; then it is closed.
+  const bool too_much = peer.unread_bytes > limits_.unread_bytes;
+  if ((!waited || too_much) && !flush(peer)) return forget_unread(peer);
+  if (peer.unread_bytes > limits_.unread_bytes) return close_deaf(connection, peer);
+  if (!waited && !peer.unread.empty()) watch(connection, peer, EPOLL_CTL_MOD);
+  while (unread_bytes_ > limits_.unread_bytes_in_all) relieve();
+}
+
+void Server::close_deaf(Connection connection, Peer& peer) {
+  note(text_of(peer.who) + " does not read: " + std::to_string(peer.unread_bytes) +
+       " bytes wait for it; its connection is closed");
+  doom(connection, peer);
+}
+
+// Who reads, however late, does not go.
+void Server::relieve() {
+  const auto most = std::ranges::max_element(
+      peers_, {}, [](const auto& entry) { return entry.second.unread_bytes; });
+  Peer& peer = most->second;
+  const std::size_t before = peer.unread_bytes;
   if (!flush(peer)) return forget_unread(peer);
-  if (!peer.unread.empty()) watch(connection, peer, EPOLL_CTL_MOD);
+  if (peer.unread_bytes == before) close_deaf(most->first, peer);
 }
 
 bool Server::flush(Peer& peer) {

@@ -18,16 +18,18 @@
 
 #include "api/session.h"
 #include "base/result.h"
+#include "control/listener.h"
 #include "control/packet.h"
-#include "control/pid_lock.h"
+#include "control/places.h"
 
 struct msghdr;
 
 namespace bushd::control {
 
 struct Limits {
-  std::size_t connections = 1100;
-  // Of packets that a client has not read yet: of one, and of all.
+  Places::Limits places{};
+  // Of packets that a client has not read yet: of one, and of all. Who has most unread is closed
+  // when it is too much of all.
   std::size_t unread_bytes = 1024 * 1024;
   std::size_t unread_bytes_in_all = 32 * 1024 * 1024;
   // Packets that were none, before the connection is closed.
@@ -49,15 +51,18 @@ class Server {
 
   // Called from within handle(); they may send and close.
   struct Handlers {
-    std::function<void(Connection, const api::Credentials&)> opened;
+    // `why_stops_only`: who has the places for all uses; "": this is one of them.
+    std::function<void(Connection, const api::Credentials&, const std::string& why_stops_only)>
+        opened;
     std::function<void(Connection, View, const Sent&)> packet;
     // Packets on such a channel are read before those of all other connections.
     std::function<bool(std::string_view channel)> is_urgent{};
     std::function<void(Connection)> closed;
+    // For the log: whom it does not serve as others, and why.
+    std::function<void(const std::string&)> noted{};
   };
 
-  // Makes the socket, in a folder that is made too. `group`: may use it too; empty: nobody else.
-  // Fails if a daemon that lives has it already.
+  // Makes the socket (Listener::open).
   static Result<std::unique_ptr<Server>> open(const std::string& path, const std::string& group,
                                               Limits limits = {});
   ~Server();
@@ -76,7 +81,12 @@ class Server {
   // Counts a packet that meant nothing.
   void reject(Connection connection);
 
-  const std::string& path() const { return path_; }
+  // Whether the socket's file is there; if not, connections go on, and nobody else can connect
+  // until it is restored.
+  bool in_place() const { return listener_.in_place(); }
+  Result<void> restore();
+
+  const std::string& path() const { return listener_.path(); }
   std::size_t connections() const { return peers_.size(); }
   // Packets that were none, and connections that were not taken or closed for what they did.
   std::uint64_t dropped() const { return dropped_; }
@@ -85,6 +95,7 @@ class Server {
  private:
   struct Peer {
     int fd;
+    api::Credentials who;
     std::deque<std::shared_ptr<const std::vector<std::uint8_t>>> unread{};
     std::size_t unread_bytes = 0;
     unsigned bad = 0;
@@ -95,9 +106,13 @@ class Server {
     std::int64_t connected_after_ns = 0;
   };
 
-  Server(std::string path, PidLock lock, int listener, int epoll, Limits limits);
+  Server(Listener listener, int epoll, Limits limits);
+  Result<void> watch_listener();
   void accept_all();
   void accept_one(int fd);
+  // A place for who comes next: one that is kept for stops may have to be given up. Not while all
+  // of those wait to be heard.
+  bool make_room();
   void handle_peer(Connection connection, std::uint32_t events);
   // The packet that it has sent longest ago is urgent.
   bool is_urgent(const Peer& peer) const;
@@ -106,18 +121,21 @@ class Server {
   bool read(Connection connection, Peer& peer);
   bool flush(Peer& peer);
   void forget_unread(Peer& peer);
+  void close_deaf(Connection connection, Peer& peer);
+  // Less is unread of all: sends to who has most unread, or closes it.
+  void relieve();
+  void note(const std::string& text) const;
   void doom(Connection connection, Peer& peer);
   void close(Connection connection);
   void watch(Connection connection, const Peer& peer, int operation) const;
 
-  std::string path_;
-  PidLock lock_;
-  int listener_;
+  Listener listener_;
   int epoll_;
   int spare_;  // given up for a moment to turn a connection away when there are no descriptors left
   Limits limits_;
   Handlers handlers_;
   Connection last_ = 0;  // 0 is the listener
+  Places places_;
   std::map<Connection, Peer> peers_;
   std::vector<Connection> doomed_;
   std::size_t unread_bytes_ = 0;

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <string>
@@ -76,9 +77,11 @@ class ServerTest : public testing::Test {
     ASSERT_TRUE(opened) << opened.error().text();
     server_ = std::move(*opened);
     server_->set_handlers({.opened =
-                               [this](Server::Connection connection, const api::Credentials& who) {
+                               [this](Server::Connection connection, const api::Credentials& who,
+                                      const std::string& why_stops_only) {
                                  last_ = connection;
                                  who_ = who;
+                                 why_stops_only_ = why_stops_only;
                                },
                            .packet =
                                [this](Server::Connection, View view, const Server::Sent& sent) {
@@ -87,7 +90,8 @@ class ServerTest : public testing::Test {
                                  if (on_packet_) on_packet_();
                                },
                            .is_urgent = [](std::string_view channel) { return channel == "STOP"; },
-                           .closed = [this](Server::Connection) { ++closed_; }});
+                           .closed = [this](Server::Connection) { ++closed_; },
+                           .noted = [this](const std::string& text) { noted_.push_back(text); }});
   }
   void settle() {
     pollfd polled{.fd = server_->fd(), .events = POLLIN, .revents = 0};
@@ -105,6 +109,8 @@ class ServerTest : public testing::Test {
   std::function<void()> on_packet_;
   Server::Connection last_ = 0;
   api::Credentials who_;
+  std::string why_stops_only_;
+  std::vector<std::string> noted_;
   int closed_ = 0;
 };
 
@@ -275,10 +281,132 @@ TEST_F(ServerTest, MemoryOfAllIsBounded) {
   }
 }
 
+// Who reads what is sent loses nothing, however many others do not.
+TEST_F(ServerTest, OfAllWhoDoNotReadTheOneWithMostUnreadGoes) {
+  open({.unread_bytes_in_all = 500'000});
+  std::vector<Peer> deaf;
+  std::vector<Server::Connection> connections;
+  for (int i = 0; i < 20; ++i) {
+    deaf.emplace_back(path_);
+    settle();
+    connections.push_back(last_);
+  }
+  const Peer good(path_);
+  settle();
+  connections.insert(connections.begin(), last_);
+  for (int i = 0; i < 500; ++i) {
+    for (const Server::Connection connection : connections) send(connection, bytes("STATE", 4000));
+    ASSERT_LE(server_->unread_bytes(), 500'000u);
+    ASSERT_EQ(good.read(), bytes("STATE", 4000)) << i;
+  }
+  EXPECT_FALSE(good.hung_up());
+  EXPECT_TRUE(std::ranges::any_of(deaf, &Peer::hung_up));
+  ASSERT_FALSE(noted_.empty());
+  EXPECT_EQ(noted_.front().find("control socket: process " + std::to_string(::getpid())), 0u);
+}
+
+// The room in the kernel counts, not what the server has noticed of it.
+TEST_F(ServerTest, WhoHasReadMeanwhileIsSentToBeforeItCountsAsDeaf) {
+  open({.unread_bytes = 100'000});
+  const Peer slow(path_);
+  settle();
+  while (server_->unread_bytes() + 5000 < 100'000u) send(last_, bytes("STATE", 4000));
+  while (!slow.read().empty()) {
+  }
+  for (int i = 0; i < 20; ++i) send(last_, bytes("STATE", 4000));
+  EXPECT_FALSE(slow.hung_up());
+}
+
+TEST_F(ServerTest, OneProcessLeavesPlacesForStops) {
+  open({.places = {.of_process = 5, .for_stops = 3}});
+  std::vector<Peer> peers;
+  for (int i = 0; i < 20; ++i) {
+    peers.emplace_back(path_);
+    settle();
+    EXPECT_EQ(why_stops_only_.empty(), i < 5) << i;
+    EXPECT_LE(server_->connections(), 8u);
+  }
+  EXPECT_THAT(why_stops_only_, HasSubstr("process " + std::to_string(::getpid()) + " of user " +
+                                         std::to_string(::getuid()) + " has 5 connections"));
+  for (std::size_t i = 0; i < peers.size(); ++i) EXPECT_EQ(peers[i].hung_up(), i >= 5 && i < 17);
+  EXPECT_EQ(noted_.size(), 1u) << "once, not for each";
+  peers.front().leave();
+  settle();
+  const Peer again(path_);
+  settle();
+  EXPECT_EQ(why_stops_only_, "") << "a place is free again";
+}
+
+// However many come at once, and whoever else has the places.
+TEST_F(ServerTest, WhoHasSentSomethingIsReadBeforeItsPlaceIsAnothers) {
+  open({.places = {.of_process = 2, .for_stops = 2}});
+  std::vector<Peer> peers;
+  for (int i = 0; i < 50; ++i) {
+    peers.emplace_back(path_);
+    EXPECT_TRUE(peers.back().send(bytes("STOP")));
+  }
+  settle();
+  EXPECT_EQ(heard_.size(), 50u);
+}
+
+TEST_F(ServerTest, FoldersOfThePathAreMade) {
+  path_ = (directory_.path() / "a" / "b" / "c" / "control").string();
+  open();
+  EXPECT_TRUE(Peer(path_).connected());
+}
+
+TEST_F(ServerTest, AFolderThatCannotBeMadeIsNamed) {
+  std::ofstream(directory_.path() / "file") << "no folder";
+  const auto opened = Server::open((directory_.path() / "file" / "b" / "control").string(), "");
+  ASSERT_FALSE(opened);
+  EXPECT_THAT(
+      opened.error().text(),
+      HasSubstr("/file: the folder of the control socket cannot be made: a file has its name"));
+}
+
+TEST_F(ServerTest, ASocketThatWasDeletedComesBack) {
+  open();
+  const Peer before(path_);
+  settle();
+  const Server::Connection connection = last_;
+  for (const bool with_folder : {false, true}) {
+    EXPECT_TRUE(server_->in_place());
+    std::filesystem::remove_all(with_folder ? std::filesystem::path(path_).parent_path()
+                                            : std::filesystem::path(path_));
+    EXPECT_FALSE(server_->in_place());
+    const auto restored = server_->restore();
+    ASSERT_TRUE(restored) << restored.error().text();
+    EXPECT_TRUE(server_->in_place());
+    const Peer after(path_);
+    EXPECT_TRUE(after.send(bytes("AFTER")));
+    settle();
+    EXPECT_EQ(heard_.back(), "AFTER");
+  }
+  send(connection, bytes("STATE"));
+  EXPECT_EQ(before.read(), bytes("STATE")) << "connections go on";
+  const auto second = Server::open(path_, "");
+  ASSERT_FALSE(second);
+}
+
+TEST_F(ServerTest, ASocketOfAnotherDaemonIsNotTakenFromIt) {
+  open();
+  std::filesystem::remove_all(std::filesystem::path(path_).parent_path());
+  auto other = Server::open(path_, "");
+  ASSERT_TRUE(other);
+  const auto restored = server_->restore();
+  ASSERT_FALSE(restored);
+  EXPECT_THAT(restored.error().text(), HasSubstr("another daemon has this control socket"));
+  server_.reset();
+  EXPECT_TRUE(Peer(path_).connected()) << "it is the other one's, and stays";
+}
+
 TEST_F(ServerTest, ClosingWithinAHandlerIsSafe) {
   open({.unread_bytes = 10});
   const Peer peer(path_);
-  on_packet_ = [this] { send(last_, bytes("MORE_THAN_ALLOWED", 100)); };
+  // The kernel has room for the first ones.
+  on_packet_ = [this] {
+    for (int i = 0; i < 1000; ++i) send(last_, bytes("MORE_THAN_ALLOWED", 4000));
+  };
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(peer.send(bytes("A")));
   settle();
   EXPECT_THAT(heard_, ElementsAre("A"));
@@ -318,13 +446,13 @@ TEST_F(ServerTest, WhatSomebodyHasSentWhoHasLeftIsTaken) {
   EXPECT_EQ(server_->dropped(), 0u);
 }
 
-TEST_F(ServerTest, AThousandConnectionsSurviveAndOneMoreIsTurnedAway) {
+TEST_F(ServerTest, AThousandConnectionsSurviveAndOneMoreMayStop) {
   rlimit files{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &files), 0);
   files.rlim_cur = files.rlim_max;
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &files), 0);
   if (files.rlim_max < 2200) GTEST_SKIP() << "too few descriptors allowed here";
-  open({.connections = 1000});
+  open({.places = {.in_all = 1000, .of_user = 2000, .of_process = 2000}});
   std::vector<Peer> peers;
   for (int i = 0; i < 1000; ++i) {
     peers.emplace_back(path_);
@@ -332,16 +460,17 @@ TEST_F(ServerTest, AThousandConnectionsSurviveAndOneMoreIsTurnedAway) {
   }
   settle();
   EXPECT_EQ(server_->connections(), 1000u);
+  EXPECT_EQ(why_stops_only_, "");
   const Peer more(path_);
   settle();
-  EXPECT_TRUE(more.hung_up());
-  EXPECT_EQ(server_->dropped(), 1u);
+  EXPECT_FALSE(more.hung_up());
+  EXPECT_THAT(why_stops_only_, HasSubstr("1000 connections"));
   for (const Peer& peer : peers) EXPECT_TRUE(peer.send(bytes("HELLO")));
   settle();
   EXPECT_EQ(heard_.size(), 1000u);
   peers.clear();
   settle();
-  EXPECT_EQ(server_->connections(), 0u);
+  EXPECT_EQ(server_->connections(), 1u);
   EXPECT_TRUE(Peer(path_).connected());
 }
 

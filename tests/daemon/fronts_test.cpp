@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -424,6 +425,69 @@ TEST_F(SocketFrontTest, WhatComesAfterItsClientHasGoneIsNobodys) {
   while (readable(server_->fd())) front.handle();
   ASSERT_TRUE(asker.session);
   asker.answer(api::Accepted{});
+}
+
+// Of a program that has taken all places, everybody can stop the motors still.
+TEST_F(SocketFrontTest, WithoutAPlaceAClientMayStopAndIsToldWhoHasThem) {
+  std::vector<Client> greedy;
+  const std::size_t all = control::Places::Limits().of_process;
+  for (std::size_t i = 0; i < all; ++i) {
+    greedy.push_back(connect());
+    settle();
+  }
+  Client scan = connect();
+  say(scan, lcm::encode(lcm::Subscription{.state = true}));
+  say(scan, lcm::encode(0, {.client_id = "scan", .number = 1}, api::Request(api::Move{})));
+  ASSERT_EQ(scan.heard.size(), 1u);
+  const auto& refused = std::get<api::Refused>(std::get<lcm::ReplyMessage>(scan.heard[0]).reply);
+  EXPECT_THAT(refused.reason, HasSubstr("may stop motors and no more: process "));
+  EXPECT_THAT(refused.reason, HasSubstr(std::to_string(all) + " connections"));
+  say(scan, lcm::encode(0, {.client_id = "scan", .number = 2}, api::Request(api::Stop{})));
+  EXPECT_THAT(carried_out_, ElementsAre("stop"));
+  publish_something();
+  listen(scan);
+  EXPECT_EQ(scan.heard.size(), 1u) << "states are told, for who waits for the end of a stop";
+}
+
+TEST_F(SocketFrontTest, LooksForItsFileOnceASecond) {
+  std::vector<std::string> logged;
+  front_ = nullptr;
+  SocketFront front(
+      *server_, kRunOfFronts, reception_, publishing_, [] { return std::int64_t{1}; },
+      [&](const std::string& text) { logged.push_back(text); });
+  front.step(0);
+  std::filesystem::remove(path_);
+  front.step(999'999);
+  EXPECT_FALSE(server_->in_place());
+  std::filesystem::create_directory(path_);  // in the way
+  front.step(front.next_wake_us());
+  front.step(front.next_wake_us());
+  ASSERT_EQ(logged.size(), 1u) << "not each time";
+  EXPECT_THAT(logged[0], HasSubstr("cannot be made again"));
+  std::filesystem::remove(path_);
+  front.step(front.next_wake_us());
+  EXPECT_TRUE(server_->in_place());
+  ASSERT_EQ(logged.size(), 2u);
+  EXPECT_THAT(logged[1], HasSubstr("had been deleted; it is made again"));
+}
+
+// Its connection may have been closed by a daemon that lives.
+TEST_F(SocketFrontTest, AClientSaysWhetherTheDaemonHasEnded) {
+  for (const bool ends : {false, true}) {
+    Client client = connect();
+    settle();
+    for (int i = 0; i < 16; ++i) (void)client.link->send({.channel = "NOTHING", .payload = {}});
+    if (ends) {
+      front_ = nullptr;
+      server_ = nullptr;
+    } else {
+      settle();
+    }
+    const auto handled = client.link->handle([](const auto&) {});
+    ASSERT_FALSE(handled);
+    EXPECT_THAT(handled.error().text(),
+                HasSubstr(ends ? "the daemon has ended" : "bushd has closed this connection"));
+  }
 }
 
 TEST_F(SocketFrontTest, RandomPacketsDoNoHarm) {

@@ -135,9 +135,22 @@ class ControlSocket(EndToEndTest):
         self.start_move("a0", FAR)
         clients = [self.connect() for _ in range(1000)]
         for client in clients:
-            client.send(b"junk")
-        self.wait_until("all of them to be read", lambda: self.dropped() >= 1000)
+            try:
+                client.send(b"junk")
+            except OSError:  # one process may not have so many: its place was another's
+                pass
+        self.wait_until("all of them to be read, or closed", lambda: self.dropped() >= 1000 - 32)
         self.assert_undisturbed()
+        self.assertIn("has 256 connections, as many as one process may have", self.bushd.said())
+
+    def test_a_deleted_socket_comes_back(self):
+        self.bring_up()
+        client = self.connect()
+        self.file("control").unlink()
+        self.wait_until("the file to be there again", self.file("control").exists)
+        self.command("status", "--socket", self.file("control"))
+        client.send(b"junk")
+        self.wait_until("the one before to be read", lambda: self.dropped() == 1)
 
     def test_a_daemon_that_is_not_running(self):
         self.write_config()

@@ -79,13 +79,25 @@ class SocketLink:
             except OSError:
                 packet, flags = b"", 0
             if not packet:
-                raise LinkEnded(f"the daemon has ended, or closed {self._path}")
+                raise LinkEnded(why_closed(self._path))
             name, nul, payload = packet.partition(b"\0")
             if nul and 0 < len(name) <= MAX_CHANNEL and name.isascii() and not flags & socket.MSG_TRUNC:
                 yield name.decode("ascii"), payload
 
     def close(self) -> None:
         self._socket.close()
+
+
+def why_closed(path: str) -> str:
+    """The connection is over; whether somebody listens there still tells why."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as another:
+        another.setblocking(False)
+        if another.connect_ex(path) != 0:
+            return f"the daemon has ended; it was at {path}"
+    return (
+        f"bushd has closed this connection at {path}: too many clients are connected, this one did not read what it "
+        "was sent, or the daemon has restarted; its log tells why"
+    )
 
 
 class LcmLink:
