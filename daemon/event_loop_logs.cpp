@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "daemon/event_loop.h"
 #include "daemon/process.h"
@@ -53,7 +54,7 @@ void EventLoop::tell_left_out(std::int64_t now) {
                                  {"utime_us", wall_clock_us()},
                                  {"request", left_out.newest},
                                  {"left_out", left_out.lines}};
-    move_log(line.dump());
+    move_log(json_text(line));
   }
 }
 

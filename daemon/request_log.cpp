@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "api/introduction.h"
+#include "base/json_text.h"
 
 namespace bushd::daemon {
 namespace {
@@ -65,7 +66,7 @@ std::string line_of(std::int64_t unix_us, const api::Session& session, std::int6
   }
   std::visit([&line](const auto& content) { put_motors(line, content); }, request);
   // Names are as clients wrote them; what is not UTF-8 must not end the daemon.
-  return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(line);
 }
 
 // Stands for the session of one request until that is answered.

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/json_text.h"
 #include "tables/store/atomic_file.h"
 #include "tables/store/store.h"
 #include "tables/table_file.h"
@@ -157,9 +158,7 @@ Result<void> TableLibrary::keep(const std::vector<std::string>& wanted) const {
   std::error_code error;
   if (json.empty() && !fs::exists(in_service_, error)) return {};
   fs::create_directories(in_service_.parent_path(), error);  // writing tells
-  return tables::store::replace_file(
-      in_service_,
-      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  return tables::store::replace_file(in_service_, json_text(json, {.indent = 2}) + "\n");
 }
 
 }  // namespace bushd::daemon

@@ -434,7 +434,8 @@ void Arrays::run(std::int64_t now_us, const api::Asker& asker, const api::Follow
   if (const auto may = may_run(array); !may) return asker.answer(api::Refused{may.error().text()});
   asker.answer(api::Accepted{});
   array.followed = std::make_shared<Trajectory>(array.rows);
-  array.logged = journal_.array_begun(*array.followed, array.motors());
+  array.logged = journal_.array_begun();
+  journal_.array_rows(array.logged, *array.followed, array.motors());
   const std::vector<MotorId> motors = array.motors();
   motion::Tick start = INT64_MIN;
   for (const MotorId id : motors) {
@@ -445,7 +446,7 @@ void Arrays::run(std::int64_t now_us, const api::Asker& asker, const api::Follow
   for (std::size_t m = 0; m < motors.size(); ++m) {
     open_.planned(motors[m], 1, array.check->peak_steps_per_s(m));
     installation_[motors[m]].follow(
-        {.number = array.logged, .trajectory = array.followed, .motor = m}, start);
+        {.number = array.logged.number, .trajectory = array.followed, .motor = m}, start);
   }
   moves_.begin_on_line(motors);
 }

@@ -64,7 +64,7 @@ class Arrays final : public Service {
     bool dropped = false;           // a stop has ended it, and its last rows were told that
     // From when it runs: the rows that have been checked.
     std::shared_ptr<motion::Trajectory> followed;
-    std::uint64_t logged = 0;
+    Journal::LoggedArray logged{};
 
     std::vector<MotorId> motors() const;
   };

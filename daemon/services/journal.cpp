@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/json_text.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -49,7 +50,7 @@ void Journal::tell_table(MotorId motor, const tables::Table& table) {
     const std::span decel(codes.decel.code, codes.decel.count);
     line["decel"] = std::vector<std::uint16_t>(decel.rbegin(), decel.rend());
   }
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
@@ -103,7 +104,7 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
       line["phase_sequence"] = fieldbus::kSequenceNames.at(emission.sequence);
     }
   }
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
 }
 
 std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>& motors) {
@@ -116,7 +117,7 @@ std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>
                               {"table_file", table->path()},
                               {"table_sha256", table->content_hash()}});
   }
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
   return last_id_;
 }
 
@@ -135,25 +136,19 @@ std::uint64_t Journal::path_laid(const std::vector<MotorId>& motors, const motio
                               {"table_file", table.path()},
                               {"table_sha256", table.content_hash()}});
   }
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
   return last_id_;
 }
 
-std::uint64_t Journal::array_begun(const motion::Trajectory& trajectory,
-                                   const std::vector<MotorId>& motors) {
-  array_rows(++last_id_, trajectory, motors);
-  return last_id_;
-}
-
-void Journal::array_rows(std::uint64_t number, const motion::Trajectory& trajectory,
+void Journal::array_rows(LoggedArray& array, const motion::Trajectory& trajectory,
                          const std::vector<MotorId>& motors) {
-  std::size_t& logged = rows_logged_[number];
+  std::size_t& logged = array.rows;
   const bool cubic = trajectory.interpolation() == motion::Trajectory::Interpolation::kCubic;
   do {
     const std::size_t until = std::min(trajectory.rows(), logged + kRowsPerLine);
     const bool last = until == trajectory.rows() && trajectory.closed();
     nlohmann::json line = {{"event", "array"},
-                           {"array", number},
+                           {"array", array.number},
                            {"interpolation", cubic ? "cubic" : "linear"},
                            {"closed", last}};
     for (const MotorId id : motors) line["motors"].push_back(installation_[id].name());
@@ -165,9 +160,8 @@ void Journal::array_rows(std::uint64_t number, const motion::Trajectory& traject
       }
       line["rows"].push_back(std::move(row));
     }
-    outputs_.move_log(line.dump());
+    outputs_.move_log(json_text(line));
   } while (logged < trajectory.rows());
-  if (trajectory.closed()) rows_logged_.erase(number);
 }
 
 void Journal::changed(MotorId motor, const motion::Change& change) {
@@ -180,7 +174,7 @@ void Journal::changed(MotorId motor, const motion::Change& change) {
   if (change.target_steps && installation_[motor].axis().line()) {
     line["run_steps"] = change.run_steps;
   }
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::ended(MotorId motor, std::string_view result) {
@@ -189,7 +183,7 @@ void Journal::ended(MotorId motor, std::string_view result) {
                                {"motor", installation_[motor].name()},
                                {"result", result},
                                {"position_steps", installation_[motor].position_steps()}};
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::position_set(MotorId motor, std::int64_t from_steps, const api::Asker& by) {
@@ -199,8 +193,7 @@ void Journal::position_set(MotorId motor, std::int64_t from_steps, const api::As
                          {"position_steps", installation_[motor].position_steps()},
                          {"number", by.number}};
   if (by.session) line["client"] = by.session->client_id();
-  // Clients choose their names; what is not UTF-8 must not end the daemon.
-  outputs_.move_log(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::position_corrected(MotorId motor, std::int64_t from_steps) {
@@ -209,7 +202,7 @@ void Journal::position_corrected(MotorId motor, std::int64_t from_steps) {
                                {"motor", installation_[motor].name()},
                                {"from_steps", from_steps},
                                {"position_steps", installation_[motor].position_steps()}};
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::offset_set(MotorId id, const api::Asker& by) {
@@ -221,7 +214,7 @@ void Journal::offset_set(MotorId id, const api::Asker& by) {
                          {"offset", motor.coordinates().scale().offset},
                          {"number", by.number}};
   if (by.session) line["client"] = by.session->client_id();
-  outputs_.move_log(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::configured(MotorId id, std::string_view key, std::string_view value,
@@ -232,7 +225,7 @@ void Journal::configured(MotorId id, std::string_view key, std::string_view valu
                          {"value", value},
                          {"number", by.number}};
   if (by.session) line["client"] = by.session->client_id();
-  outputs_.move_log(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::before_report(MotorId id, bool being_set) {
@@ -276,7 +269,7 @@ void Journal::end_autonomous(MotorId id, const Mcu& mcu) {
                          {"set", homed || autonomous.set},
                          {"position_steps", motor.position_steps()}};
   if (autonomous.since) line["from_tick"] = *autonomous.since;
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
 }
 
 void Journal::position_lost(MotorId motor, std::int64_t from_steps) {
@@ -292,7 +285,7 @@ void Journal::position_lost(MotorId motor, std::int64_t from_steps) {
   if (const std::string cause = motion::reset_cause_word(report.reset_cause); !cause.empty()) {
     line["reset_cause"] = cause;
   }
-  outputs_.move_log(line.dump());
+  outputs_.move_log(json_text(line));
 }
 
 }  // namespace bushd::daemon

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,11 +29,15 @@ class Journal final : public Service {
   };
   std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);
   std::uint64_t path_laid(const std::vector<MotorId>& motors, const motion::Path& path);
-  // Before its motors follow it: its rows so far. Returns its number.
-  std::uint64_t array_begun(const motion::Trajectory& trajectory,
-                            const std::vector<MotorId>& motors);
+  // An array in the log, and how many of its rows are there.
+  struct LoggedArray {
+    std::uint64_t number = 0;
+    std::size_t rows = 0;
+  };
+  // Before its motors follow it.
+  LoggedArray array_begun() { return {.number = ++last_id_}; }
   // Rows that it has now and that have not been logged, and whether one follows.
-  void array_rows(std::uint64_t number, const motion::Trajectory& trajectory,
+  void array_rows(LoggedArray& array, const motion::Trajectory& trajectory,
                   const std::vector<MotorId>& motors);
   void changed(MotorId motor, const motion::Change& change);
   void ended(MotorId motor, std::string_view result);
@@ -69,8 +72,7 @@ class Journal final : public Service {
   const Installation& installation_;
   Outputs& outputs_;
   std::uint64_t last_id_;
-  std::map<std::uint64_t, std::size_t> rows_logged_;  // by array
-  ById<MotorId, std::uint64_t> id_;                   // of its present move in the log
+  ById<MotorId, std::uint64_t> id_;  // of its present move in the log
   ById<MotorId, std::optional<Autonomous>> autonomous_;
   ById<MotorId, std::string> table_told_;  // of those that are no files, the last one: its hash
   ById<McuId, std::optional<motion::Tick>> told_;  // the tick of the last report

@@ -4,12 +4,13 @@ import contextlib
 import json
 import os
 import resource
+import shutil
 import signal
 import struct
 import unittest
 
 from hostile_test import Wire, text
-from rig import EndToEndTest
+from rig import TOP, EndToEndTest
 
 STOP_CHANNEL = b"BUSHD_STOP"
 MANY = 1500
@@ -45,6 +46,24 @@ class Logs(EndToEndTest):
         bushd = self.start_bushd()
         self.assertEqual(bushd.process.wait(20), 1)
         self.assertIn("must be a regular file", bushd.said())
+
+    def test_paths_that_are_no_utf8(self):
+        """Names of files are bytes: the daemon lives, and its logs and answers name them as well as they can."""
+        self.write_config()
+        folder = self.file(os.fsdecode(b"h\xe4ll"))
+        folder.mkdir()
+        config = self.file("bushd.toml").read_text().replace('"bushd2-constant"', '"ramp"')
+        (folder / "bushd.toml").write_text(config)
+        shutil.copy(TOP / "tables/bushd2-constant.toml", folder / "ramp.toml")
+        self.bushsim = self.start_bushsim()
+        self.bushd = self.start_bushd(config=folder / "bushd.toml")
+        self.wait_until_ready()
+        self.command("move", "--wait", "a0", "5")
+        self.assertIn("h\ufffdll/ramp.toml", self.moves()[0]["table_file"])
+        for what in ("status", "where", "health", "doctor"):
+            self.assertIn(json.loads(self.bushctl(what, "--json").stdout).__class__, (dict, list))
+        self.command("table", "list")
+        self.assertEqual(self.bushd.end(), 0)
 
     def test_a_log_of_moves_that_was_removed_is_begun_anew(self):
         self.bring_up()

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/json_text.h"
 #include "daemon/lab.h"
 
 namespace bushd::test {
@@ -212,7 +213,7 @@ TEST(SemanticsDriver, CarriesOutWhatItReads) {
     answer["now_us"] = driver.now_us();
     answer["motors"] = driver.state();
     answer["failed"] = testing::Test::HasFailure();
-    std::cout << "@ " << answer.dump() << std::endl;
+    std::cout << "@ " << bushd::json_text(answer) << std::endl;
   }
 }
 

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "commands.h"
 #include "tables/table_text.h"
@@ -117,7 +118,7 @@ int run_cycle(Client& client, const CamacOptions& options, const camac::Naf& naf
                        : (result->requests >> (naf.station - 1) & 1) != 0;
   if (options.json) {
     const ordered_json json = {{"x", x}, {"q", q}, {"data", data}, {"lam", lam}};
-    fmt::print("{}\n", json.dump());
+    fmt::print("{}\n", bushd::json_text(json));
   } else {
     fmt::print("X={:d} Q={:d} data {} (0x{:06x}){}\n", x, q, data, data, lam ? ", LAM" : "");
   }
@@ -170,7 +171,7 @@ int dump(Client& client, const CamacOptions& options, int station) {
   if (!options.page.empty()) return print_table(options, station, *bytes);
   if (options.json) {
     const ordered_json json = {{"station", station}, {"memory", *bytes}};
-    fmt::print("{}\n", json.dump());
+    fmt::print("{}\n", bushd::json_text(json));
     return kDone;
   }
   for (std::size_t i = 0; i < bytes->size(); i += kLineBytes) {

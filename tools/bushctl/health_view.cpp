@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "grid.h"
 #include "render.h"
@@ -147,8 +148,7 @@ std::string health_json(const bushd::client::Status& status) {
                         {"sequence", status.healths.front().part.sequence},
                         {"utime_us", status.healths.front().part.utime_us}};
   for (const api::HealthSnapshot& bus : healths_of(status)) out["buses"].push_back(bus_json(bus));
-  // Texts from the network need not be UTF-8; by default dump() throws then.
-  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return bushd::json_text(out);
 }
 
 }  // namespace bushctl

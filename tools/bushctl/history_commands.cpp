@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <variant>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "commands.h"
 #include "grid.h"
@@ -44,7 +45,7 @@ void print_json(const std::string& motor, const api::MotionHistory& history) {
                                {"outcome", motion.outcome},
                                {"reason", motion.reason}});
   }
-  fmt::print("{}\n", json.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", bushd::json_text(json));
 }
 
 // In its unit, as it was then; of a motor without one there are steps only.

@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "grid.h"
 #include "link/health.h"
 #include "link/unique_id.h"
@@ -117,7 +118,7 @@ std::string latency_json(const LatencyTest& test) {
     }
     out["latency"].push_back(column);
   }
-  return out.dump();
+  return bushd::json_text(out);
 }
 
 std::vector<std::string> scan_lines(std::vector<Found> found) {
@@ -163,7 +164,7 @@ std::string scan_json(std::vector<Found> found) {
     out["mcus"].push_back(entry);
   }
   for (const auto& [address, ids] : doubled(found)) out["doubled_addresses"].push_back(address);
-  return out.dump();
+  return bushd::json_text(out);
 }
 
 }  // namespace bushctl

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "grid.h"
 
@@ -297,8 +298,7 @@ std::string json(const Status& status) {
     }
     if (description.address != 0) out["mcus"].push_back(mcu_json(mcu, description));
   }
-  // Texts from the network need not be UTF-8; by default dump() throws then.
-  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return bushd::json_text(out);
 }
 
 std::string json(const api::MovePlan& plan) {
@@ -320,7 +320,7 @@ std::string json(const api::MovePlan& plan) {
                              {"duration_us", motor.duration_us},
                              {"peak_steps_per_s", motor.peak_steps_per_s}});
   }
-  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return bushd::json_text(out);
 }
 
 std::vector<std::string> lines(const api::MovePlan& plan) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "config/edit.h"
 #include "grid.h"
@@ -79,7 +80,7 @@ std::string json(const api::Configuration& configuration) {
                                {"value", json_of(key, value)},
                                {"in_file", json_of(key, in_file)}});
   }
-  return out.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return bushd::json_text(out);
 }
 
 Result<api::Configure> save(const api::Configuration& configuration) {

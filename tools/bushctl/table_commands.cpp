@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "commands.h"
 #include "grid.h"
@@ -17,10 +18,6 @@ namespace {
 namespace api = bushd::api;
 using bushd::client::Client;
 using nlohmann::ordered_json;
-
-std::string dump(const ordered_json& json) {
-  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
 
 std::map<std::string, api::TableRef> by_group(const bushd::client::Status& status) {
   std::map<std::string, api::TableRef> groups;
@@ -57,7 +54,7 @@ void print_json(const std::map<std::string, api::TableRef>& groups,
                               {"start_steps_per_s", entry.start_steps_per_s},
                               {"max_steps_per_s", entry.max_steps_per_s}});
   }
-  fmt::print("{}\n", dump(json));
+  fmt::print("{}\n", bushd::json_text(json));
 }
 
 void print(const std::map<std::string, api::TableRef>& groups,
@@ -123,7 +120,7 @@ void print_json(const bushd::tables::TableContent& table) {
   if (table.cruise) json["cruise"] = *table.cruise;
   json["accel"] = table.accel;
   if (table.decel) json["decel"] = *table.decel;
-  fmt::print("{}\n", dump(json));
+  fmt::print("{}\n", bushd::json_text(json));
 }
 
 void print(const bushd::tables::TableContent& table) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "grid.h"
 
@@ -90,7 +91,7 @@ std::string json(const std::vector<Whereabouts>& motors) {
     if (!state.uncertain_reason.empty()) motor["reason"] = state.uncertain_reason;
     out["motors"].push_back(std::move(motor));
   }
-  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return bushd::json_text(out);
 }
 
 }  // namespace bushctl

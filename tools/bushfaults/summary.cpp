@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "base/json_text.h"
 #include "installation.h"
 #include "small_world.h"
 
@@ -144,7 +145,7 @@ std::string summary_json(const World& world) {
       {"skew_us", static_cast<double>(world.skew().worst_ns()) / 1000},
       {"report_age_ms", static_cast<double>(world.witness().positions().worst_age_ns()) / 1e6},
       {"violations", world.witness().violation() ? 1 : 0}};
-  return all.dump() + "\n";
+  return bushd::json_text(all) + "\n";
 }
 
 std::string story(const World& world, const Options& options) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/printable.h"
 
 namespace bushctl::doctor {
@@ -67,8 +68,7 @@ std::string json(const Findings& findings) {
     if (!remedy.empty()) finding["remedy"] = remedy;
     out["findings"].push_back(std::move(finding));
   }
-  // Texts from the network need not be UTF-8; by default dump() throws then.
-  return out.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return bushd::json_text(out);
 }
 
 }  // namespace bushctl::doctor
