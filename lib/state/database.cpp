@@ -385,12 +385,23 @@ Result<void> Database::add(const PastMove& move) {
                    .bind(move.to_text)
                    .run();
   if (!added) return added;
-  Statement old(sqlite_, "DELETE FROM move WHERE utime_us < ?");
-  if (auto removed = old.bind(move.utime_us - kHistoryUs).run(); !removed) return removed;
+  if (auto removed = remove_old_moves(); !removed) return removed;
   Statement many(sqlite_,
                  "DELETE FROM move WHERE motor = ?1 AND id <="
                  " (SELECT id FROM move WHERE motor = ?1 ORDER BY id DESC LIMIT 1 OFFSET ?2)");
   return many.bind(move.motor).bind(std::int64_t{kHistoryMoves}).run();
+}
+
+Result<void> Database::remove_old_moves() {
+  const auto newest = sqlite_.number("SELECT max(id) FROM move");
+  if (!newest) return fail(newest.error());
+  if (*newest % kLookEvery != 0) return {};
+  Statement old(sqlite_,
+                "DELETE FROM move WHERE id <= (SELECT max(id) FROM"
+                " (SELECT id, sum(gap_us) OVER (ORDER BY id DESC) AS age_us FROM"
+                " (SELECT id, max(0, min(?1, lead(utime_us, 1, utime_us) OVER (ORDER BY id)"
+                " - utime_us)) AS gap_us FROM move)) WHERE age_us > ?2)");
+  return old.bind(kDayUs).bind(kHistoryUs).run();
 }
 
 }  // namespace bushd::state

@@ -22,8 +22,12 @@ Versions all_versions();
 
 class Database {
  public:
-  static constexpr std::int64_t kHistoryUs = std::int64_t{90} * 86400 * 1'000'000;
+  // The history. Its age is that of the days on which something was written: from one line to the
+  // next a day at most counts, so that a clock that is wrong for a while makes nothing old.
+  static constexpr std::int64_t kDayUs = std::int64_t{86400} * 1'000'000;
+  static constexpr std::int64_t kHistoryUs = 90 * kDayUs;
   static constexpr int kHistoryMoves = 2000;  // of one motor
+  static constexpr int kLookEvery = 64;       // lines: what is too old is looked for
 
   // Makes it if it is not there. One of an older version is copied, then brought up to date. One
   // that is damaged, or no database of bushd, is moved aside and begun anew. `notes` gets what
@@ -73,6 +77,7 @@ class Database {
   Result<void> put(const std::string& motor, const Record& record);
   Result<void> put(const std::string& motor, const Settings& settings);
   Result<void> add(const PastMove& move);
+  Result<void> remove_old_moves();
 
   Sqlite sqlite_;
   bool foreign_ = false;  // no database of bushd, or not as it should be

@@ -6,7 +6,11 @@
 namespace bushd::state {
 namespace {
 
-constexpr std::size_t kMaxPendingMoves = 10'000;  // while the disk does not take any
+void keep_newest(std::vector<PastMove>& moves) {
+  constexpr std::ptrdiff_t kAtOnce = Keeper::kMaxPendingMoves / 10;  // not all moved up for each
+  const std::ptrdiff_t many = std::ssize(moves) - Keeper::kMaxPendingMoves;
+  if (many > 0) moves.erase(moves.begin(), moves.begin() + std::max(many, kAtOnce));
+}
 
 bool same_but_time(Record a, const Record& b) {
   a.utime_us = b.utime_us;
@@ -103,6 +107,12 @@ void Keeper::settings(const std::string& name, Settings settings) {
   pending_.settings[name] = std::move(settings);
 }
 
+void Keeper::past(PastMove move) {
+  ++told_;
+  pending_.moves.push_back(std::move(move));
+  keep_newest(pending_.moves);
+}
+
 void Keeper::step(std::int64_t now_us) {
   if (marking_.empty() && !to_mark_.empty() && now_us >= mark_again_us_) {
     std::vector<Mark> marks;
@@ -166,10 +176,7 @@ void Keeper::write(std::int64_t now_us, const Result<void>& done) {
   pending_.settings.merge(written.settings);
   written.moves.insert(written.moves.end(), pending_.moves.begin(), pending_.moves.end());
   pending_.moves = std::move(written.moves);
-  if (pending_.moves.size() > kMaxPendingMoves) {
-    const auto many = static_cast<std::ptrdiff_t>(pending_.moves.size() - kMaxPendingMoves);
-    pending_.moves.erase(pending_.moves.begin(), pending_.moves.begin() + many);
-  }
+  keep_newest(pending_.moves);
 }
 
 }  // namespace bushd::state

@@ -35,6 +35,7 @@ class Keeper {
  public:
   static constexpr std::int64_t kPatienceUs = 1'000'000;
   static constexpr std::int64_t kRetryUs = 1'000'000;
+  static constexpr int kMaxPendingMoves = 10'000;  // while the disk does not take any
 
   // `kept`: as the store was when it was opened. The backend outlives it.
   Keeper(const std::vector<std::string>& motors, const std::map<std::string, Kept>& kept,
@@ -59,7 +60,8 @@ class Keeper {
   void settings(MotorId motor, Settings settings);
   // Of what is no motor.
   void settings(const std::string& name, Settings settings);
-  void past(PastMove move) { pending_.moves.push_back(std::move(move)), ++told_; }
+  // While the disk does not take them, the newest are kept.
+  void past(PastMove move);
 
   // How much has been told, and how much of that is on the disk.
   std::uint64_t told() const { return told_; }

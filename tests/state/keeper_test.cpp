@@ -70,6 +70,22 @@ TEST_F(KeeperTest, WhatComesMeanwhileGoesTogether) {
   EXPECT_EQ(disk.writes[1].records.at("theta").steps, 3);
 }
 
+// A disk that hangs takes no write and refuses none.
+TEST_F(KeeperTest, WhatADiskThatHangsIsToTakeIsBounded) {
+  keeper.past({.motor = "phi", .utime_us = -1});
+  keeper.step(0);
+  for (std::int64_t i = 0; i < 3 * Keeper::kMaxPendingMoves; ++i) {
+    keeper.past({.motor = "phi", .utime_us = i});
+    keeper.step(0);
+  }
+  keeper.write(0, {});
+  keeper.step(0);
+  ASSERT_THAT(disk.writes, SizeIs(2));
+  EXPECT_LE(std::ssize(disk.writes[1].moves), Keeper::kMaxPendingMoves);
+  EXPECT_GE(std::ssize(disk.writes[1].moves), Keeper::kMaxPendingMoves * 9 / 10);
+  EXPECT_EQ(disk.writes[1].moves.back().utime_us, 3 * Keeper::kMaxPendingMoves - 1);
+}
+
 TEST_F(KeeperTest, ARestThatHasGoneOutNeedsANewMark) {
   mark(kTheta);
   stand(kTheta, 100);

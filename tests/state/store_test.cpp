@@ -282,8 +282,56 @@ TEST(Database, HistoryIsBoundedInTimeAndRows) {
   EXPECT_EQ(most->front().utime_us, start + Database::kHistoryMoves + 9);
   EXPECT_THAT(*store.history("theta", 3), SizeIs(3));
   EXPECT_THAT(*store.history("phi", 3), SizeIs(1));
-  ASSERT_TRUE(store.write({.moves = {past_move("phi", start + Database::kHistoryUs + 1)}}));
-  EXPECT_THAT(*store.history("phi", 3), SizeIs(1));
+}
+
+constexpr std::int64_t kDayUs = Database::kDayUs;
+constexpr auto kDays = Database::kHistoryUs / kDayUs;
+
+// What is old is looked for now and then.
+void write_until_looked(Store& store, const char* motor, std::int64_t utime_us) {
+  for (int i = 0; i < Database::kLookEvery; ++i) {
+    ASSERT_TRUE(store.write({.moves = {past_move(motor, utime_us)}}));
+  }
+}
+
+TEST(Database, HistoryIsBoundedInTime) {
+  sim::SimDisk disk(1);
+  Store store = open(disk);
+  const std::int64_t start = 10 * Database::kHistoryUs;
+  ASSERT_TRUE(store.write({.moves = {past_move("phi", start)}}));
+  for (std::int64_t day = 1; day <= kDays; ++day) {
+    ASSERT_TRUE(store.write({.moves = {past_move("theta", start + day * kDayUs)}}));
+  }
+  write_until_looked(store, "theta", start + kDays * kDayUs);
+  EXPECT_THAT(*store.history("phi", 3), SizeIs(1)) << "90 days old, and not more";
+  write_until_looked(store, "theta", start + kDays * kDayUs + 1);
+  EXPECT_THAT(*store.history("phi", 3), IsEmpty());
+}
+
+// A clock that is wrong, or was, makes nothing old: a gap counts as one day at most.
+TEST(Database, HistoryIsNotDeletedByAClockThatJumps) {
+  sim::SimDisk disk(1);
+  Store store = open(disk);
+  const std::int64_t start = 10 * Database::kHistoryUs;
+  ASSERT_TRUE(store.write({.moves = {past_move("phi", start)}}));
+  const std::int64_t jumps[] = {200 * kDayUs, -200 * kDayUs, 0, -start, 5000 * kDayUs};
+  for (const std::int64_t jump : jumps) {
+    write_until_looked(store, "theta", start + jump);
+    EXPECT_THAT(*store.history("phi", 3), SizeIs(1)) << jump;
+  }
+}
+
+// Those of a clock that was ahead are as old as what was written beside them.
+TEST(Database, HistoryOfTheFutureDoesNotStay) {
+  sim::SimDisk disk(1);
+  Store store = open(disk);
+  const std::int64_t start = 10 * Database::kHistoryUs;
+  ASSERT_TRUE(store.write({.moves = {past_move("phi", start + 5000 * kDayUs)}}));
+  for (std::int64_t day = 1; day <= kDays + 1; ++day) {
+    ASSERT_TRUE(store.write({.moves = {past_move("theta", start + day * kDayUs)}}));
+  }
+  write_until_looked(store, "theta", start + (kDays + 2) * kDayUs);
+  EXPECT_THAT(*store.history("phi", 3), IsEmpty());
 }
 
 TEST(Database, AnOlderVersionIsCopiedThenBroughtUpToDate) {
