@@ -192,12 +192,12 @@ void Host::give(const bushd::lcm::Hello& hello) {
 }
 
 void Host::give(const Request& request) {
-  witness_.arrives(request);
   const bool usable = request.damage == Damage::kNone && bushd::api::is_client_id(request.client);
+  if (usable) witness_.arrives(request);
   const std::uint64_t dropped = daemon_->dropped();
   recent_.note(now_ns_, text_of(request));
   if (usable) witness_.promise().give(request);
-  daemon_->give(packet_of(now_us(), request));
+  daemon_->give(packet_of(request));
   if (usable) check(witness_.promise().given());
   if (usable != (daemon_->dropped() == dropped)) {
     witness_.violated(now_ns_, (usable ? "dropped: " : "not dropped: ") + text_of(request));
@@ -207,13 +207,14 @@ void Host::give(const Request& request) {
 // What the core answers, at the moment when it does: messages arrive later.
 class Host::Overhearing final : public bushd::api::Session {
  public:
-  Overhearing(Host& host, bushd::api::Asker asker, Key key)
+  Overhearing(Host& host, bushd::api::Asker asker, Key key, std::size_t kind)
       : Session(bushd::api::Transport::kLcm, asker.session->client_id(), true),
         host_(host),
         asker_(std::move(asker)),
-        key_(std::move(key)) {}
+        key_(std::move(key)),
+        kind_(kind) {}
   void answer(std::int64_t, const bushd::api::Reply& reply) override {
-    host_.witness_.reply(host_.now_ns_, key_, reply);
+    host_.witness_.reply(host_.now_ns_, key_, kind_, reply);
     asker_.answer(reply);
   }
 
@@ -221,6 +222,7 @@ class Host::Overhearing final : public bushd::api::Session {
   Host& host_;
   bushd::api::Asker asker_;
   Key key_;
+  std::size_t kind_;
 };
 
 bushd::api::Asker Host::carry_out(const bushd::api::Asker& asker,
@@ -230,14 +232,15 @@ bushd::api::Asker Host::carry_out(const bushd::api::Asker& asker,
   }
   const auto asked = witness_.promise().carried_out(asker.session->client_id(), asker.number);
   if (!asked ||
-      packet_of(0, *asked).payload != bushd::lcm::encode(0, asked->id(), request).value().payload) {
+      packet_of(*asked).payload !=
+          bushd::lcm::encode(asked->sent_us, asked->id(), request).value().payload) {
     witness_.violated(now_ns_,
                       fmt::format("carried out, and was not to be: {} #{}: {}",
                                   asker.session->client_id(), asker.number, name_of(request)));
     return asker;
   }
   witness_.carried_out(now_ns_, *asked);
-  return {.session = std::make_shared<Overhearing>(*this, asker, key_of(asked->id())),
+  return {.session = std::make_shared<Overhearing>(*this, asker, key_of(asked->id()), request.index()),
           .number = asker.number,
           .after_stops = asker.after_stops};
 }

@@ -82,6 +82,7 @@ void Mail::say_hello(TimeNs now_ns, const std::string& name, Client& client) {
 
 void Mail::send(TimeNs now_ns, Request request) {
   now_ns_ = now_ns;
+  request.sent_us = now_ns / 1000;
   if (!bushd::api::is_client_id(request.client)) return post(now_ns, request);
   // Whoever can speak may stop.
   if (request.is_stop() && random_.one_in(2)) {

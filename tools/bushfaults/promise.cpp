@@ -40,6 +40,8 @@ std::uint64_t below(std::int64_t highest, std::int64_t number) {
 
 void Promise::daemon_started() {
   sessions_.clear();
+  books_.clear();
+  books_used_.clear();
   by_hello_.clear();
   idle_.clear();
   used_.clear();
@@ -107,28 +109,60 @@ void Promise::forget_oldest(std::list<std::int64_t>& order) {
   order.pop_front();
 }
 
-Promise::Duty Promise::duty_of(const Request& request) {
-  Session* session = find(request.session, request.client);
-  if (session == nullptr) return request.ends_motion() ? Duty::kCarryOut : Duty::kUnknownSession;
-  use(request.session, *session);
-  const std::int64_t number = request.number;
-  if (!session->highest || number > *session->highest) {
-    session->highest = number;
-    std::erase_if(session->seen,
-                  [&](std::int64_t seen) { return below(number, seen) >= kNumbers; });
-  } else if (below(*session->highest, number) >= kNumbers) {
-    return request.ends_motion() ? Duty::kCarryOut : Duty::kTooOld;
+Promise::Duty Promise::Numbers::duty_of(std::int64_t number, std::size_t kind, bool stop) {
+  const auto holds = [&](std::int64_t n) {
+    return highest && n <= *highest && below(*highest, n) < kNumbers;
+  };
+  if (highest && number <= *highest && !holds(number)) {
+    return stop && !stops.contains(number) ? Duty::kElsewhere : Duty::kTooOld;
   }
-  return session->seen.insert(number).second ? Duty::kCarryOut : Duty::kAnswerAgain;
+  if (const auto before = seen.find(number); before != seen.end()) {
+    if (before->second == kind) return Duty::kAnswerAgain;
+    return stop ? Duty::kElsewhere : Duty::kOtherRequest;
+  }
+  highest = highest ? std::max(*highest, number) : number;
+  std::erase_if(seen, [&](const auto& entry) { return !holds(entry.first); });
+  seen.emplace(number, kind);
+  if (stop) {
+    std::erase_if(stops, [&](std::int64_t n) { return !holds(n); });
+    stops.insert(number);
+    if (stops.size() > kStops) stops.erase(stops.begin());
+  }
+  return Duty::kCarryOut;
+}
+
+// One that its session does not know of is told from its repetitions by when it was sent.
+Promise::Numbers& Promise::book_of(const Request& request) {
+  const BookKey key(request.client, request.sent_us);
+  const auto [book, first] = books_.try_emplace(key);
+  if (!first) books_used_.remove(key);
+  books_used_.push_back(key);
+  if (books_used_.size() > kUsedSessions) {
+    books_.erase(books_used_.front());
+    books_used_.pop_front();
+  }
+  return book->second;
+}
+
+Promise::Duty Promise::duty_of(const Request& request, std::size_t kind) {
+  const bool stop = request.ends_motion();
+  Session* session = find(request.session, request.client);
+  if (session == nullptr && !stop) return Duty::kUnknownSession;
+  if (session != nullptr) {
+    use(request.session, *session);
+    const Duty duty = session->numbers.duty_of(request.number, kind, stop);
+    if (duty != Duty::kElsewhere) return duty;
+  }
+  const Duty duty = book_of(request).duty_of(request.number, kind, stop);
+  return duty == Duty::kElsewhere ? Duty::kCarryOut : duty;
 }
 
 void Promise::give(const Request& request) {
   const Key key = key_of(request.id());
   const std::size_t kind = api_of(request).index();
-  const Duty duty = duty_of(request);
-  const auto [asked, first] = asked_.try_emplace(key, Asked{.kind = kind});
-  if (first) order_.push_back(key);
-  given_ = Given{.request = request, .duty = duty, .same_kind = asked->second.kind == kind};
+  const Duty duty = duty_of(request, kind);
+  if (asked_.try_emplace(key).second) order_.push_back(key);
+  given_ = Given{.request = request, .duty = duty, .kind = kind};
   forget_some();
 }
 
@@ -148,22 +182,19 @@ void Promise::forget_some() {
 
 Promise::Wrong Promise::given() {
   const Given given = *std::exchange(given_, std::nullopt);
-  if (given.carried_out) return std::nullopt;
   const Request& request = given.request;
   if (given.duty == Duty::kCarryOut) {
-    // Its repetition may still be without an answer.
-    const bool repeated = asked_.at(key_of(request.id())).carried_out > 0;
-    if (request.ends_motion() && !repeated) {
+    if (request.ends_motion() && !given.carried_out) {
       return "a stop is not carried out: " + text_of(request);
     }
-    if (request.ends_motion()) return std::nullopt;
-    if (!given.refused) waiting_[request.client].push_back(request);
+    if (!request.ends_motion() && !given.refused) waiting_[request.client].push_back(request);
     return std::nullopt;
   }
+  if (given.carried_out) return "carried out again: " + text_of(request);
   ++not_carried_out_;
   // What still waits has not been answered so far.
-  const bool silent =
-      given.duty == Duty::kAnswerAgain && given.same_kind && !asked_.at(key_of(request.id())).told;
+  const bool silent = given.duty == Duty::kAnswerAgain &&
+                      !asked_.at(key_of(request.id())).told.contains(given.kind);
   if (given.answers == 1 || (silent && given.answers == 0)) return std::nullopt;
   return fmt::format("{} answers at once to what is not to be carried out: {}", given.answers,
                      text_of(request));
@@ -174,7 +205,9 @@ std::optional<Request> Promise::carried_out(const std::string& client, std::int6
   if (given_ && given_->request.client == client && given_->request.number == number) {
     if (!given_->request.ends_motion()) return std::nullopt;  // it has not had its turn
     given_->carried_out = true;
-    ++asked_.at(key_of(given_->request.id())).carried_out;
+    Asked& asked = asked_.at(key_of(given_->request.id()));
+    ++asked.carried_out;
+    asked.told.erase(given_->kind);
     return given_->request;
   }
   const auto waiting = waiting_.find(client);
@@ -186,7 +219,7 @@ std::optional<Request> Promise::carried_out(const std::string& client, std::int6
   return request;
 }
 
-Promise::Wrong Promise::answered(const Key& key, const api::Reply& reply) {
+Promise::Wrong Promise::answered(const Key& key, std::size_t kind, const api::Reply& reply) {
   const auto& [session, client, number] = key;
   const lcm::ReplyMessage message{.id = {.session = session, .client_id = client, .number = number},
                                   .reply = reply};
@@ -200,8 +233,8 @@ Promise::Wrong Promise::answered(const Key& key, const api::Reply& reply) {
   if (!room) return "one reply too many:" + text_of(message);
   if (alone) ++asked.accepted;
   ++(completed ? asked.completed : refused ? asked.refused : asked.accepted);
-  asked.told = essence(message);
-  on_the_way_.push_back(*asked.told);
+  asked.told[kind] = essence(message);
+  on_the_way_.push_back(asked.told[kind]);
   return std::nullopt;
 }
 
@@ -212,11 +245,15 @@ Promise::Wrong Promise::check_again(const lcm::ReplyMessage& message, const Aske
         return is_refusal(message.reply, "below the highest of this session");
       case Duty::kUnknownSession:
         return is_refusal(message.reply, api::kUnknownSession);
-      case Duty::kAnswerAgain:
+      case Duty::kOtherRequest:
+        return is_refusal(message.reply, "was another request's");
+      case Duty::kAnswerAgain: {
+        const auto told = asked.told.find(given_->kind);
         return is_refusal(message.reply, "carried out earlier, answer not kept") ||
-               (given_->same_kind ? asked.told == essence(message)
-                                  : is_refusal(message.reply, "was another request's"));
+               (told != asked.told.end() && told->second == essence(message));
+      }
       case Duty::kCarryOut:
+      case Duty::kElsewhere:
         break;
     }
     return false;
@@ -237,11 +274,6 @@ Promise::Wrong Promise::hear(const lcm::ReplyMessage& message) {
   ++given_->answers;
   Asked& asked = asked_.at(key_of(message.id));
   if (given_->duty != Duty::kCarryOut) return check_again(message, asked);
-  // A stop that its session does not know may be told from its repetitions, and need not be.
-  if (given_->request.ends_motion() && asked.carried_out > 0) {
-    given_->carried_out = true;
-    return std::nullopt;
-  }
   // Too many wait already.
   if (given_->request.ends_motion() || !is_refusal(message.reply, "wait")) {
     return "said before it was carried out:" + text_of(message);
@@ -249,7 +281,7 @@ Promise::Wrong Promise::hear(const lcm::ReplyMessage& message) {
   given_->refused = true;
   ++asked.carried_out;
   ++asked.refused;
-  asked.told = essence(message);
+  asked.told[given_->kind] = essence(message);
   return std::nullopt;
 }
 

@@ -35,8 +35,8 @@ class Promise {
   Wrong given();
   // The core gets it. Which one it is, unless it was not to be carried out.
   std::optional<Request> carried_out(const std::string& client, std::int64_t number);
-  // The core says so.
-  Wrong answered(const Key& key, const bushd::api::Reply& reply);
+  // The core says so to a request of that index in api::Request.
+  Wrong answered(const Key& key, std::size_t kind, const bushd::api::Reply& reply);
   // It has arrived at the clients.
   Wrong hear(const bushd::lcm::ReplyMessage& message);
 
@@ -53,43 +53,62 @@ class Promise {
   static constexpr std::size_t kIdleSessions = 256;
   static constexpr std::uint64_t kNumbers = 1024;
 
+  static constexpr std::size_t kStops = 64;
+
+  // What is to become of a request that arrives. kElsewhere: of a stop that these numbers do not
+  // tell from its repetitions.
+  enum class Duty {
+    kCarryOut,
+    kAnswerAgain,
+    kOtherRequest,
+    kTooOld,
+    kUnknownSession,
+    kElsewhere
+  };
+  struct Numbers {
+    std::optional<std::int64_t> highest{};
+    std::map<std::int64_t, std::size_t> seen{};  // of the newest kNumbers: index in api::Request
+    std::set<std::int64_t> stops{};              // the newest kStops of them
+
+    Duty duty_of(std::int64_t number, std::size_t kind, bool stop);
+  };
   struct Session {
     std::string client;
     std::int64_t nonce;
     bool idle = true;
-    std::optional<std::int64_t> highest{};
-    std::set<std::int64_t> seen{};  // of the newest kNumbers
+    Numbers numbers{};
   };
-  // What is to become of a request that arrives.
-  enum class Duty { kCarryOut, kAnswerAgain, kTooOld, kUnknownSession };
+  using BookKey = std::pair<std::string, std::int64_t>;  // the client, and when it was sent
   struct Given {
     Request request;
     Duty duty;
-    bool same_kind;  // as what had this number before
+    std::size_t kind;  // index in api::Request
     std::size_t answers = 0;
     bool carried_out = false;
     bool refused = false;
   };
   struct Asked {
-    std::size_t kind = 0;  // index in api::Request
-    // A stop that no session remembers may be carried out any number of times.
+    // A stop that a session has forgotten is carried out again.
     std::uint64_t carried_out = 0;
     std::uint64_t accepted = 0;
     std::uint64_t refused = 0;
     std::uint64_t completed = 0;
-    std::optional<std::vector<std::uint8_t>> told{};  // the newest answer
+    std::map<std::size_t, std::vector<std::uint8_t>> told{};  // by kind: the newest answer
     bool finished() const { return refused + completed == carried_out && carried_out > 0; }
   };
 
   Session* find(std::int64_t session, const std::string& client);
   void use(std::int64_t number, Session& session);
   void forget_oldest(std::list<std::int64_t>& order);
-  Duty duty_of(const Request& request);
+  Numbers& book_of(const Request& request);
+  Duty duty_of(const Request& request, std::size_t kind);
   Wrong check_again(const bushd::lcm::ReplyMessage& message, const Asked& asked) const;
   void forget_some();
 
   std::map<std::int64_t, Session> sessions_;
   std::map<std::pair<std::string, std::int64_t>, std::int64_t> by_hello_;
+  std::map<BookKey, Numbers> books_;  // of stops that their session does not know of
+  std::list<BookKey> books_used_;     // longest silent first
   std::list<std::int64_t> idle_;  // longest silent first
   std::list<std::int64_t> used_;
   std::set<std::int64_t> ever_;  // sessions of all daemons

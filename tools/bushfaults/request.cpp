@@ -228,8 +228,9 @@ api::Request api_of(const Request& request) {
   return api::Disarm{request.motors};
 }
 
-bushd::lcm::Packet packet_of(std::int64_t utime_us, const Request& request) {
-  bushd::lcm::Packet packet = bushd::lcm::encode(utime_us, request.id(), api_of(request)).value();
+bushd::lcm::Packet packet_of(const Request& request) {
+  bushd::lcm::Packet packet =
+      bushd::lcm::encode(request.sent_us, request.id(), api_of(request)).value();
   switch (request.damage) {
     case Damage::kNone:
       break;

@@ -56,6 +56,7 @@ struct Request {
   std::string client;
   std::int64_t session = 0;
   std::int64_t number = 0;
+  std::int64_t sent_us = 0;  // for the first time
   Ask ask{};
   std::vector<std::string> motors{};
   std::vector<std::int64_t> steps{};   // as many as motors
@@ -116,7 +117,7 @@ inline Key key_of(const bushd::lcm::RequestId& id) {
 
 bushd::api::Request api_of(const Request& request);
 // As it arrives at the daemon.
-bushd::lcm::Packet packet_of(std::int64_t utime_us, const Request& request);
+bushd::lcm::Packet packet_of(const Request& request);
 std::string text_of(const Request& request);
 std::string text_of(const Key& key, const bushd::api::Reply& reply);
 std::string text_of(const bushd::lcm::ReplyMessage& message);

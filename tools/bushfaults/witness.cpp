@@ -99,8 +99,8 @@ void Witness::carried_out(TimeNs now_ns, const Request& request) {
       Asked{.request = request, .since_ns = now_ns, .due_since_ns = now_ns};
 }
 
-void Witness::reply(TimeNs now_ns, const Key& key, const api::Reply& reply) {
-  if (const auto wrong = promise_.answered(key, reply)) return violated(now_ns, *wrong);
+void Witness::reply(TimeNs now_ns, const Key& key, std::size_t kind, const api::Reply& reply) {
+  if (const auto wrong = promise_.answered(key, kind, reply)) return violated(now_ns, *wrong);
   recent_.note(now_ns, text_of(key, reply));
   const auto found = asked_.find(key);
   if (found == asked_.end()) return;  // of a stop, long after another one with its number

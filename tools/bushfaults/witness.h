@@ -58,7 +58,8 @@ class Witness {
   void arrives(const Request& request);
   // Before the core gets it; after that come the replies that it makes at once.
   void carried_out(TimeNs now_ns, const Request& request);
-  void reply(TimeNs now_ns, const Key& key, const bushd::api::Reply& reply);
+  // `kind`: index in api::Request of what it answers.
+  void reply(TimeNs now_ns, const Key& key, std::size_t kind, const bushd::api::Reply& reply);
   void state(TimeNs now_ns, std::size_t mcu, const bushd::api::StateSnapshot& state);
   void description(TimeNs now_ns, const bushd::api::Description& said);
   void lam(TimeNs now_ns, const bushd::api::CamacLam& lam);
