@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "request.h"
@@ -31,7 +32,19 @@ class Arrivals {
   static constexpr std::size_t kMostEnds = 200;
   static constexpr std::size_t kMostArrivals = 20'000;
 
+  // A path arrives with its first part, and other paths of the client with these motors have other
+  // numbers of points.
+  using Path = std::tuple<std::string, std::vector<std::string>, std::size_t>;
+  struct Place {
+    std::uint64_t at;  // of all that had arrived
+    std::int64_t number;
+  };
+
+  static Path path_of(const Request& request);
+  std::optional<Place> place_of(const Request& request) const;
+
   std::uint64_t count_ = 0;
+  std::map<Path, Place> first_parts_;
   std::map<Key, std::uint64_t> arrived_;
   std::map<Key, std::uint64_t> carried_out_;  // that end others: when
   std::vector<End> ends_;

@@ -218,11 +218,11 @@ ProgramMotion Crates::program() const {
   }
   motion.steps = program.left ? -std::int64_t{program.steps} : program.steps;
   // The formula of the report: before step k of N stands code min(k, N - 1 - k, 237).
-  const std::int64_t unit_ns =
+  motion.unit_ns =
       kSecond / (Bushd2::kCodesPerStartPeriod * config_.crates.front().modules.front().f_start_hz);
   for (std::uint32_t k = 1; k < program.steps; ++k) {
     const auto code = std::min({k, program.steps - 1 - k, 237U});
-    motion.first_to_last_ns += program.codes[code] * unit_ns;
+    motion.delays_ns.push_back(program.codes[code] * motion.unit_ns);
   }
   return motion;
 }

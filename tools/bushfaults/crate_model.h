@@ -27,7 +27,8 @@ inline constexpr int kBushd2Station = 5;
 struct ProgramMotion {
   std::size_t motor = 0;   // of the module
   std::int64_t steps = 0;  // left: below 0
-  std::int64_t first_to_last_ns = 0;
+  std::int64_t unit_ns = 0;
+  std::vector<std::int64_t> delays_ns{};  // between its steps
   bushd::camac::Program program{};
 };
 

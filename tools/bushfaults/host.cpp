@@ -166,6 +166,7 @@ void Host::end(TimeNs now_ns, TimeNs gone_ns) {
   ends_at_ns_ = now_ns + kEndWatchedNs;
   gone_ns_ = gone_ns;
   witness_.daemon_ends(now_ns);
+  if (small_ != nullptr) small_->daemon_ends(now_ns);
   core().shut_down(now_us());
   step();
 }

@@ -17,20 +17,25 @@ namespace {
 // shorter ticks than a line for 32 motors can carry.
 constexpr std::array<const char*, 4> kTables = {"bushd2-constant", "bushd2-scurve",
                                                 "bushd2-exponential", "bushd2-resonance"};
-constexpr std::array<std::uint32_t, 4> kBauds = {500'000, 1'000'000, 2'000'000, 4'000'000};
+constexpr std::array<std::uint32_t, 7> kBauds = {57'600,    115'200,   230'400,  500'000,
+                                                 1'000'000, 2'000'000, 4'000'000};
+constexpr std::uint32_t kUsualBaud = 500'000;
 constexpr std::uint32_t kInstallationStream = 400;  // of randomness
 constexpr std::uint32_t kHomeStream = 401;
 constexpr std::uint32_t kEmergencyStream = 402;
 constexpr std::uint32_t kInputStream = 413;
 constexpr std::uint32_t kHomeSpeedStream = 407;
 constexpr std::uint32_t kRequiredStream = 410;
+constexpr std::uint32_t kLineStream = 414;
 constexpr std::uint32_t kSwitchStream = 500;  // and the next ones, one for each motor
 constexpr std::uint32_t kLimitStream = 5000;  // likewise
 
 // Every choice is drawn, also where the way is given: so a run told all its ways is the same run.
 bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
   bushd::sim::Random random(seed, kInstallationStream);
-  bushd::config::Bus bus{.name = "hall", .port = "simulated", .tick_us = kTickUs};
+  bushd::config::Bus bus{.name = "hall",
+                         .port = "simulated",
+                         .tick_us = ways.slow_line.value_or(false) ? kSlowTickUs : kTickUs};
   const bool table_runs = random.one_in(2);
   const bool table_ticks = random.one_in(2);
   const bool coarse = random.one_in(2);
@@ -92,6 +97,7 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
   }
   bushd::config::Bus bus = make_bus(ways, seed);
   for (const std::uint32_t baud : kBauds) {
+    if (baud < kUsualBaud && !ways.slow_line.value_or(false)) continue;
     if (bushd::fieldbus::line_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
         bushd::fieldbus::kMaxLineLoad) {
       continue;
@@ -215,13 +221,19 @@ void add_limit_switches(bushd::config::Config& config) {
   }
 }
 
+void add_all_ways(Ways& ways, std::uint64_t seed) {
+  const bool slow = bushd::sim::Random(seed, kLineStream).one_in(3);
+  if (!ways.slow_line) ways.slow_line = slow;
+}
+
 std::string ways_text(const bushd::config::Config& config) {
   const bushd::config::Bus& bus = config.buses[0];
-  return fmt::format("--moves {} --frames {} --format {} --emergency {} --required {}",
+  return fmt::format("--moves {} --frames {} --format {} --emergency {} --required {}{}",
                      bus.table_runs ? "table" : "stream", bus.table_ticks ? "auto" : "ticks",
                      bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse",
                      bus.emergency_stop == BUSHD_STOP_IMMEDIATE ? "immediate" : "ramp",
-                     config.state.required ? "yes" : "no");
+                     config.state.required ? "yes" : "no",
+                     bus.tick_us == kSlowTickUs ? " --line slow" : "");
 }
 
 }  // namespace bushfaults

@@ -14,6 +14,7 @@
 namespace bushfaults {
 
 inline constexpr std::uint32_t kTickUs = 2560;
+inline constexpr std::uint32_t kSlowTickUs = 5000;
 
 // How motors are told their moves; what is not given is chosen by the seed.
 struct Ways {
@@ -22,6 +23,8 @@ struct Ways {
   std::optional<bushd_format> format;
   std::optional<bushd_stop_mode> emergency_stop;
   std::optional<bool> state_required;  // [state] required
+  // Ticks of kSlowTickUs, at the slowest rate that carries all motors; chosen only with all kinds.
+  std::optional<bool> slow_line;
 };
 
 // Refuses what does not fit: more motors than outputs, or than any line can carry.
@@ -50,6 +53,9 @@ void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed);
 
 // At one end of most motors, at both of the others.
 void add_limit_switches(bushd::config::Config& config);
+
+// What of the ways is not given, and is not usual, by the seed.
+void add_all_ways(Ways& ways, std::uint64_t seed);
 
 // The ways of its bus, as options of bushfaults.
 std::string ways_text(const bushd::config::Config& config);

@@ -100,6 +100,12 @@ int run(int argc, char** argv) {
   add_way<bushd_stop_mode>(app, "--emergency", ways.emergency_stop,
                            {{"ramp", BUSHD_STOP_RAMP}, {"immediate", BUSHD_STOP_IMMEDIATE}});
   add_way<bool>(app, "--required", ways.state_required, {{"no", false}, {"yes", true}});
+  app.add_option_function<std::string>(
+         "--line", [&ways](const std::string& line) { ways.slow_line = line == "slow"; },
+         fmt::format("slow: ticks of {} us, at the slowest rate that carries the motors "
+                     "(default: usual; with --all-kinds by the seed)",
+                     bushfaults::kSlowTickUs))
+      ->check(CLI::IsMember({"usual", "slow"}));
   app.add_option("--crystal-ppm", options.crystal_ppm, "Largest error of the MCUs' clocks")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
@@ -122,6 +128,7 @@ int run(int argc, char** argv) {
   if (all_kinds) {
     bushfaults::add_all_kinds(options.fault_rates, options.command_rates, options.seed);
   }
+  if (all_kinds) bushfaults::add_all_ways(ways, options.seed);
   options.all_kinds = all_kinds;
   auto config =
       bushfaults::make_installation(options.motors, options.mcus, options.ways, options.seed);

@@ -144,7 +144,7 @@ Promise::Numbers& Promise::book_of(const Request& request) {
   return book->second;
 }
 
-Promise::Duty Promise::duty_of(const Request& request, std::size_t kind) {
+Promise::Duty Promise::duty_of(Request& request, std::size_t kind) {
   const bool stop = request.ends_motion();
   Session* session = find(request.session, request.client);
   if (session == nullptr && !stop) return Duty::kUnknownSession;
@@ -153,16 +153,17 @@ Promise::Duty Promise::duty_of(const Request& request, std::size_t kind) {
     const Duty duty = session->numbers.duty_of(request.number, kind, stop);
     if (duty != Duty::kElsewhere) return duty;
   }
+  request.unordered = true;
   const Duty duty = book_of(request).duty_of(request.number, kind, stop);
   return duty == Duty::kElsewhere ? Duty::kCarryOut : duty;
 }
 
-void Promise::give(const Request& request) {
+void Promise::give(Request request) {
   const Key key = key_of(request.id());
   const std::size_t kind = api_of(request).index();
   const Duty duty = duty_of(request, kind);
   if (asked_.try_emplace(key).second) order_.push_back(key);
-  given_ = Given{.request = request, .duty = duty, .kind = kind};
+  given_ = Given{.request = std::move(request), .duty = duty, .kind = kind};
   forget_some();
 }
 

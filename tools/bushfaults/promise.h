@@ -31,7 +31,7 @@ class Promise {
   Wrong hello_given();
 
   // A request arrives. What is said at once, and what is carried out at once, comes before given().
-  void give(const Request& request);
+  void give(Request request);
   Wrong given();
   // The core gets it. Which one it is, unless it was not to be carried out.
   std::optional<Request> carried_out(const std::string& client, std::int64_t number);
@@ -101,7 +101,7 @@ class Promise {
   void use(std::int64_t number, Session& session);
   void forget_oldest(std::list<std::int64_t>& order);
   Numbers& book_of(const Request& request);
-  Duty duty_of(const Request& request, std::size_t kind);
+  Duty duty_of(Request& request, std::size_t kind);
   Wrong check_again(const bushd::lcm::ReplyMessage& message, const Asked& asked) const;
   void forget_some();
 

@@ -57,6 +57,7 @@ struct Request {
   std::int64_t session = 0;
   std::int64_t number = 0;
   std::int64_t sent_us = 0;  // for the first time
+  bool unordered = false;    // its session does not know of it, and not its place among others
   Ask ask{};
   std::vector<std::string> motors{};
   std::vector<std::int64_t> steps{};   // as many as motors

@@ -21,6 +21,8 @@ constexpr TimeNs kAgeNs = 1'500'000'000;
 constexpr TimeNs kPortSilenceNs = 120'000'000;
 // From a request to the first step, and from a stop to what was under way.
 constexpr TimeNs kReactionNs = 300'000'000;
+// What has arrived has its turn.
+constexpr TimeNs kTurnNs = 1'500'000'000;
 constexpr std::int64_t kHomeSteps = 1;  // how exactly a switch is found
 constexpr TimeNs kRoundingNs = 1;       // times of edges are whole ns
 
@@ -276,6 +278,7 @@ void SmallJudge::asked_by_others(TimeNs now_ns, const api::Request& request) {
       continue;
     }
     motor.touched_by = requests_;
+    if (resume == nullptr) motor.stopped_ns = now_ns;
     motor.changed = true;
     if (emergency) motor.cut = true;
     if (resume != nullptr) motor.caused_ns = std::max(motor.caused_ns, now_ns);
@@ -309,9 +312,10 @@ void SmallJudge::replied(TimeNs now_ns, std::int64_t number, const api::Reply& r
     const auto& result = std::get<api::Completed>(reply);
     recent_.note(now_ns,
                  fmt::format("desk #{} {}: {}", number, word(result.outcome), result.reason));
-    // What was over before it began has a result alone.
-    if (!open.accepted && result.outcome == api::Outcome::kReached) {
-      violated_(now_ns, "reached before it was accepted: " + open.text);
+    // What was stopped before it began has a result alone.
+    const bool lone = open.is_motion && open.text != "jog" && !open.accepted;
+    if (lone && result.outcome != api::Outcome::kStopped) {
+      violated_(now_ns, fmt::format("{} before it was accepted: {}", word(result.outcome), open.text));
     }
     if (open.is_motion) ++results_[std::string(word(result.outcome))];
     completed(now_ns, open, result);
@@ -344,13 +348,16 @@ void SmallJudge::ended(TimeNs now_ns, Open& open, std::size_t i, const api::Moto
   if (motor.name != result.motor) return violated(now_ns, motor, "has the result of another motor");
   // Another one of the same request may have moved on, and this one by another request.
   const bool stands = motor.touched_by <= open.order;
+  // One that waited behind a stop is told so at its turn.
+  const bool stopped_before =
+      !open.accepted && motor.stopped_ns && now_ns <= *motor.stopped_ns + kTurnNs;
   if (result.outcome == api::Outcome::kReached && open.target[i] && stands &&
       motor.position != *open.target[i]) {
     violated(now_ns, motor,
              fmt::format("is said to have reached its target, and stands {} steps off",
                          motor.position - *open.target[i]));
   }
-  if (result.outcome == api::Outcome::kStopped && motor.touched_by <= open.order &&
+  if (result.outcome == api::Outcome::kStopped && stands && !stopped_before &&
       open.text == "move") {
     violated(now_ns, motor, "is said to have been stopped, and nobody has stopped it");
   }

@@ -117,6 +117,7 @@ class SmallJudge final : public bushd::sim::EdgeSink {
     TimeNs keys_ns = -1;
     TimeNs caused_ns = 0;          // by a request, if none is open
     std::uint64_t touched_by = 0;  // the latest request for it, counting all
+    std::optional<TimeNs> stopped_ns{};  // by others
     std::uint32_t unseen = 0;
     int open = 0;
     // What positions that are told are less than `position`.

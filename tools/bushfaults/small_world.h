@@ -45,6 +45,8 @@ class SmallWorld {
 
   void daemon_started(TimeNs now_ns, DaemonRun& daemon);
   // `power`: the computer has lost it.
+  // It is asked to.
+  void daemon_ends(TimeNs now_ns) { judge_.asked_by_others(now_ns, bushd::api::Stop{}); }
   void daemon_gone(TimeNs now_ns, bool power);
   void daemon_paused(TimeNs until_ns);
   // Time passes at the other ends.

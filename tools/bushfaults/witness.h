@@ -297,7 +297,7 @@ class Witness {
   }
   void module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted, bool on_line);
   void module_ended(TimeNs now_ns, Motor& motor, const End& end, bool whole);
-  void check_program(TimeNs now_ns, const Motor& motor);
+  void check_program(TimeNs now_ns, const Motor& motor, TimeNs floor_ns);
   bool is_of_module(const Motor& motor) const {
     return motor.move && std::get<1>(*motor.move) == Crates::kBushd2Client;
   }

@@ -118,24 +118,34 @@ void Witness::module_ended(TimeNs now_ns, Motor& motor, const End& end, bool who
   const bool reached = end.word == "reached";
   const bool on_line = asked_.at(*motor.move).request.line;
   ++moves_by_result_[(on_line ? "camac streamed " : "camac ") + end.word];
-  if (reached && whole) check_program(now_ns, motor);
+  const std::size_t of = index_of(motor);
+  const bool approach = units_.backlash_steps(of) != 0;
+  const Request& request = asked_.at(*motor.move).request;
+  if (reached && whole) {
+    check_program(now_ns, motor, approach ? units_.approach_floor_ns(of, request) : 0);
+  }
   crates_.motion_ended(reached);
   motor.move.reset();
 }
 
-// From its first step to its last it has taken the time of its codes. Ticks are emitted up to 1/64
-// faster or slower while an MCU is brought into step, each of the two steps is up to a tick off,
-// and the last one may be late by one more (sim/pace.h).
-void Witness::check_program(TimeNs now_ns, const Motor& motor) {
+// From its first step to its last it has taken the time of its codes, of which none is shorter than
+// the floor, rounded up to a code. Ticks are emitted up to 1/64 faster or slower while an MCU is
+// brought into step, each of the two steps is up to a tick off, and the last one may be late by one
+// more (sim/pace.h).
+void Witness::check_program(TimeNs now_ns, const Motor& motor, TimeNs floor_ns) {
   if (!program_ || std::abs(program_->steps) < 2) return;
   const TimeNs tick_ns = config_.buses.front().tick_ns();
-  const TimeNs due_ns = program_->first_to_last_ns;
+  TimeNs due_ns = 0;
+  TimeNs rounding_ns = 0;
+  for (const TimeNs delay_ns : program_->delays_ns) {
+    due_ns += std::max(delay_ns, floor_ns);
+    if (delay_ns < floor_ns) rounding_ns += program_->unit_ns;
+  }
   const TimeNs took_ns =
       plant_.last_step_ns(motor.mcu, motor.output) - plant_.first_step_ns(motor.mcu, motor.output);
   const TimeNs drift_ns = due_ns / 63;
-  if (took_ns >= due_ns - drift_ns - 2 * tick_ns && took_ns <= due_ns + drift_ns + 3 * tick_ns) {
-    return;
-  }
+  const TimeNs latest_ns = due_ns + rounding_ns + drift_ns + 3 * tick_ns;
+  if (took_ns >= due_ns - drift_ns - 2 * tick_ns && took_ns <= latest_ns) return;
   violated(now_ns, fmt::format("{} made {} steps of a program in {} us, not in {}", motor.name,
                                program_->steps, took_ns / 1000, due_ns / 1000));
 }
