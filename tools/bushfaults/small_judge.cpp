@@ -264,10 +264,12 @@ void SmallJudge::asked(TimeNs now_ns, std::int64_t number, const api::Request& r
 void SmallJudge::asked_by_others(TimeNs now_ns, const api::Request& request) {
   const auto* stop = std::get_if<api::Stop>(&request);
   const auto* pause = std::get_if<api::Pause>(&request);
+  const auto* hold = std::get_if<api::Hold>(&request);
   const auto* resume = std::get_if<api::Resume>(&request);
   const bool emergency = std::holds_alternative<api::EmergencyStop>(request);
   const api::MotorNames* names = stop != nullptr     ? &stop->motors
                                  : pause != nullptr  ? &pause->motors
+                                 : hold != nullptr   ? &hold->motors
                                  : resume != nullptr ? &resume->motors
                                                      : nullptr;
   if (names == nullptr && !emergency) return;
