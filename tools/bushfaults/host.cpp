@@ -232,18 +232,18 @@ bushd::api::Asker Host::carry_out(const bushd::api::Asker& asker,
     if (const auto own = small_->hear(now_ns_, asker, request)) return *own;
   }
   const auto asked = witness_.promise().carried_out(asker.session->client_id(), asker.number);
-  if (!asked ||
-      packet_of(*asked).payload !=
-          bushd::lcm::encode(asked->sent_us, asked->id(), request).value().payload) {
+  if (!asked || packet_of(*asked).payload !=
+                    bushd::lcm::encode(asked->sent_us, asked->id(), request).value().payload) {
     witness_.violated(now_ns_,
                       fmt::format("carried out, and was not to be: {} #{}: {}",
                                   asker.session->client_id(), asker.number, name_of(request)));
     return asker;
   }
   witness_.carried_out(now_ns_, *asked);
-  return {.session = std::make_shared<Overhearing>(*this, asker, key_of(asked->id()), request.index()),
-          .number = asker.number,
-          .after_stops = asker.after_stops};
+  return {
+      .session = std::make_shared<Overhearing>(*this, asker, key_of(asked->id()), request.index()),
+      .number = asker.number,
+      .after_stops = asker.after_stops};
 }
 
 void Host::hear(const std::optional<bushd::lcm::DaemonMessage>& message) {

@@ -57,14 +57,7 @@ class Promise {
 
   // What is to become of a request that arrives. kElsewhere: of a stop that these numbers do not
   // tell from its repetitions.
-  enum class Duty {
-    kCarryOut,
-    kAnswerAgain,
-    kOtherRequest,
-    kTooOld,
-    kUnknownSession,
-    kElsewhere
-  };
+  enum class Duty { kCarryOut, kAnswerAgain, kOtherRequest, kTooOld, kUnknownSession, kElsewhere };
   struct Numbers {
     std::optional<std::int64_t> highest{};
     std::map<std::int64_t, std::size_t> seen{};  // of the newest kNumbers: index in api::Request
@@ -109,7 +102,7 @@ class Promise {
   std::map<std::pair<std::string, std::int64_t>, std::int64_t> by_hello_;
   std::map<BookKey, Numbers> books_;  // of stops that their session does not know of
   std::list<BookKey> books_used_;     // longest silent first
-  std::list<std::int64_t> idle_;  // longest silent first
+  std::list<std::int64_t> idle_;      // longest silent first
   std::list<std::int64_t> used_;
   std::set<std::int64_t> ever_;  // sessions of all daemons
   struct GivenHello {

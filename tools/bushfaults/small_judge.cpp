@@ -317,7 +317,8 @@ void SmallJudge::replied(TimeNs now_ns, std::int64_t number, const api::Reply& r
     // What was stopped before it began has a result alone.
     const bool lone = open.is_motion && open.text != "jog" && !open.accepted;
     if (lone && result.outcome != api::Outcome::kStopped) {
-      violated_(now_ns, fmt::format("{} before it was accepted: {}", word(result.outcome), open.text));
+      violated_(now_ns,
+                fmt::format("{} before it was accepted: {}", word(result.outcome), open.text));
     }
     if (open.is_motion) ++results_[std::string(word(result.outcome))];
     completed(now_ns, open, result);

@@ -115,8 +115,8 @@ class SmallJudge final : public bushd::sim::EdgeSink {
     bool homes = false;
     TimeNs excused_ns = 0;
     TimeNs keys_ns = -1;
-    TimeNs caused_ns = 0;          // by a request, if none is open
-    std::uint64_t touched_by = 0;  // the latest request for it, counting all
+    TimeNs caused_ns = 0;                // by a request, if none is open
+    std::uint64_t touched_by = 0;        // the latest request for it, counting all
     std::optional<TimeNs> stopped_ns{};  // by others
     std::uint32_t unseen = 0;
     int open = 0;
