@@ -187,7 +187,9 @@ void HomingQueue::add(Task task) {
 // With a store as soon as that knows of the motion, and once its drivers are enabled: step(). There
 // one ends as well that may not begin any more.
 void HomingQueue::begin(Mcu& mcu) {
+  if (queues_[mcu.id].empty()) return;
   Task& task = queues_[mcu.id].front();
+  if (task.phase != Phase::kWaiting) return;  // it has begun as the next of a sequence
   const bool ends = !may_begin(task.motor) || !task.ended_by.empty();
   if (kept_.keeps() || !idle_drivers_.none() || ends) return;
   task.phase = Phase::kHoming;
@@ -283,17 +285,16 @@ void HomingQueue::move_on(std::int64_t now_us, Mcu& mcu) {
 
 // Its part of the request has ended with that move.
 void HomingQueue::follow_moving_on(Mcu& mcu) {
-  const Task& task = queues_[mcu.id].front();
+  const Task task = queues_[mcu.id].front();
   const motion::Motor& motor = installation_[task.motor];
   if (motor.has_plan() && (motor.axis().stopping() || motor.target_steps() == task.then_steps)) {
     return;
   }
   const bool reached = !motor.has_plan() && motor.position_steps() == task.then_steps;
-  const MotorId id = task.motor;
   queues_[mcu.id].pop_front();
-  follow_sequence(id, reached,
+  follow_sequence(task.motor, reached,
                   "it was homed, and did not reach " + motor.coordinates().text(task.then_steps));
-  if (!queues_[mcu.id].empty()) begin(mcu);
+  begin(mcu);
 }
 
 void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
@@ -302,7 +303,7 @@ void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   outputs_.log(outcome == Outcome::kReached ? LogLevel::kInfo : LogLevel::kWarning, id,
                installation_[id].name() + ": " + reason);
   ended(id, outcome, reason);
-  if (!queues_[mcu.id].empty() && queues_[mcu.id].front().phase == Phase::kWaiting) begin(mcu);
+  begin(mcu);
 }
 
 void HomingQueue::ended(MotorId id, Outcome outcome, const std::string& reason) {
@@ -387,9 +388,7 @@ bool HomingQueue::end_if_waiting(MotorId id, const std::string& because) {
   const bool first = task == queue.begin();
   queue.erase(task);
   ended(id, Outcome::kStopped, because);
-  if (first && !queue.empty() && queue.front().phase == Phase::kWaiting) {
-    begin(installation_.mcu_of(id));
-  }
+  if (first) begin(installation_.mcu_of(id));
   return true;
 }
 

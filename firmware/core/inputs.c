@@ -78,8 +78,9 @@ void bushd_mcu_watch_inputs(bushd_mcu* mcu) {
   watch_current(mcu, next);
 }
 
-void bushd_mcu_clear_faults(bushd_mcu* mcu) {
-  mcu->faults &= BUSHD_FAULT_SELF_TEST;
+void bushd_mcu_clear_faults(bushd_mcu* mcu, uint8_t faults) {
+  const uint8_t others = faults == 0 ? 0 : (uint8_t)~faults;
+  mcu->faults &= (uint8_t)(others | BUSHD_FAULT_SELF_TEST);
   // What has caused one may be there still.
   watch_emergency(mcu, mcu->port.read_inputs(mcu->port.context), bushd_mcu_first_open(mcu));
   watch_current(mcu, bushd_mcu_first_open(mcu));

@@ -94,7 +94,8 @@ static uint32_t capabilities_of(const bushd_mcu* mcu) {
   uint32_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
                  BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
-                 BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL;
+                 BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL |
+                 BUSHD_CAN_CLEAR_NAMED;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   if (mcu->port.set_current != NULL) all |= BUSHD_CAN_CURRENTS;
   if (mcu->config.velocity_motors != 0) all |= BUSHD_CAN_VELOCITY;
@@ -148,7 +149,7 @@ static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
   const uint8_t at_rest_only =
       BUSHD_CONTROL_DISABLE | BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES;
   if ((message->actions & at_rest_only) != 0 && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
-  if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) bushd_mcu_clear_faults(mcu);
+  if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) bushd_mcu_clear_faults(mcu, message->faults);
   if (message->actions & BUSHD_CONTROL_FORGET_TABLES) bushd_mcu_forget_tables(mcu);
   if (message->actions & BUSHD_CONTROL_DISABLE) bushd_mcu_set_enable(mcu, false);
   if (message->actions & BUSHD_CONTROL_ENABLE) {

@@ -239,16 +239,21 @@ bushd_status bushd_decode_assign(const uint8_t* payload, size_t size, bushd_assi
 
 size_t bushd_encode_control(const bushd_control* message, uint8_t* payload) {
   payload[0] = message->actions;
-  return 1;
+  payload[1] = message->faults;
+  return message->faults == 0 ? 1 : 2;
 }
 
 bushd_status bushd_decode_control(const uint8_t* payload, size_t size, bushd_control* message) {
   reader r = read_from(payload, size);
   message->actions = get8(&r);
+  const bool named = size > 1;
+  message->faults = named ? get8(&r) : 0;
   const uint8_t both = BUSHD_CONTROL_ENABLE | BUSHD_CONTROL_DISABLE;
   return finish(
       &r, message->actions <= (both | BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES) &&
-              (message->actions & both) != both);
+              (message->actions & both) != both &&
+              (!named ||
+               (message->faults != 0 && (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0)));
 }
 
 size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload) {

@@ -47,7 +47,8 @@ enum {
 #define BUSHD_CAN_CURRENTS UINT32_C(0x8000)
 #define BUSHD_CAN_VELOCITY UINT32_C(0x10000)
 #define BUSHD_CAN_KEYPAD UINT32_C(0x20000)
-#define BUSHD_CAN_SCRATCH UINT32_C(0x40000)  // has BUSHD_SCRATCH_SLOT
+#define BUSHD_CAN_SCRATCH UINT32_C(0x40000)      // has BUSHD_SCRATCH_SLOT
+#define BUSHD_CAN_CLEAR_NAMED UINT32_C(0x80000)  // bushd_control.faults
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
 // which one it is.
@@ -152,6 +153,7 @@ enum {
 };
 typedef struct bushd_control {
   uint8_t actions;
+  uint8_t faults;  // BUSHD_FAULT_*: which ones CLEAR_FAULTS is for; 0: all
 } bushd_control;
 
 typedef struct bushd_set_position {

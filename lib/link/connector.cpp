@@ -58,7 +58,7 @@ bool Connector::reconfigure(McuIndex mcu, McuSetup setup) {
   record.view.detail = "being configured";
   record.poll_wanted = true;
   links_[mcu].setup_written = false;
-  links_[mcu].queue.clear();
+  links_[mcu].queue.discard_setup();
   links_[mcu].scratch.clear();
   return true;
 }
@@ -73,7 +73,21 @@ void Connector::control(McuIndex mcu, std::uint8_t actions) {
   if (actions & BUSHD_CONTROL_ENABLE) links_[mcu].powered = true;
   if (actions & BUSHD_CONTROL_DISABLE) links_[mcu].powered = false;
   if (actions & BUSHD_CONTROL_CLEAR_FAULTS) links_[mcu].clearing = true;
-  links_[mcu].queue.control(actions);
+  add_control(mcu, actions);
+}
+
+// What has come up since the last report, or comes while this is on its way, nobody has seen: it
+// is not cleared with the rest.
+void Connector::add_control(McuIndex mcu, std::uint8_t actions) {
+  const McuView& view = mcus_[mcu].view;
+  bushd_control message{.actions = actions, .faults = 0};
+  if ((actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0 &&
+      (view.identity.capabilities & BUSHD_CAN_CLEAR_NAMED) != 0) {
+    message.faults = view.report.faults;
+    if (view.bound_by_stop) message.faults |= BUSHD_FAULT_EMERGENCY;
+    if (message.faults == 0) message.actions ^= BUSHD_CONTROL_CLEAR_FAULTS;
+  }
+  links_[mcu].queue.control(message);
 }
 
 void Connector::emergency_stop(bushd_stop_mode mode) {
@@ -281,7 +295,7 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
   SetupQueue& queue = links_[mcu].queue;
   if (!queue.done(BUSHD_MSG_TABLES)) return;
   if (!holds_its_tables(mcu, held)) {
-    queue.control(BUSHD_CONTROL_FORGET_TABLES);
+    queue.control({.actions = BUSHD_CONTROL_FORGET_TABLES, .faults = 0});
     for (std::uint8_t slot = 0; slot < record.setup.tables.size(); ++slot) {
       queue.upload_table(slot, record.setup.tables[slot]);
     }
@@ -290,7 +304,7 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
     if (const auto slot = record.setup.table_of_motor[m]) queue.assign(m, *slot);
   }
   tell_local(mcu);
-  queue.control(first_actions(mcu, may_clear));
+  add_control(mcu, first_actions(mcu, may_clear));
 }
 
 std::uint8_t Connector::first_actions(McuIndex mcu, bool may_clear) const {
@@ -315,8 +329,9 @@ void Connector::acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t typ
   }
   links_[mcu].queue.done(type);
   record.poll_wanted = links_[mcu].queue.empty();
+  record.answered = true;
   if (status == BUSHD_OK) return;
-  if (record.view.phase == McuPhase::kOnline) {
+  if (record.view.phase == McuPhase::kOnline || !SetupQueue::may_be_setup(type)) {
     listener_.refused(mcu, type, status);
     return;
   }

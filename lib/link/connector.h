@@ -114,6 +114,7 @@ class Connector {
   void write_setup(McuIndex mcu);
   bool holds_its_tables(McuIndex mcu, const bushd_tables& held) const;
   std::uint8_t first_actions(McuIndex mcu, bool may_clear) const;
+  void add_control(McuIndex mcu, std::uint8_t actions);
   void note_power(McuIndex mcu);
   void tell_local(McuIndex mcu);
 

@@ -35,8 +35,14 @@ PerMcu<McuRecord> records_of(const BusSetup& setup) {
 }
 
 // The MCU takes the number that it has for the same frame again.
-std::uint8_t next_trigger_number(const bushd_report& report) {
-  return static_cast<std::uint8_t>(report.trigger_number % 255 + 1);
+// The MCU takes the last number that it was given for the same frame again, whether it has reported
+// it or not.
+std::uint8_t next_trigger_number(McuRecord& mcu) {
+  std::uint8_t& number = mcu.trigger_number;
+  do {
+    number = static_cast<std::uint8_t>(number % 255 + 1);
+  } while (number == mcu.view.report.trigger_number);
+  return number;
 }
 
 }  // namespace
@@ -233,7 +239,7 @@ std::optional<BusSnapshot> Master::snapshot(std::int64_t now_us) const {
 
 std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                          std::span<const Armed> moves) {
-  const McuRecord& record = mcus_[mcu];
+  McuRecord& record = mcus_[mcu];
   std::vector<bushd_table_run_entry> entries;
   for (const Armed& move : moves) {
     entries.push_back(
@@ -241,7 +247,7 @@ std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
   }
   std::sort(entries.begin(), entries.end(),
             [](const auto& a, const auto& b) { return a.motor < b.motor; });
-  const std::uint8_t number = next_trigger_number(record.view.report);
+  const std::uint8_t number = next_trigger_number(record);
   connector_.queue(mcu).arm(number, edge, delay_us, entries);
   return number;
 }
@@ -253,7 +259,7 @@ std::uint8_t Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay
     entries.push_back({motor, static_cast<std::int8_t>(run.direction), run.increment});
   }
   std::ranges::sort(entries, {}, &bushd_line_entry::motor);
-  const std::uint8_t number = next_trigger_number(mcus_[mcu].view.report);
+  const std::uint8_t number = next_trigger_number(mcus_[mcu]);
   connector_.queue(mcu).arm_line({.number = number,
                                   .edge = edge,
                                   .delay_us = delay_us,
@@ -263,7 +269,7 @@ std::uint8_t Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay
 }
 
 std::uint8_t Master::travel(McuIndex mcu, bushd_travel message) {
-  message.number = next_trigger_number(mcus_[mcu].view.report);
+  message.number = next_trigger_number(mcus_[mcu]);
   connector_.queue(mcu).travel(message);
   return message.number;
 }

@@ -60,7 +60,7 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   const BusHealth& bus_health() const override { return transactions_.health(); }
   void reset_low_water() override;
   bool busy(McuIndex mcu) const override {
-    return !connector_.queue(mcu).empty() || mcus_[mcu].poll_wanted;
+    return !connector_.queue(mcu).empty() || mcus_[mcu].poll_wanted || mcus_[mcu].answered;
   }
   bool streams() const override { return true; }
   // By this master or by an MCU.

@@ -86,6 +86,7 @@ void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answ
   }
   view.report = report;
   view.reported = true;
+  mcu.answered = false;
   view.outdated_us = 0;
   poller_.follow_report(index);
   connector_.follow_stop(index);

@@ -99,7 +99,7 @@ void Poller::follow_report(McuIndex mcu) {
 
 void Poller::went_offline(McuIndex mcu) {
   polled_[mcu].missed_replies = 0;
-  mcus_[mcu].poll_wanted = false;
+  mcus_[mcu].poll_wanted = mcus_[mcu].answered = false;
 }
 
 }  // namespace bushd::link

@@ -18,6 +18,26 @@ bool SetupQueue::done(std::uint8_t type) {
   return true;
 }
 
+bool SetupQueue::may_be_setup(std::uint8_t type) {
+  switch (type) {
+    case BUSHD_MSG_SET_POSITION:
+    case BUSHD_MSG_HOME:
+    case BUSHD_MSG_TRAVEL:
+    case BUSHD_MSG_TRIGGER:
+    case BUSHD_MSG_LINE_TRIGGER:
+    case BUSHD_MSG_POSITION_COMPARE:
+      return false;
+    default:
+      return true;
+  }
+}
+
+void SetupQueue::discard_setup() {
+  std::erase_if(requests_, [](const Request& request) {
+    return may_be_setup(request.type) && request.type != BUSHD_MSG_CONTROL;
+  });
+}
+
 void SetupQueue::configure(const bushd_configure& message) {
   add(BUSHD_MSG_CONFIGURE, [&](std::uint8_t* p) { return bushd_encode_configure(&message, p); });
 }
@@ -82,14 +102,14 @@ void SetupQueue::assign(std::uint8_t motor, std::uint8_t slot) {
   add(BUSHD_MSG_ASSIGN, [&](std::uint8_t* p) { return bushd_encode_assign(&message, p); });
 }
 
-void SetupQueue::control(std::uint8_t actions) {
-  const bushd_control message = {actions};
+void SetupQueue::control(const bushd_control& message) {
   add(BUSHD_MSG_CONTROL, [&](std::uint8_t* p) { return bushd_encode_control(&message, p); });
 }
 
 void SetupQueue::discard_clearing() {
   for (Request& request : requests_) {
     if (request.type != BUSHD_MSG_CONTROL) continue;
+    request.payload.resize(1);  // without the faults
     request.payload[0] &= static_cast<std::uint8_t>(~BUSHD_CONTROL_CLEAR_FAULTS);
   }
 }

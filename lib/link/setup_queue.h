@@ -24,6 +24,11 @@ class SetupQueue {
   bool empty() const { return requests_.empty(); }
   const Request& front() const { return requests_.front(); }
   void clear() { requests_.clear(); }
+  // Another setup follows, which says all that this one would have. What was asked otherwise stays;
+  // so does CONTROL, which may be either, and does no harm twice.
+  void discard_setup();
+  // Whether a setup has such requests, among others.
+  static bool may_be_setup(std::uint8_t type);
   // The first request has been answered, if it is of this type. Returns false if it is not.
   bool done(std::uint8_t type);
 
@@ -39,7 +44,7 @@ class SetupQueue {
   void upload_table(std::uint8_t slot, const TableRef& ref);
   void assign(std::uint8_t motor, std::uint8_t slot);
 
-  void control(std::uint8_t actions);
+  void control(const bushd_control& message);
   // What was asked before an emergency stop must not clear it.
   void discard_clearing();
   void set_position(std::uint8_t motor, std::int32_t position_steps);

@@ -175,7 +175,7 @@ TEST_P(Faults, AnEmergencyStopIsTheSame) {
     expect_alike(BUSHD_FAULT_EMERGENCY, before, before + (how == BUSHD_STOP_IMMEDIATE ? 2 : 8));
     for (const std::uint8_t address : {kVirtual, kReal}) {
       ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
+                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}),
                 BUSHD_OK);
     }
   }

@@ -191,8 +191,9 @@ TEST_P(Nvm, ABitThatHasFlippedIsAFault) {
   EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
   EXPECT_EQ(master_.valid_tables(kAddress), 0u);
   // It is mended when there is something to keep again.
-  ASSERT_EQ(ask(BUSHD_MSG_CONTROL, bushd_encode_control, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
-            BUSHD_OK);
+  ASSERT_EQ(
+      ask(BUSHD_MSG_CONTROL, bushd_encode_control, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}),
+      BUSHD_OK);
   ASSERT_NO_FATAL_FAILURE(make_ready());
   pass(real_->keeps_within_ns(kCodes));
   reboot();

@@ -172,6 +172,20 @@ TEST(MotorSettings, OfTheVelocityLoopAreToldToTheMcu) {
   EXPECT_GT(press(), 300) << "by its table";
 }
 
+// Whatever the MCU has been asked by then.
+TEST(MotorSettings, ThatTheMcuKeepsLeavePositionsThatAreBeingSet) {
+  for (int ms = 0; ms <= 20; ++ms) {
+    SCOPED_TRACE(std::to_string(ms) + " ms");
+    SettingsLab lab(blade("offset = 10\nlocal = true\n"));
+    const auto set = lab.send(Ask::kSetPosition, {"m02"}, {77});
+    lab.run_for(ms * 1e-3);
+    lab.expect_done("m01", "velocity", "100,1500,500");
+    const Answer answer = lab.wait(set);
+    EXPECT_EQ(answer.result, "done") << answer.reason;
+    EXPECT_EQ(lab.motor("m02").position_steps, 77);
+  }
+}
+
 TEST(MotorSettings, OfWhoMovesAMotorAreToldToTheMcu) {
   SettingsLab lab;
   EXPECT_EQ(lab.show("m01").size(), 3u) << "nobody needs to be told";

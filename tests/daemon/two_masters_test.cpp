@@ -31,7 +31,7 @@ class OtherMaster {
          bushd_encode_sync(&sync, payload.data()));
   }
   void forget_tables() {
-    const bushd_control control{.actions = BUSHD_CONTROL_FORGET_TABLES};
+    const bushd_control control{.actions = BUSHD_CONTROL_FORGET_TABLES, .faults = 0};
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload{};
     const std::size_t size = bushd_encode_control(&control, payload.data());
     // Whatever the sequence of the daemon is, one of these is not behind it.

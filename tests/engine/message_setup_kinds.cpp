@@ -96,12 +96,18 @@ Kinds setup_kinds() {
         codec(bushd_decode_assign, bushd_encode_assign),
         {{"motor 16", set8(0, 16)}, {"slot 8", set8(1, 8)}}}},
       {"control",
-       {bytes_with(
-            1, [](Bytes* p) { (*p)[0] = *rc::gen::element<uint8_t>(0, 1, 2, 4, 5, 6, 8, 9, 14); }),
+       {bytes_with(2,
+                   [](Bytes* p) {
+                     (*p)[0] = *rc::gen::element<uint8_t>(4, 5, 6, 12, 14);
+                     (*p)[1] = between<uint8_t>(1, 255);
+                   }),
         codec(bushd_decode_control, bushd_encode_control),
         {{"enable and disable", set8(0, 3)},
          {"both and clear", set8(0, 7)},
-         {"unknown", set8(0, 16)}}}},
+         {"unknown", set8(0, 20)},
+         {"no fault", set8(1, 0)},
+         {"faults that are not cleared", set8(0, 1)}},
+        true}},
       {"set_position",
        {bytes_with(5, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 15); }),
         codec(bushd_decode_set_position, bushd_encode_set_position),

@@ -104,6 +104,19 @@ TEST(MessageTicks, RefusesTheFineDisplacementWithoutACounterpart) {
   EXPECT_EQ(bushd_decode_ticks(payload.data(), size + 4, &ticks), BUSHD_E_FORMAT);
 }
 
+TEST(MessageControl, MayLeaveOutTheFaults) {
+  const auto again = codec(bushd_decode_control, bushd_encode_control);
+  for (unsigned actions = 0; actions <= UINT8_MAX; ++actions) {
+    const Bytes payload{static_cast<uint8_t>(actions)};
+    Bytes encoded;
+    const bool both = (actions & 3) == 3;
+    ASSERT_EQ(again(payload, &encoded), actions < 16 && !both ? BUSHD_OK : BUSHD_E_FORMAT);
+    if (!encoded.empty()) {
+      EXPECT_EQ(encoded, payload);
+    }
+  }
+}
+
 TEST(MessageTableTicks, RefusesMotorsThatDoNotRise) {
   holds("an order of motors is taken if it rises", [] {
     const std::vector<bushd_table_ticks_entry> entries{{between<uint8_t>(0, 15), any_run_state()},

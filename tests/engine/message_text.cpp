@@ -86,6 +86,7 @@ void put(const bushd_assign& m, Fields& f) {
 }
 void put(const bushd_control& m, Fields& f) {
   f.add("actions", m.actions);
+  if (m.faults != 0) f.add("faults", m.faults);
 }
 void put(const bushd_set_position& m, Fields& f) {
   f.add("motor", m.motor).add("position_steps", m.position_steps);

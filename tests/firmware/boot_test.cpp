@@ -59,7 +59,8 @@ TEST(Boot, IdentitySaysWhatThePortGave) {
                 BUSHD_CAN_LINE_RUN | BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_TRIGGER |
                 BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST | BUSHD_CAN_COMMON_DIR |
                 BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES | BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_TRAVEL |
-                BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH);
+                BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH |
+                BUSHD_CAN_CLEAR_NAMED);
   EXPECT_TRUE(std::ranges::equal(identity.unique_id, Rig::unique_id()));
 }
 
@@ -176,10 +177,11 @@ TEST(Boot, ValuesOutOfRangeAreRefused) {
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {3}), BUSHD_E_FORMAT) << "enable and disable";
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {16}), BUSHD_E_FORMAT);
   EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {}), BUSHD_E_LENGTH);
+  EXPECT_EQ(rig.request(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_CLEAR_FAULTS, 0}), BUSHD_E_FORMAT);
   EXPECT_EQ(rig.set_position(4, 0), BUSHD_E_FORMAT) << "four motors: 0..3";
   EXPECT_EQ(rig.request(0x11, {}), BUSHD_E_LENGTH);
   EXPECT_EQ(rig.request(0x7F, {1, 2, 3}), BUSHD_E_UNKNOWN_MESSAGE);
-  EXPECT_EQ(rig.poll().rejected_frames, 9);
+  EXPECT_EQ(rig.poll().rejected_frames, 10);
   EXPECT_EQ(rig.poll().flags, 0) << "nothing of it had an effect";
 }
 

@@ -360,6 +360,21 @@ TEST_P(SystemInputs, TheEmergencyInputIsLatchedAndClearedWhenItIsReleased) {
   EXPECT_EQ(on->pulses(0), 5);
 }
 
+TEST_P(SystemInputs, TheEmergencyInputIsClearedOnlyByItsName) {
+  const auto on = with({.emergency = BUSHD_EMERGENCY_INPUT_RAMP});
+  on->emergency(BUSHD_STOP_RAMP);
+  on->pins({0, BUSHD_INPUT_EMERGENCY});
+  on->pass();
+  on->pins(kNothing);
+  on->pass();
+  EXPECT_EQ(on->poll().faults, BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT);
+  EXPECT_EQ(on->clear(BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_LINK), BUSHD_OK);
+  EXPECT_EQ(on->poll().faults, BUSHD_FAULT_EMERGENCY_INPUT);
+  EXPECT_EQ(start(*on, 5), BUSHD_E_STATE);
+  EXPECT_EQ(on->clear(BUSHD_FAULT_EMERGENCY_INPUT), BUSHD_OK);
+  EXPECT_EQ(on->poll().faults, 0);
+}
+
 TEST_P(SystemInputs, TheEmergencyInputDoesNothingUnlessItIsToldTo) {
   const auto on = with({});
   ASSERT_EQ(start(*on, 50), BUSHD_OK);

@@ -400,6 +400,10 @@ bushd_status Rig::control(std::uint8_t actions) {
   return request(BUSHD_MSG_CONTROL, {actions});
 }
 
+bushd_status Rig::clear(std::uint8_t faults) {
+  return request(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_CLEAR_FAULTS, faults});
+}
+
 bushd_status Rig::emission(const bushd_emission& message) {
   return request(BUSHD_MSG_EMISSION,
                  payload_of([&](std::uint8_t* p) { return bushd_encode_emission(&message, p); }));

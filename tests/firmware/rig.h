@@ -126,6 +126,7 @@ class Rig {
   bushd_status upload(std::uint8_t slot, const Law& law);
   bushd_status assign(std::uint8_t motor, std::uint8_t slot);
   bushd_status control(std::uint8_t actions);
+  bushd_status clear(std::uint8_t faults);
   bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
   bushd_status emission(const bushd_emission& message);
   bushd_tables tables();

@@ -362,7 +362,8 @@ class Bus {
       mcu->enabled = true;
     }
     if (frame.type == BUSHD_MSG_CONTROL && (frame.payload[0] & BUSHD_CONTROL_CLEAR_FAULTS) != 0) {
-      mcu->stopped = false;
+      const bool named = frame.payload_size > 1;
+      if (!named || (frame.payload[1] & BUSHD_FAULT_EMERGENCY) != 0) mcu->stopped = false;
     }
   }
 
@@ -375,7 +376,7 @@ class Bus {
                                        .slots = 128,
                                        .queue_ticks = 64,
                                        .table_codes = 100,
-                                       .capabilities = UINT16_MAX,
+                                       .capabilities = UINT16_MAX | BUSHD_CAN_CLEAR_NAMED,
                                        .unique_id = {awaited_->addresses.front()}};
       return bushd_encode_identity(&identity, payload);
     }

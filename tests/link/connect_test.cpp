@@ -1,4 +1,6 @@
 // From an open port to an MCU that takes moves, and everything that can be in the way.
+#include <set>
+
 #include <gmock/gmock.h>
 
 #include "link/slave.h"
@@ -37,6 +39,23 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
   EXPECT_NEAR(static_cast<double>(bus.master->tick_at(bus.now_us)), bus.tick(0), 1);
   EXPECT_EQ(bus.master->health(McuIndex{0}).timeouts, 0u);
   EXPECT_EQ(bus.master->bus_health().crc_errors, 0u);
+}
+
+TEST(Connect, ClearsTheFaultsThatItHasReadOf) {
+  for (const bool named : {false, true}) {
+    for (const std::uint8_t faults : Bytes{0, BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC}) {
+      SCOPED_TRACE(testing::Message() << "faults " << int{faults} << (named ? ", named" : ", all"));
+      FakeBus bus;
+      Slave& slave = bus.slaves[0];
+      if (named) slave.identity.capabilities |= BUSHD_CAN_CLEAR_NAMED;
+      slave.faults = faults;
+      bus.connect();
+      Bytes expected{BUSHD_CONTROL_ENABLE | BUSHD_CONTROL_CLEAR_FAULTS};
+      if (named) expected = faults == 0 ? Bytes{BUSHD_CONTROL_ENABLE} : Bytes{expected[0], faults};
+      EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONTROL).back().payload, expected);
+      EXPECT_EQ(slave.faults, 0);
+    }
+  }
 }
 
 // A switch may have gone from the configuration since the last time.
@@ -466,11 +485,24 @@ TEST(Connect, ControlAndPositionAreAskedForOnceAndSeen) {
   bus.master->control(McuIndex{0}, BUSHD_CONTROL_DISABLE);
   EXPECT_TRUE(bus.master->busy(McuIndex{0}));
   ASSERT_TRUE(bus.run_until([&] { return !bus.master->busy(McuIndex{0}); }));
-  bus.run_for(100'000);
   EXPECT_EQ(bus.master->view(McuIndex{0}).report.motor[2].position_steps, -77);
   EXPECT_EQ(bus.master->view(McuIndex{0}).report.flags & BUSHD_FLAG_ENABLED, 0);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_SET_POSITION).size(), 1u);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONTROL).size(), 1u);
+}
+
+// The MCU takes the last number for the same frame again.
+TEST(Connect, NoTriggerNumberIsGivenTwiceBeforeItIsReported) {
+  FakeBus bus;
+  bus.slaves[0].identity.capabilities |= BUSHD_CAN_TRIGGER | BUSHD_CAN_TRAVEL;
+  bus.connect();
+  std::set<std::uint8_t> given;
+  for (int i = 0; i < 3; ++i) {
+    given.insert(bus.master->arm(McuIndex{0}, BUSHD_EDGE_RISING, 50, {}));
+    given.insert(bus.master->travel(McuIndex{0}, {}));
+  }
+  EXPECT_EQ(given.size(), 6u);
+  EXPECT_EQ(given.count(0), 0u);
 }
 
 }  // namespace

@@ -280,10 +280,36 @@ TEST_F(Connecting, RefusalEndsTheSetupAndOfAnOnlineMcuIsOnlyTold) {
   EXPECT_TRUE(connector.queue(kFirst).empty());
   story.clear();
   mcus[kFirst].view.phase = McuPhase::kOnline;
-  connector.queue(kFirst).control(BUSHD_CONTROL_ENABLE);
+  connector.queue(kFirst).control({.actions = BUSHD_CONTROL_ENABLE, .faults = 0});
   connector.acknowledged(0, kFirst, BUSHD_MSG_CONTROL, BUSHD_E_STATE);
   EXPECT_EQ(story, "refused ");
   EXPECT_TRUE(connector.queue(kFirst).empty());
+}
+
+// What others have asked of it is not lost when it gets another setup, and comes before that.
+TEST_F(Connecting, ReconfiguringKeepsWhatElseWasAsked) {
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  connector.queue(kFirst).inputs({});
+  connector.queue(kFirst).set_position(2, -77);
+  connector.queue(kFirst).position_compare({});
+  connector.control(kFirst, BUSHD_CONTROL_DISABLE);
+  ASSERT_TRUE(connector.reconfigure(kFirst, mcus[kFirst].setup));
+  connector.follow_report(0, kFirst, true);
+  auto requests = setup_requests();
+  requests.resize(7);
+  EXPECT_THAT(requests,
+              ElementsAre(BUSHD_MSG_SET_POSITION, BUSHD_MSG_POSITION_COMPARE, BUSHD_MSG_CONTROL,
+                          BUSHD_MSG_CONFIGURE, BUSHD_MSG_EMISSION, BUSHD_MSG_INPUTS,
+                          BUSHD_MSG_TABLES));
+}
+
+TEST_F(Connecting, ARefusalOfWhatElseWasAskedIsNoneOfTheSetup) {
+  mcus[kFirst].view.phase = McuPhase::kOnline;
+  connector.queue(kFirst).set_position(2, -77);
+  ASSERT_TRUE(connector.reconfigure(kFirst, mcus[kFirst].setup));
+  connector.acknowledged(0, kFirst, BUSHD_MSG_SET_POSITION, BUSHD_E_STATE);
+  EXPECT_EQ(story, "refused ");
+  EXPECT_EQ(mcus[kFirst].view.phase, McuPhase::kConnecting);
 }
 
 TEST_F(Connecting, UnsentClearingIsDiscardedByAnEmergencyStop) {

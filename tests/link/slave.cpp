@@ -198,7 +198,9 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
       if (p[0] & BUSHD_CONTROL_ENABLE) slave.flags |= BUSHD_FLAG_ENABLED;
       if (p[0] & BUSHD_CONTROL_DISABLE)
         slave.flags &= static_cast<std::uint8_t>(~BUSHD_FLAG_ENABLED);
-      if (p[0] & BUSHD_CONTROL_CLEAR_FAULTS) slave.faults = 0;
+      if (p[0] & BUSHD_CONTROL_CLEAR_FAULTS) {
+        slave.faults &= static_cast<std::uint8_t>(p.size() > 1 ? ~p[1] : 0);
+      }
       if (p[0] & BUSHD_CONTROL_FORGET_TABLES) {
         slave.tables.clear();
         slave.held.clear();

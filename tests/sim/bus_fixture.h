@@ -213,7 +213,7 @@ class Master {
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
       const std::uint8_t address = bus_.node(i).address();
       ASSERT_EQ(acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
-                             bushd_control{BUSHD_CONTROL_ENABLE}),
+                             bushd_control{BUSHD_CONTROL_ENABLE, 0}),
                 BUSHD_OK);
       ASSERT_EQ(poll(address).state, BUSHD_STATE_READY);
     }

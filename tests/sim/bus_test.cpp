@@ -240,7 +240,7 @@ TEST_F(TwoMcus, EnableShowsOnTheEnWire) {
   make_ready();
   const TimeNs before_ns = bus.now_ns();
   ASSERT_EQ(master.acknowledged(2, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                bushd_control{BUSHD_CONTROL_DISABLE}),
+                                bushd_control{BUSHD_CONTROL_DISABLE, 0}),
             BUSHD_OK);
   const auto falls = recorder.times(1, Signal::kEnable, 0, false);
   ASSERT_EQ(falls.size(), 1u);

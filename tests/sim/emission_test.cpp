@@ -249,7 +249,7 @@ TEST(EmissionOnPins, HoldCurrentIsOnOrOffAtRest) {
     EXPECT_EQ(levels_of(lab.recorder, 1).back().second, hold ? 1 : 0);
     // Without EN nothing holds.
     ASSERT_EQ(lab.master.acknowledged(1, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                      bushd_control{BUSHD_CONTROL_DISABLE}),
+                                      bushd_control{BUSHD_CONTROL_DISABLE, 0}),
               BUSHD_OK);
     lab.bus.advance_to(lab.bus.now_ns() + 10'000'000);
     if (hold) {

@@ -199,7 +199,7 @@ class RandomStreams : public testing::Test {
               BUSHD_OK);
     ASSERT_EQ(master_.acknowledged(
                   kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                  bushd_control{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES}),
+                  bushd_control{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES, 0}),
               BUSHD_OK);
     const bushd_format format = random_.one_in(2) ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, format));

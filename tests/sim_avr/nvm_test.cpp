@@ -44,7 +44,7 @@ TEST_F(AvrNvm, APowerCutLeavesAllOrAFault) {
       EXPECT_EQ(report.failed_tests, BUSHD_TEST_EEPROM);
       EXPECT_EQ(master_.valid_tables(kAddress), 0u);
       EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS}),
+                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}),
                 BUSHD_OK);
     } else {
       EXPECT_EQ(kept_crc, 0u) << "what was kept is gone";

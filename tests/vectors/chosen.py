@@ -93,6 +93,7 @@ FRAMES = [
     (3, 4, "table_end", {"slot": 2, "crc": 0xCBF43926}),
     (1, 5, "assign", {"motor": 15, "slot": 7}),
     (1, 6, "control", {"actions": 5}),
+    (1, 6, "control", {"actions": 12, "faults": 0x86}),
     (1, 7, "set_position", {"motor": 0, "position_steps": -310}),
     (0, 41, "sync", {"master": 4660, "sync_id": 1, "follows": 0, "follow_up_id": 0, "sync_tick": 0, "sync_ns": 0}),
     (0, 42, "sync", {"master": 4660, "sync_id": 66051, "follows": 1, "follow_up_id": 66050, "sync_tick": 100000,

@@ -9,7 +9,7 @@ LAYOUTS = {
     "table_data": (0x04, [("slot", 1), ("offset", 2), ("count", 1), ("codes", [2])]),
     "table_end": (0x05, [("slot", 1), ("crc", 4)]),
     "assign": (0x06, [("motor", 1), ("slot", 1)]),
-    "control": (0x07, [("actions", 1)]),
+    "control": (0x07, [("actions", 1), ("faults", "optional")]),
     "set_position": (0x08, [("motor", 1), ("position_steps", -4)]),
     "poll": (0x09, [("count", 1), ("entries", [1, 2])]),
     "sync": (0x0A, [("master", 2), ("sync_id", 4), ("follows", 1), ("follow_up_id", 4), ("sync_tick", 4), ("sync_ns", 4)]),
@@ -91,6 +91,9 @@ ENTRIES = {"run_state": run_state_bytes, "table_run": table_run_bytes, "line": l
 def payload_of(layout, fields):
     out = b""
     for name, width in layout:
+        if width == "optional":
+            out += bytes([fields[name]]) if name in fields else b""
+            continue
         value = fields[name]
         if isinstance(width, int):
             out += value.to_bytes(abs(width), "little", signed=width < 0)

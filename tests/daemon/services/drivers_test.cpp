@@ -13,12 +13,44 @@ using test::LiveBench;
 using testing::HasSubstr;
 
 struct DriversBench : LiveBench {
-  DriversBench() { connect(drivers); }
+  explicit DriversBench(const std::string& toml = test::hall(2, 2)) : LiveBench(toml) {
+    connect(drivers);
+  }
   Drivers drivers{installation, interlocks, emergency_stop};
   bool enabled(const std::string& motor) {
     return (report_of(motor).flags & BUSHD_FLAG_ENABLED) != 0;
   }
 };
+
+// People clear what they have been told of. An input that is pressed meanwhile is no part of it.
+TEST(Drivers, ClearTheFaultsThatWereReported) {
+  for (std::int64_t ms = -30; ms <= 20; ++ms) {
+    SCOPED_TRACE(std::to_string(ms) + " ms after it was asked for");
+    DriversBench bench(test::hall_with_emergency_input());
+    bench.emergency_stop.request(bench.now_us(), bench.asker(1), {});
+    EXPECT_EQ(bench.result(1).outcome, api::Outcome::kDone);
+    bench.run_for(0.1);
+    const std::int64_t asked_us = bench.now_us() + 40'000;
+    bool asked = false;
+    bool was_told = false;
+    const auto run_to = [&](std::int64_t until_us) {
+      bench.run_until([&] {
+        if (bench.now_us() >= asked_us && !std::exchange(asked, true)) {
+          was_told = (bench.report_of("m01").faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0;
+          bench.drivers.request(bench.now_us(), bench.asker(2), api::ClearFaults{});
+        }
+        return bench.now_us() >= until_us;
+      });
+    };
+    run_to(asked_us + ms * 1000);
+    bench.line.mcu(0).set_inputs({0, BUSHD_INPUT_EMERGENCY});
+    run_to(bench.now_us() + 6000);
+    bench.line.mcu(0).set_inputs({0, 0});
+    run_to(std::max(bench.now_us(), asked_us) + 1'000'000);
+    EXPECT_TRUE(bench.is_completed(2));
+    ASSERT_EQ(bench.report_of("m01").faults, was_told ? 0 : BUSHD_FAULT_EMERGENCY_INPUT);
+  }
+}
 
 TEST(Drivers, AreDisabledAndEnabledByMcu) {
   DriversBench bench;

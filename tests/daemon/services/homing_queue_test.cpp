@@ -25,13 +25,27 @@ std::string homes() {
 }
 
 struct HomingBench : LiveBench {
-  HomingBench() : LiveBench(homes()) {
+  // `on_its_own`: homing has its steps, and nobody stops it.
+  explicit HomingBench(const std::string& toml = homes(), bool on_its_own = false)
+      : LiveBench(toml) {
     for (std::size_t output = 0; output < 2; ++output) {
       line.mcu(0).attach_switch(output, {.at_steps = -150});
     }
-    connect(stops);
+    connect(on_its_own ? static_cast<Service&>(homing) : stops);
+  }
+  void send(BusId bus, std::span<const std::uint8_t> bytes) override {
+    for (const std::uint8_t byte : bytes) {
+      bushd_frame frame;
+      if (bushd_receive_byte(&sent_, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
+      homes_asked += frame.type == BUSHD_MSG_HOME;
+    }
+    LiveBench::send(bus, bytes);
   }
   Stops stops{installation, moves, homing, travels, local_inputs, open_moves};
+  int homes_asked = 0;
+
+ private:
+  bushd_receiver sent_{};
 };
 
 TEST(HomingQueue, MotorsOfAnMcuAreHomedOneAfterTheOther) {
@@ -45,6 +59,19 @@ TEST(HomingQueue, MotorsOfAnMcuAreHomedOneAfterTheOther) {
   EXPECT_EQ(result.outcome, api::Outcome::kReached) << result.reason;
   EXPECT_TRUE(bench.homing.empty());
   EXPECT_FALSE(bench.of("m02").uncertain_reason());
+}
+
+// The next of a sequence begins when the one before has moved on: its MCU is asked once.
+TEST(HomingQueue, EachMotorIsAskedForOnce) {
+  std::string toml = homes();
+  const std::string first = "position_steps = -50";
+  toml.replace(toml.find(first), first.size(), first + ", then = 20");
+  toml.replace(toml.rfind(first + ", most"), first.size(), first + ", order = 2");
+  HomingBench bench(toml, true);
+  bench.homing.request(bench.asker(1), api::Home{.all = true});
+  const api::Completed result = bench.result(1);
+  EXPECT_EQ(result.outcome, api::Outcome::kReached) << result.reason;
+  EXPECT_EQ(bench.homes_asked, 2);
 }
 
 TEST(HomingQueue, StopEndsIt) {
