@@ -110,15 +110,14 @@ bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message)
   // Its acknowledgement was lost.
   if (is_valid(mcu, message->slot)) return entry->crc == message->crc ? BUSHD_OK : BUSHD_E_CRC;
   if (count == 0 || entry->received != count) return BUSHD_E_STATE;
-  // A master may send it at any time, and the checks may take longer than a tick.
-  const bool scratch = message->slot == BUSHD_SCRATCH_SLOT;
-  if (scratch && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
+  // The checks may take longer than a tick, and people may have moved a motor since TABLE_BEGIN.
+  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   const uint32_t crc = bushd_table_crc32(&entry->table);
   if (crc != message->crc) return BUSHD_E_CRC;
   const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
   if (status != BUSHD_OK) return status;
   entry->crc = crc;
-  if (scratch) {
+  if (message->slot == BUSHD_SCRATCH_SLOT) {
     mcu->config.scratch->valid = true;
   } else {
     mcu->tables.valid |= slot_bit(message->slot);

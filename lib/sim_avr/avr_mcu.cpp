@@ -431,6 +431,20 @@ void AvrMcu::flip_eeprom_bit(std::uint16_t address, int bit) {
   avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &at);
 }
 
+void AvrMcu::wear_eeprom_byte(std::uint16_t address, std::uint8_t value) {
+  if (worn_.empty()) avr_register_io_write(avr_, kEecr, on_eeprom_control, this);
+  worn_[address] = value;
+  on_eeprom_control(avr_, kEecr, 0, this);
+}
+
+// simavr has written what it was to.
+void AvrMcu::on_eeprom_control(avr_t* avr, std::uint16_t, std::uint8_t, void* param) {
+  for (auto [address, value] : static_cast<AvrMcu*>(param)->worn_) {
+    avr_eeprom_desc_t at{&value, address, 1};
+    avr_ioctl(avr, AVR_IOCTL_EEPROM_SET, &at);
+  }
+}
+
 void AvrMcu::tear_eeprom_byte() {
   if ((avr_->data[kEecr] & kEerie) == 0) return;
   const auto address = static_cast<std::uint16_t>(avr_->data[kEear] | avr_->data[kEear + 1] << 8);

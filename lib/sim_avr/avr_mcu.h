@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -81,6 +82,8 @@ class AvrMcu final : public Mcu {
   void stop_ticks();  // the tick timer's interrupts are off
   void flip_flash_bit(std::uint32_t address, int bit);
   void flip_eeprom_bit(std::uint16_t address, int bit);
+  // Whatever is written to it from now on, it holds this.
+  void wear_eeprom_byte(std::uint16_t address, std::uint8_t value);
   // If the image is writing one. A write ends there, as if the power went: reset it next.
   void tear_eeprom_byte();
   void poke(std::uint16_t address, std::uint8_t value);  // in RAM
@@ -130,6 +133,7 @@ class AvrMcu final : public Mcu {
   static void on_adc(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_interrupt(avr_irq_t* irq, std::uint32_t value, void* param);
   static void on_reset(avr_io_t* io);
+  static void on_eeprom_control(avr_t* avr, std::uint16_t address, std::uint8_t value, void* param);
   static std::uint8_t read_shorted(avr_t* avr, std::uint16_t address, void* param);
 
   const AvrChip& chip_;
@@ -155,6 +159,7 @@ class AvrMcu final : public Mcu {
   };
   std::optional<Bit> stuck_;
   std::uint8_t shorted_ = 0;
+  std::map<std::uint16_t, std::uint8_t> worn_;  // of the EEPROM
   bool driver_enable_ = false;
   TimeNs byte_end_ns_ = 0;
   std::uint64_t interrupts_ = 0;

@@ -289,6 +289,21 @@ TEST_F(TableUpload, AllAreForgottenAtOnceAndTheirMemoryIsFree) {
   expect_runs_down_by(rig, 0, law);
 }
 
+// Its checks may take longer than a tick, and local motion begins when people want it.
+TEST_F(TableUpload, IsNotEndedWhileAMotorMoves) {
+  const Law law = flat_law(250, 20, 10);
+  ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
+  ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  ASSERT_EQ(rig.begin(1, law), BUSHD_OK);
+  ASSERT_EQ(rig.data(1, 0, codes_of(law)), BUSHD_OK);
+  const Plan plan = plan_move(law, 4, Rig::kTickNs, BUSHD_FORMAT_FINE);
+  ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+  EXPECT_EQ(rig.end(1, codes_of(law)), BUSHD_E_STATE);
+  EXPECT_FALSE(rig.tables().slot[1].valid);
+  rig.pass_until_rest();
+  EXPECT_EQ(rig.end(1, codes_of(law)), BUSHD_OK);
+}
+
 TEST_F(TableUpload, RefusedDuringARampDown) {
   const Law law = flat_law(250, 20, 10);
   ASSERT_EQ(rig.upload(0, law), BUSHD_OK);

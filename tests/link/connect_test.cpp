@@ -1,7 +1,7 @@
 // From an open port to an MCU that takes moves, and everything that can be in the way.
-#include <set>
-
 #include <gmock/gmock.h>
+
+#include <set>
 
 #include "link/slave.h"
 

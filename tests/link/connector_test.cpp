@@ -297,10 +297,9 @@ TEST_F(Connecting, ReconfiguringKeepsWhatElseWasAsked) {
   connector.follow_report(0, kFirst, true);
   auto requests = setup_requests();
   requests.resize(7);
-  EXPECT_THAT(requests,
-              ElementsAre(BUSHD_MSG_SET_POSITION, BUSHD_MSG_POSITION_COMPARE, BUSHD_MSG_CONTROL,
-                          BUSHD_MSG_CONFIGURE, BUSHD_MSG_EMISSION, BUSHD_MSG_INPUTS,
-                          BUSHD_MSG_TABLES));
+  EXPECT_THAT(requests, ElementsAre(BUSHD_MSG_SET_POSITION, BUSHD_MSG_POSITION_COMPARE,
+                                    BUSHD_MSG_CONTROL, BUSHD_MSG_CONFIGURE, BUSHD_MSG_EMISSION,
+                                    BUSHD_MSG_INPUTS, BUSHD_MSG_TABLES));
 }
 
 TEST_F(Connecting, ARefusalOfWhatElseWasAskedIsNoneOfTheSetup) {

@@ -106,7 +106,7 @@ TEST_F(AvrNvm, TablesThatAreForgottenMeanwhileLeaveTheRestAlone) {
       for (int ms = 0; ms < 3000 && avr_->eeprom_writes() < before + written; ++ms) pass(1'000'000);
     }
     ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                   bushd_control{BUSHD_CONTROL_FORGET_TABLES}),
+                                   bushd_control{BUSHD_CONTROL_FORGET_TABLES, 0}),
               BUSHD_OK);
     pass(1'000'000'000);
   }
@@ -115,6 +115,43 @@ TEST_F(AvrNvm, TablesThatAreForgottenMeanwhileLeaveTheRestAlone) {
   ASSERT_TRUE(reply);
   EXPECT_EQ(master_.poll(kAddress).faults, 0);
   EXPECT_EQ(avr_->boot_number(), 8);
+}
+
+// A cell of the EEPROM is good for 100000 writes (data sheet): drivers that are disabled at rest
+// would wear one out within weeks.
+TEST_F(AvrNvm, DriversThatSleepAndWakeWriteNothing) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  bushd_set_inputs inputs{};
+  inputs.enable_after_watchdog = true;
+  ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
+            BUSHD_OK);
+  pass(4'000'000'000);
+  const std::uint64_t before = avr_->eeprom_writes();
+  for (int i = 0; i < 20; ++i) {
+    for (const std::uint8_t action : {BUSHD_CONTROL_DISABLE, BUSHD_CONTROL_ENABLE}) {
+      ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
+                                     bushd_control{action, 0}),
+                BUSHD_OK);
+      pass(50'000'000);
+    }
+  }
+  EXPECT_EQ(avr_->eeprom_writes(), before);
+}
+
+// With the number of the boot before, counts of before it would be taken for known.
+TEST_F(AvrNvm, ABootNumberThatIsNotWrittenIsStillAnotherOne) {
+  avr_->wear_eeprom_byte(16, 3);
+  std::uint16_t before = master_.poll(kAddress).boot_number;
+  for (int boot = 0; boot < 4; ++boot) {
+    reboot();
+    const bushd_report report = master_.poll(kAddress);
+    EXPECT_NE(report.boot_number, before);
+    EXPECT_EQ(report.failed_tests, 0);
+    before = report.boot_number;
+  }
+  avr_->wear_eeprom_byte(14, 7);
+  reboot();
+  EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM) << "nothing counts any more";
 }
 
 TEST_F(AvrNvm, NothingIsWrittenWhileAMotorMoves) {

@@ -1,4 +1,5 @@
-; Before anything is in RAM, and with registers only: why the chip was reset, the watchdog off, RAM and flash tested.
+; Before anything is in RAM, and with registers only: why the chip was reset, the watchdog off, what RAM has kept, RAM and
+; flash tested.
 ; What came out is in BOOT_CAUSE and BOOT_FAULTS (boot_tests.h) until interrupts are let in.
 ;
 ; RAM: a march test of all of it,
@@ -58,6 +59,14 @@
     sts WDTCSR, r1
     out BOOT_FAULTS, r1
 
+    lds r18, enable_kept
+    lds r19, enable_kept + 1
+    cpi r18, lo8(BOOT_ENABLE_ON)
+    brne 1f
+    cpi r19, hi8(BOOT_ENABLE_ON)
+    brne 1f
+    sbi BOOT_FAULTS, BOOT_ENABLE_KEPT_BIT
+1:
     ldi XL, lo8(RAMSTART)
     ldi XH, hi8(RAMSTART)
     ldi r19, ZEROS

@@ -9,6 +9,10 @@
 #define BOOT_RAM_BAD 1
 #define BOOT_FLASH_BAD_BIT 1
 #define BOOT_FLASH_BAD 2
+// No fault: `enable_kept` was BOOT_ENABLE_ON, as RAM still had it.
+#define BOOT_ENABLE_KEPT_BIT 2
+#define BOOT_ENABLE_KEPT 4
+#define BOOT_ENABLE_ON 0x5A69
 
 #ifdef __ASSEMBLER__
 

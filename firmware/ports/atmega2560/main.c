@@ -152,7 +152,8 @@ __attribute__((noinline)) static void boot(void) {
                              .reply = line_reply(&mcu.receiver)};
   identity kept;
   config.reset_cause = reset_cause();
-  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && identity_enable_kept();
+  const bool enable_kept_on = (boot_faults() & BOOT_ENABLE_KEPT) != 0;
+  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept_on;
   const nvm_found found = nvm_find();
   const bool has_identity = identity_load(&kept, &config.boot_number);
   if (!has_identity || found == NVM_BROKEN) failed_tests |= BUSHD_TEST_EEPROM;
