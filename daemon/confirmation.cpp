@@ -27,11 +27,13 @@ std::optional<Result<void>> Confirmation::follow(std::int64_t now_us, const Mcu*
   return fail("MCU " + installation[awaited_.front()].name() + " did not confirm it in time");
 }
 
+api::Completed Confirmation::result_of(const Result<void>& ended, const std::string& done) {
+  if (ended) return {.outcome = api::Outcome::kDone, .reason = done, .detail = {}};
+  return {.outcome = api::Outcome::kFault, .reason = ended.error().text(), .detail = {}};
+}
+
 void Confirmation::answer(const Result<void>& ended, const std::string& done) const {
-  asker_.answer(ended ? api::Completed{.outcome = api::Outcome::kDone, .reason = done, .detail = {}}
-                      : api::Completed{.outcome = api::Outcome::kFault,
-                                       .reason = ended.error().text(),
-                                       .detail = {}});
+  asker_.answer(result_of(ended, done));
 }
 
 }  // namespace bushd::daemon

@@ -28,6 +28,7 @@ class Confirmation {
   std::optional<Result<void>> follow(std::int64_t now_us, const Mcu* reported,
                                      const Installation& installation, const Check& check);
   const api::Asker& asker() const { return asker_; }
+  static api::Completed result_of(const Result<void>& ended, const std::string& done = "done");
   // Tells who asked; `done` is the reason when all is well.
   void answer(const Result<void>& ended, const std::string& done = "done") const;
 

@@ -78,6 +78,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       [this](MotorId motor, const units::Coordinates& before, const api::Asker& by) {
         settings_.offset_set(motor, before, by);
       });
+  positions_.set_answerer([this](const api::Asker& asker, api::Completed done) {
+    kept_.answer_when_kept(asker, std::move(done));
+  });
   positions_.set_listener([this](MotorId motor, std::int64_t from_steps, const api::Asker& by) {
     kept_.past({.motor = installation_[motor].name(),
                 .what = "set",

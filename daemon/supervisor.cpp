@@ -127,7 +127,7 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
   for (const MotorId id : mcu.motors()) {
     motion::Motor& motor = installation_[id];
     if (!is_reported(mcu, motor)) continue;
-    journal_.before_report(id, positions_.being_set(id) || kept_.being_restored(id));
+    journal_.before_report(id, positions_.counter_being_set(id) || kept_.being_restored(id));
     moves_.take(
         now_us, id,
         motor.report({.of_mcu = mcu.report(),

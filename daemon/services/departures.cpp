@@ -50,10 +50,11 @@ std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& re
                  request);
   if (!found || found->empty() || !interlocks_.may_move()) return std::nullopt;
   const bool moves = !std::holds_alternative<api::SetPosition>(request);
+  // What is refused anyway leaves the disk alone.
   for (const MotorId motor : *found) {
-    if (moves ? !interlocks_.may_move(motor) : !installation_.mcu_of(motor).online()) {
-      return std::nullopt;
-    }
+    const bool may = moves ? interlocks_.may_move(motor) && !installation_[motor].uncertain_reason()
+                           : installation_.mcu_of(motor).online();
+    if (!may) return std::nullopt;
   }
   return *found;
 }

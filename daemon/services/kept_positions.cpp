@@ -86,7 +86,7 @@ Result<void> KeptPositions::may_be_confirmed(MotorId id) const {
   if (!motor.is<motion::Resting>()) {
     return fail(motor.busy_text() + "; its position can be confirmed at rest only");
   }
-  if (!being_restored(id) && !positions_.being_set(id)) return {};
+  if (!being_restored(id) && !positions_.counter_being_set(id)) return {};
   return fail(motor.name() + ": its position is being set; wait for that result");
 }
 
@@ -112,10 +112,40 @@ void KeptPositions::request(const api::Asker& asker, const api::Confirm& request
           .from_steps = motor.position_steps(),
           .to_steps = motor.position_steps(),
           .result = std::string(api::word(api::Outcome::kDone))});
+    keep_confirmed(id);
   }
   installation_.changed = true;
-  asker.answer(api::Completed{.outcome = api::Outcome::kDone, .reason = "done", .detail = {}});
+  answer_when_kept(asker, {.outcome = api::Outcome::kDone, .reason = "done", .detail = {}});
 }
+
+void KeptPositions::keep_confirmed(MotorId id) {
+  if (!keeper_) return;
+  const state::Record record = record_of(installation_.mcu_of(id), id);
+  // What is about to move does not stand any more.
+  if (motors_[id].wanted) return keeper_->moves(id, record);
+  keeper_->stands(id, record);
+}
+
+void KeptPositions::answer_when_kept(const api::Asker& asker, api::Completed done) {
+  if (!keeper_) return asker.answer(done);
+  open_.push_back({asker, std::move(done)});
+}
+
+void KeptPositions::answer_open() {
+  std::erase_if(open_, [this](Open& open) {
+    if (!open.number) open.number = keeper_->told();
+    const std::optional<std::string>& trouble = keeper_->trouble();
+    if (keeper_->kept_up_to() < *open.number && !trouble) return false;
+    if (trouble) {
+      if (required_) open.done.outcome = api::Outcome::kFault;
+      open.done.reason += "; that is not on the disk, and lost if bushd ends before it is: " +
+                          *trouble + "; the disk is tried again once a second";
+    }
+    open.asker.answer(open.done);
+    return true;
+  });
+}
+
 
 void KeptPositions::request(const api::Asker& asker, const api::GetHistory& request) {
   const auto motor = installation_.find(request.motor);
@@ -162,6 +192,7 @@ Result<bool> KeptPositions::make_ready(std::int64_t now_us, MotorId id) {
   Motor& motor = motors_[id];
   motor.wanted = true;
   if (motor.restoring) return false;
+  tell_counter(id);
   const auto wanted = keeper_->want_mark(now_us, id);
   if (wanted) return keeper_->marked(id);
   if (required_) {
@@ -171,6 +202,17 @@ Result<bool> KeptPositions::make_ready(std::int64_t now_us, MotorId id) {
   }
   keeper_->give_up_mark(id);
   return true;
+}
+
+// By which counter it moves, and how that is read, before it does.
+void KeptPositions::tell_counter(MotorId id) {
+  const Mcu& mcu = installation_.mcu_of(id);
+  if (!mcu.online()) return;
+  const state::Record now = record_of(mcu, id);
+  const std::optional<state::Record>& kept = keeper_->kept(id).record;
+  const bool told =
+      kept && state::same_counter(*kept, now) && kept->steps_per_unit == now.steps_per_unit;
+  if (!told) keeper_->moves(id, now);
 }
 
 void KeptPositions::past(state::PastMove move) {
@@ -186,7 +228,8 @@ void KeptPositions::past(state::PastMove move) {
 }
 
 bool KeptPositions::settled() const {
-  return !keeper_ || keeper_->trouble() || keeper_->kept_up_to() == keeper_->told();
+  if (!keeper_ || keeper_->trouble()) return true;
+  return open_.empty() && keeper_->kept_up_to() == keeper_->told();
 }
 
 void KeptPositions::goes_online(Mcu& mcu) {
@@ -203,25 +246,60 @@ void KeptPositions::goes_online(Mcu& mcu) {
   }
 }
 
-void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
-  motion::Motor& motor = installation_[id];
-  const config::Motor& config = installation_.config()[id];
+state::Seen KeptPositions::seen(const Mcu& mcu, MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  const Heard& heard = *mcus_[mcu.id].heard;
   const bool at_limit =
       has(mcu.report().forbidden_positive, motor) || has(mcu.report().forbidden_negative, motor);
+  auto before = keeper_->other_at(id, heard.unique_id, motor.output().value);
+  const std::optional<state::Record>& kept = keeper_->kept(id).record;
+  const state::Record* told = before ? &before->record : kept ? &*kept : nullptr;
+  const bool has_text = told != nullptr && told->steps_per_unit == scale_text(motor) &&
+                        motor.coordinates().has_unit();
+  std::string text = has_text ? motor.coordinates().text(told->steps) : std::string();
+  return {.mcu = mcu.name(),
+          .unique_id = heard.unique_id,
+          .boot_number = heard.boot_number,
+          .output = motor.output().value,
+          .steps_per_unit = scale_text(motor),
+          .steps = motor.position_steps(),
+          .before = std::move(before),
+          .position_text = std::move(text),
+          .local = installation_.drives()[id].moved_by_people(),
+          .may_have_overrun =
+              at_limit && installation_.config()[id].limit_action == BUSHD_STOP_IMMEDIATE};
+}
+
+void KeptPositions::note_unmoved(MotorId id, const state::Seen& seen,
+                                 const state::Verdict& verdict) {
+  std::optional<Unmoved>& unmoved = motors_[id].unmoved;
+  unmoved.reset();
+  if (verdict.trust != state::Trust::kUncertain) return;
+  const std::int64_t steps = verdict.set_steps.value_or(seen.steps);
+  const Unmoved now{.record = {}, .steps = steps, .reason = verdict.reason};
+  if (seen.before) {
+    unmoved = now;
+    return;
+  }
   const state::Kept& kept = keeper_->kept(id);
-  const bool same_scale = kept.record && kept.record->steps_per_unit == scale_text(motor);
-  state::Verdict verdict = state::on_connecting(
-      kept, {.mcu = mcu.name(),
-             .unique_id = mcus_[mcu.id].heard->unique_id,
-             .boot_number = mcus_[mcu.id].heard->boot_number,
-             .output = motor.output().value,
-             .steps_per_unit = scale_text(motor),
-             .steps = motor.position_steps(),
-             .position_text = same_scale && motor.coordinates().has_unit()
-                                  ? motor.coordinates().text(kept.record->steps)
-                                  : std::string(),
-             .local = installation_.drives()[id].moved_by_people(),
-             .may_have_overrun = at_limit && config.limit_action == BUSHD_STOP_IMMEDIATE});
+  if (!kept.record || kept.record->steps_per_unit == seen.steps_per_unit) return;
+  state::Seen as_before = seen;
+  as_before.steps_per_unit = kept.record->steps_per_unit;
+  const state::Verdict with_it = state::on_connecting(kept, as_before);
+  if (with_it.trust == state::Trust::kUncertain) return;
+  unmoved = now;
+  unmoved->record = kept.record;
+  unmoved->record->trust = with_it.trust;
+  unmoved->record->reason = with_it.reason;
+  unmoved->record->boot_number = seen.boot_number;
+  unmoved->record->steps = steps;
+}
+
+void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
+  motion::Motor& motor = installation_[id];
+  const state::Seen seen = this->seen(mcu, id);
+  state::Verdict verdict = state::on_connecting(keeper_->kept(id), seen);
+  note_unmoved(id, seen, verdict);
   // What the MCU itself reports of before this daemon.
   if (first && motor.uncertain_reason() && verdict.trust != state::Trust::kUncertain) {
     verdict.trust = state::Trust::kUncertain;
@@ -254,7 +332,27 @@ void KeptPositions::take(MotorId id, const state::Verdict& verdict) {
   installation_.changed = true;
 }
 
+// What people may have read of its motion last, and confirm.
+void KeptPositions::keep_heard(const Mcu& mcu) {
+  const std::optional<Heard>& heard = mcus_[mcu.id].heard;
+  if (!keeper_ || !heard) return;
+  for (const MotorId id : mcu.motors()) {
+    const std::optional<state::Record>& kept = keeper_->kept(id).record;
+    if (!kept || being_restored(id) || positions_.counter_being_set(id)) continue;
+    const motion::Motor& motor = installation_[id];
+    state::Record record = *kept;
+    record.steps = motor.position_steps();
+    record.utime_us = motor.trust({}).heard_utime_us.value_or(outputs_.wall_clock_us());
+    const bool is_its_own =
+        state::same_counter(record, {.unique_id = heard->unique_id,
+                                     .output = motor.output().value}) &&
+        record.boot_number == heard->boot_number;
+    if (is_its_own && record.steps != kept->steps) keeper_->moves(id, std::move(record));
+  }
+}
+
 void KeptPositions::goes_offline(Mcu& mcu, const std::string&) {
+  keep_heard(mcu);
   for (const MotorId id : mcu.motors()) {
     // It begins again when the MCU is back.
     if (!std::exchange(motors_[id].restoring, std::nullopt)) continue;
@@ -304,19 +402,34 @@ void KeptPositions::step(std::int64_t now_us) {
   }
   keeper_->step(now_us);
   tell_trouble();
+  answer_open();
 }
 
 void KeptPositions::keep(std::int64_t now_us, const Mcu& mcu, MotorId id) {
   const motion::Motor& motor = installation_[id];
   Motor& own = motors_[id];
-  if (own.wanted || positions_.being_set(id)) return;
+  if (own.wanted || positions_.counter_being_set(id)) return;
   const bushd_report& report = mcu.report();
   const bool in_motion = has(report.moving, motor) || has(report.autonomous, motor) ||
                          has(report.armed, motor) || !motor.is<motion::Resting>();
-  if (!in_motion) return keeper_->stands(id, record_of(mcu, id));
+  if (!in_motion) return keep_at_rest(mcu, id);
+  own.unmoved.reset();
   if (now_us - own.seen_us < kSeenPeriodUs) return;
   own.seen_us = now_us;
   keeper_->moves(id, record_of(mcu, id));
+}
+
+void KeptPositions::keep_at_rest(const Mcu& mcu, MotorId id) {
+  std::optional<Unmoved>& unmoved = motors_[id].unmoved;
+  state::Record record = record_of(mcu, id);
+  const bool as_before = unmoved && record.steps == unmoved->steps &&
+                         installation_[id].uncertain_reason() == unmoved->reason;
+  if (!as_before) {
+    unmoved.reset();
+    keeper_->stands(id, std::move(record));
+  } else if (unmoved->record) {
+    keeper_->stands(id, *unmoved->record);
+  }
 }
 
 state::Record KeptPositions::record_of(const Mcu& mcu, MotorId id) const {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <optional>
 #include <string>
@@ -54,6 +55,9 @@ class KeptPositions final : public Service {
   std::uint64_t told() const { return keeper_ ? keeper_->told() : 0; }
   std::uint64_t kept_up_to() const { return keeper_ ? keeper_->kept_up_to() : 0; }
   std::optional<std::string> trouble() const { return keeper_ ? keeper_->trouble() : std::nullopt; }
+  // Tells that it is done when the disk has all that it is about, as far as this has been told by
+  // the end of the next step. If the disk fails, that is said.
+  void answer_when_kept(const api::Asker& asker, api::Completed done);
   // For the history. Says who asked, and where from; how people see both is added where it is not
   // told.
   void past(state::PastMove move);
@@ -74,8 +78,16 @@ class KeptPositions final : public Service {
     std::int64_t steps;
     std::string reason;  // of what is restored, for the log
   };
+  // Its name at this output, or its steps_per_unit, is another one now. What the disk has stays so
+  // until it is moved, set or confirmed, so that the change can be taken back.
+  struct Unmoved {
+    std::optional<state::Record> record;  // of its own, as it was; none: that of the name before
+    std::int64_t steps;
+    std::string reason;  // why it is uncertain meanwhile
+  };
   struct Motor {
     bool wanted = false;  // a motion is about to begin
+    std::optional<Unmoved> unmoved{};
     std::optional<Restoring> restoring{};
     std::int64_t seen_us = 0;  // when its motion was kept last
   };
@@ -86,10 +98,17 @@ class KeptPositions final : public Service {
     bool operator==(const Heard&) const = default;
   };
   void connect(Mcu& mcu, MotorId id, bool first);
+  state::Seen seen(const Mcu& mcu, MotorId id) const;
+  void note_unmoved(MotorId id, const state::Seen& seen, const state::Verdict& verdict);
   void take(MotorId id, const state::Verdict& verdict);
   void follow_restoring(const Mcu& mcu, MotorId id);
   void keep(std::int64_t now_us, const Mcu& mcu, MotorId id);
+  void keep_at_rest(const Mcu& mcu, MotorId id);
   state::Record record_of(const Mcu& mcu, MotorId id) const;
+  void keep_confirmed(MotorId id);
+  void tell_counter(MotorId id);
+  void keep_heard(const Mcu& mcu);
+  void answer_open();
   void tell_trouble();
   Result<void> may_be_confirmed(MotorId id) const;
 
@@ -110,6 +129,13 @@ class KeptPositions final : public Service {
   };
   ById<McuId, OfMcu> mcus_;
   std::optional<std::string> told_trouble_;
+  // Done, and not yet on the disk.
+  struct Open {
+    api::Asker asker;
+    api::Completed done;
+    std::optional<std::uint64_t> number{};  // of told()
+  };
+  std::list<Open> open_;
 };
 
 }  // namespace bushd::daemon

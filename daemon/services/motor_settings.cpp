@@ -15,6 +15,18 @@ std::string assignment(SettingKey key, const std::string& value) {
   return std::string(config::name_of(key)) + " = " + value;
 }
 
+// The file has not been edited since. A key that was written with its default value is one that
+// was left out no more.
+bool is_as_replaced(const config::Settings& in_file, SettingKey key, const std::string& replaces) {
+  const std::string begin = assignment(key, "");
+  const bool is_line = replaces.starts_with(begin);
+  const bool written = in_file.written[static_cast<std::size_t>(key)];
+  if (replaces.empty() || (is_line && !written)) return replaces.empty() && !written;
+  const auto replaced =
+      config::with(in_file, key, is_line ? replaces.substr(begin.size()) : replaces);
+  return replaced && config::text_of(*replaced, key) == config::text_of(in_file, key);
+}
+
 }  // namespace
 
 MotorSettings::MotorSettings(Installation& installation, const Positions& positions,
@@ -191,7 +203,8 @@ void MotorSettings::keep(MotorId id) {
     const std::string in_file = config::text_of(in_file_[id], key);
     all.erase(std::string(config::name_of(key)));
     if (value == in_file) continue;
-    all[std::string(config::name_of(key))] = {.value = value, .replaces = in_file};
+    all[std::string(config::name_of(key))] = {.value = value,
+                                              .replaces = config::line_of(in_file_[id], key)};
   }
   kept_.keep(id, std::move(all));
 }
@@ -212,8 +225,7 @@ void MotorSettings::take_kept(MotorId id, SettingKey key, const state::Setting& 
   const motion::Motor& motor = installation_[id];
   const std::string in_file = config::text_of(in_file_[id], key);
   const std::string name(config::name_of(key));
-  const auto replaced = config::with(in_file_[id], key, kept.replaces);
-  if (!replaced || config::text_of(*replaced, key) != in_file) {
+  if (!is_as_replaced(in_file_[id], key, kept.replaces)) {
     outputs_.log(LogLevel::kInfo, id,
                  motor.name() + ": bushd.toml was edited: " + assignment(key, in_file) +
                      " counts, not " + kept.value + ", which was set in operation");

@@ -6,7 +6,6 @@
 #include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
-namespace {}  // namespace
 
 Positions::Positions(Installation& installation, Interlocks& interlocks, Journal& journal,
                      Outputs& outputs)
@@ -19,6 +18,13 @@ Positions::Positions(Installation& installation, Interlocks& interlocks, Journal
 }
 
 bool Positions::being_set(MotorId motor) const {
+  return counter_being_set(motor) || std::ranges::any_of(open_, [motor](const Setting& setting) {
+           return std::ranges::find(setting.offsets, motor, &Offset::motor) !=
+                  setting.offsets.end();
+         });
+}
+
+bool Positions::counter_being_set(MotorId motor) const {
   return std::ranges::any_of(open_, [motor](const Setting& setting) {
     return std::ranges::find(setting.parts, motor, &Part::motor) != setting.parts.end();
   });
@@ -28,20 +34,16 @@ void Positions::request(std::int64_t now_us, const api::Asker& asker,
                         const api::SetPosition& request) {
   auto plan = plan_of(request);
   if (!plan) return asker.answer(api::Refused{plan.error().text()});
-  for (Offset& offset : plan->offsets) {
-    const units::Coordinates before = installation_[offset.motor].coordinates();
-    installation_[offset.motor].set_coordinates(std::move(offset.coordinates));
-    journal_.offset_set(offset.motor, asker);
-    if (offset_listener_) offset_listener_(offset.motor, before, asker);
-    installation_.changed = true;
-  }
   std::vector<MotorId> motors;
   for (const Part& part : plan->parts) motors.push_back(part.motor);
-  open_.push_back({Confirmation(asker, installation_.mcus_of(motors), now_us), {}});
+  open_.push_back({Confirmation(asker, installation_.mcus_of(motors), now_us), {}, {}});
   for (const auto& [id, steps, from_steps] : plan->parts) {
     installation_.mcu_of(id).set_position(installation_[id].output(), steps);
   }
   open_.back().parts = std::move(plan->parts);
+  open_.back().offsets = std::move(plan->offsets);
+  // Offsets alone wait for nobody.
+  if (open_.back().parts.empty()) follow(now_us, nullptr);
 }
 
 Result<Positions::Plan> Positions::plan_of(const api::SetPosition& request) const {
@@ -99,41 +101,76 @@ Result<void> Positions::add(MotorId id, const api::Amount& position, bool dial, 
 }
 
 void Positions::follow(std::int64_t now_us, const Mcu* reported) {
+  // All that have been asked are waited for: what each has done is judged in the end.
+  const auto any = [](const Mcu&) -> Result<void> { return {}; };
   for (auto it = open_.begin(); it != open_.end();) {
-    const auto check = [&](const Mcu& mcu) -> Result<void> {
-      for (const auto& [id, steps, from_steps] : it->parts) {
-        const motion::Motor& motor = installation_[id];
-        if (installation_.config()[id].mcu == mcu.id && motor.position_steps() != steps) {
-          return fail("did not take the position of " + motor.name());
-        }
-      }
-      return {};
-    };
-    const auto ended = it->confirmation.follow(now_us, reported, installation_, check);
-    if (!ended) {
+    const auto confirmed = it->confirmation.follow(now_us, reported, installation_, any);
+    if (!confirmed) {
       ++it;
       continue;
     }
-    const Setting finished = std::move(*it);
+    Setting finished = std::move(*it);
     it = open_.erase(it);
-    end(finished, *ended);
+    end(finished, *confirmed);
   }
 }
 
-void Positions::end(const Setting& setting, const Result<void>& ended) {
+bool Positions::is_set(const Setting& setting, const Part& part) const {
+  return !setting.confirmation.awaits(installation_.config()[part.motor].mcu) &&
+         installation_[part.motor].position_steps() == part.steps;
+}
+
+// Which half is done where not all of it is.
+Result<void> Positions::outcome(const Setting& setting, const Result<void>& confirmed) const {
+  std::string done;
+  std::string missing;
+  std::string why = confirmed ? std::string() : confirmed.error().text();
+  const auto add = [this](std::string& list, MotorId motor) {
+    list += (list.empty() ? "" : ", ") + installation_[motor].name();
+  };
   for (const Part& part : setting.parts) {
-    if (!ended) break;
-    motion::Motor& motor = installation_[part.motor];
-    motor.position_is_known();
-    const api::Asker& by = setting.confirmation.asker();
-    journal_.position_set(part.motor, part.from_steps, by);
-    if (listener_) listener_(part.motor, part.from_steps, by);
-    outputs_.log(LogLevel::kInfo, part.motor,
-                 motor.name() + ": position set to " + std::to_string(part.steps) + ", was " +
-                     std::to_string(part.from_steps) + ", by " + text_of(by));
+    const bool is_set = this->is_set(setting, part);
+    add(is_set ? done : missing, part.motor);
+    if (is_set || !why.empty()) continue;
+    why = "MCU " + installation_.mcu_of(part.motor).name() + " did not take the position of " +
+          installation_[part.motor].name();
+  }
+  if (missing.empty()) return {};
+  for (const Offset& offset : setting.offsets) add(missing, offset.motor);
+  return fail(why + "; set: " + (done.empty() ? "none" : done) + "; not set: " + missing);
+}
+
+void Positions::put(Offset& offset, const api::Asker& by) {
+  motion::Motor& motor = installation_[offset.motor];
+  const units::Coordinates before = motor.coordinates();
+  motor.set_coordinates(std::move(offset.coordinates));
+  journal_.offset_set(offset.motor, by);
+  if (offset_listener_) offset_listener_(offset.motor, before, by);
+}
+
+void Positions::note(const Part& part, const api::Asker& by) {
+  motion::Motor& motor = installation_[part.motor];
+  motor.position_is_known();
+  journal_.position_set(part.motor, part.from_steps, by);
+  if (listener_) listener_(part.motor, part.from_steps, by);
+  outputs_.log(LogLevel::kInfo, part.motor,
+               motor.name() + ": position set to " + std::to_string(part.steps) + ", was " +
+                   std::to_string(part.from_steps) + ", by " + text_of(by));
+}
+
+void Positions::end(Setting& setting, const Result<void>& confirmed) {
+  const api::Asker& by = setting.confirmation.asker();
+  const Result<void> outcome = this->outcome(setting, confirmed);
+  for (const Part& part : setting.parts) {
+    if (is_set(setting, part)) note(part, by);
+  }
+  if (outcome) {
+    for (Offset& offset : setting.offsets) put(offset, by);
   }
   installation_.changed = true;
-  setting.confirmation.answer(ended);
+  api::Completed answer = Confirmation::result_of(outcome);
+  if (answerer_) return answerer_(by, std::move(answer));
+  by.answer(answer);
 }
 
 }  // namespace bushd::daemon

@@ -28,8 +28,14 @@ class Positions final : public Service {
   using Listener = std::function<void(MotorId, std::int64_t from_steps, const api::Asker& by)>;
   void set_listener(Listener listener) { listener_ = std::move(listener); }
 
-  // Its MCU has not yet confirmed a position.
+  // Tells who asked, once what is to be kept of it is on the disk.
+  using Answerer = std::function<void(const api::Asker&, api::Completed)>;
+  void set_answerer(Answerer answerer) { answerer_ = std::move(answerer); }
+
+  // What was asked for is not yet done.
   bool being_set(MotorId motor) const;
+  // Likewise, and it is the MCU's counter.
+  bool counter_being_set(MotorId motor) const;
 
   void reports(std::int64_t now_us, Mcu& mcu) override { follow(now_us, &mcu); }
   void step(std::int64_t now_us) override { follow(now_us, nullptr); }
@@ -52,16 +58,22 @@ class Positions final : public Service {
   struct Setting {
     Confirmation confirmation;
     std::vector<Part> parts;
+    std::vector<Offset> offsets;  // once all of these are set
   };
   Result<Plan> plan_of(const api::SetPosition& request) const;
   Result<void> may_be_set(MotorId motor) const;
   Result<void> add(MotorId motor, const api::Amount& position, bool dial, Plan& plan) const;
   void follow(std::int64_t now_us, const Mcu* reported);
-  void end(const Setting& setting, const Result<void>& ended);
+  void end(Setting& setting, const Result<void>& confirmed);
+  bool is_set(const Setting& setting, const Part& part) const;
+  Result<void> outcome(const Setting& setting, const Result<void>& confirmed) const;
+  void put(Offset& offset, const api::Asker& by);
+  void note(const Part& part, const api::Asker& by);
 
   Installation& installation_;
   OffsetListener offset_listener_;
   Listener listener_;
+  Answerer answerer_;
   Journal& journal_;
   Outputs& outputs_;
   std::list<Setting> open_;

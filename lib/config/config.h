@@ -16,6 +16,7 @@
 #include "base/ids.h"
 #include "base/result.h"
 #include "config/drive.h"
+#include "config/setting.h"
 #include "engine/message.h"
 #include "fieldbus/emission_setup.h"
 #include "pseudo/curved_axis.h"
@@ -148,6 +149,7 @@ struct Motor {
   Drive drive{};
   bool has_one_input = false;  // that with the number of its output, which no other motor names
   bool never_disable = false;  // its MCU's drivers stay enabled at rest
+  WrittenKeys written{};       // which settings the file has, also where it has a default
 };
 
 // A box with keys on a serial line of its own, which jogs a motor.

@@ -402,6 +402,9 @@ Result<void> read_motors(Loading* loading) {
     const bool has_mcu = !config.mcus[mcu->value].stand_in;
     motor.has_one_input = has_mcu && motor.inputs.own && !reader.has("inputs");
     motor.drive.input_open = motor.has_one_input && motor.inputs.own->active_open;
+    for (std::size_t i = 0; i < kSettingKeys.size(); ++i) {
+      motor.written[i] = reader.has(name_of(kSettingKeys[i]));
+    }
     config.motors.push_back(std::move(motor));
   }
   for (Motor& motor : config.motors) {

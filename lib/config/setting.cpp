@@ -229,7 +229,8 @@ Settings settings_of(const Motor& motor, const Mcu& mcu) {
           .has_mcu = !mcu.stand_in,
           .max_speed = motor.max_speed.has_value(),
           .idle_disabled = mcu.idle_disable_s.has_value(),
-          .has_one_input = motor.has_one_input};
+          .has_one_input = motor.has_one_input,
+          .written = motor.written};
 }
 
 std::string_view name_of(SettingKey key) {
@@ -292,8 +293,14 @@ std::string text_of(const Settings& settings, SettingKey key) {
   return fmt::format("[{}, {}]", settings.soft_limits->low, settings.soft_limits->high);
 }
 
+std::string line_of(const Settings& settings, SettingKey key) {
+  if (!settings.written[static_cast<std::size_t>(key)]) return {};
+  return fmt::format("{} = {}", name_of(key), text_of(settings, key));
+}
+
 Result<Settings> with(Settings settings, SettingKey key, std::string_view text) {
   if (!applies(settings, key)) return fail(fmt::format("{}: {}", name_of(key), why_not(key)));
+  settings.written.set(static_cast<std::size_t>(key));
   if (key == SettingKey::kSoftLimits) return with_soft_limits(std::move(settings), text);
   if (key == SettingKey::kInputActive) return with_input_level(std::move(settings), text);
   if (key == SettingKey::kLocal || key == SettingKey::kKeypad) {

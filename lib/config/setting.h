@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -28,6 +29,9 @@ inline constexpr std::array kSettingKeys = {
     SettingKey::kOffset, SettingKey::kDirection, SettingKey::kSoftLimits, SettingKey::kInputActive,
     SettingKey::kLocal,  SettingKey::kKeypad,    SettingKey::kVelocity,   SettingKey::kCurrents};
 
+// By SettingKey.
+using WrittenKeys = std::bitset<kSettingKeys.size()>;
+
 std::string_view name_of(SettingKey key);  // as in bushd.toml
 std::optional<SettingKey> setting_key_of(std::string_view name);
 
@@ -43,6 +47,7 @@ struct Settings {
   bool idle_disabled = false;
   // It has one input, which no other motor uses: input_active may be changed.
   bool has_one_input = false;
+  WrittenKeys written{};  // what was left out has its default
 };
 struct Motor;
 struct Mcu;
@@ -59,7 +64,10 @@ bool is_reported(const Settings& settings, SettingKey key);
 // table of TOML, or "none". The same value has one text.
 std::string text_of(const Settings& settings, SettingKey key);
 
-// With another value. Beside the texts above, soft limits may come without brackets and blanks:
+// "offset = 12.5"; "" if it was left out.
+std::string line_of(const Settings& settings, SettingKey key);
+
+// With another value, written. Beside the texts above, soft limits may come without brackets and blanks:
 // "-5,30", and inline tables without names, in their order: "100,1500,500" and
 // "1500,1000,300,fast". Errors name key, value, cause and what is allowed, not the motor.
 Result<Settings> with(Settings settings, SettingKey key, std::string_view text);

@@ -56,7 +56,17 @@ ALTER TABLE move ADD COLUMN from_text TEXT NOT NULL DEFAULT '';
 ALTER TABLE move ADD COLUMN to_text TEXT NOT NULL DEFAULT '';
 )";
 
-constexpr std::array kVersions = {kVersion1, kVersion2};
+// An output is one motor's at a time: that which was written last.
+constexpr const char* kVersion3 = R"(
+UPDATE position SET unique_id = '', at_rest = 0, trust = 'uncertain',
+  reason = CASE trust WHEN 'uncertain' THEN reason
+    ELSE 'its output has become that of another motor; last known: ' || steps || ' steps' END
+  WHERE unique_id <> '' AND EXISTS (SELECT 1 FROM position AS newer
+    WHERE newer.unique_id = position.unique_id AND newer.output = position.output
+      AND newer.rowid > position.rowid);
+)";
+
+constexpr std::array kVersions = {kVersion1, kVersion2, kVersion3};
 constexpr std::array kTrust = {"unconfirmed", "known", "restored", "uncertain"};
 
 Trust trust_of(const std::string& word) {

@@ -1,6 +1,7 @@
 #include "state/keeper.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 namespace bushd::state {
@@ -29,13 +30,51 @@ Keeper::Keeper(const std::vector<std::string>& motors, const std::map<std::strin
     motor.ended = stood(motor.kept) ? motor.kept.motion : 0;
     // Nothing is known of its motions; the next one has another number in any case.
     if (!motor.kept.record) motor.ended = motor.kept.motion;
+    motor.record_on_disk = motor.kept.record;
     motors_.add(std::move(motor));
+  }
+  for (const auto& [name, of_name] : kept) {
+    if (!of_name.record || std::ranges::find(motors, name) != motors.end()) continue;
+    others_[name] = *of_name.record;
   }
 }
 
-bool Keeper::marked(MotorId id) const {
-  const Motor& motor = motors_[id];
+std::optional<Owner> Keeper::other_at(MotorId id, const std::string& unique_id,
+                                      std::uint8_t output) const {
+  const Record counter{.unique_id = unique_id, .output = output};
+  for (const Motor& motor : motors_) {
+    if (&motor == &motors_[id] || motor.present || !motor.kept.record) continue;
+    if (same_counter(*motor.kept.record, counter)) return Owner{motor.name, *motor.kept.record};
+  }
+  for (const auto& [name, record] : others_) {
+    if (same_counter(record, counter)) return Owner{name, record};
+  }
+  return std::nullopt;
+}
+
+bool Keeper::has_mark(const Motor& motor) {
   return motor.on_disk == motor.kept.motion && motor.ended < motor.kept.motion;
+}
+
+// The disk knows by which counter it moves, and how that is read: so a name that comes back there
+// later does not believe what it had.
+bool Keeper::has_counter(const Motor& motor) {
+  const auto& [told, there] = std::tie(motor.kept.record, motor.record_on_disk);
+  return !told || told->unique_id.empty() ||
+         (there && same_counter(*told, *there) &&
+                   told->steps_per_unit == there->steps_per_unit);
+}
+
+bool Keeper::marked(MotorId id) const {
+  return has_mark(motors_[id]) && has_counter(motors_[id]);
+}
+
+Result<void> Keeper::want_counter(std::int64_t now_us, Motor& motor) {
+  if (has_counter(motor)) return {};
+  if (!motor.record_wanted_us) motor.record_wanted_us = now_us;
+  if (now_us - *motor.record_wanted_us < kPatienceUs) return {};
+  return fail(trouble_.value_or("its position is not on the disk after " +
+                                std::to_string(kPatienceUs / 1'000'000) + " s"));
 }
 
 Result<void> Keeper::want_mark(std::int64_t now_us, MotorId id) {
@@ -48,6 +87,7 @@ Result<void> Keeper::want_mark(std::int64_t now_us, MotorId id) {
     }
     return {};
   }
+  if (auto counter = want_counter(now_us, motor); !counter || has_mark(motor)) return counter;
   if (motor.wanted_us) {
     if (now_us - *motor.wanted_us < kPatienceUs) return {};
     return fail("its moving mark is not on the disk after " +
@@ -72,6 +112,25 @@ bool Keeper::any_unguarded() const {
   return std::ranges::any_of(motors_, &Motor::unguarded);
 }
 
+// An output is one motor's at a time: a name that had it before does not find its old position there
+// when it comes back.
+void Keeper::take_output(Motor& motor, const Record& record) {
+  const bool has_it = motor.kept.record && same_counter(*motor.kept.record, record);
+  if (std::exchange(motor.present, true) && has_it) return;
+  if (record.unique_id.empty()) return;
+  const auto give_up = [&](const std::string& name, Record& of_name) {
+    if (!same_counter(of_name, record)) return;
+    give_up_output(of_name, motor.name);
+    pending_.records[name] = of_name;
+    ++told_;
+  };
+  for (Motor& other : motors_) {
+    // Two that are there have MCUs with the same unique id.
+    if (!other.present && other.kept.record) give_up(other.name, *other.kept.record);
+  }
+  for (auto& [name, of_name] : others_) give_up(name, of_name);
+}
+
 void Keeper::tell(Motor& motor, Record record) {
   ++told_;
   motor.kept.record = record;
@@ -80,6 +139,7 @@ void Keeper::tell(Motor& motor, Record record) {
 
 void Keeper::stands(MotorId id, Record record) {
   Motor& motor = motors_[id];
+  take_output(motor, record);
   record.at_rest = true;
   record.motion = motor.kept.motion;
   motor.kept.mark_lost = motor.unguarded;
@@ -90,6 +150,7 @@ void Keeper::stands(MotorId id, Record record) {
 
 void Keeper::moves(MotorId id, Record record) {
   Motor& motor = motors_[id];
+  take_output(motor, record);
   record.at_rest = false;
   record.motion = motor.kept.record ? motor.kept.record->motion : 0;
   if (motor.kept.record && same_but_time(*motor.kept.record, record)) return;
@@ -165,7 +226,10 @@ void Keeper::write(std::int64_t now_us, const Result<void>& done) {
     kept_up_to_ = writing_up_to_;
     for (Motor& motor : motors_) {
       const auto record = written.records.find(motor.name);
-      if (record != written.records.end() && record->second.at_rest) motor.unguarded = false;
+      if (record == written.records.end()) continue;
+      if (record->second.at_rest) motor.unguarded = false;
+      motor.record_on_disk = record->second;
+      if (has_counter(motor)) motor.record_wanted_us.reset();
     }
     return;
   }

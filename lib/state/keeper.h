@@ -18,6 +18,7 @@
 #include "base/ids.h"
 #include "base/result.h"
 #include "state/record.h"
+#include "state/rules.h"
 
 namespace bushd::state {
 
@@ -43,8 +44,12 @@ class Keeper {
 
   // As it is now, for the rules on connecting.
   const Kept& kept(MotorId motor) const { return motors_[motor].kept; }
+  // The motor, other than this one, whose position is the counter of this output.
+  std::optional<Owner> other_at(MotorId motor, const std::string& unique_id,
+                                std::uint8_t output) const;
 
-  // Whatever happens now, this motor does not look at rest when the power goes.
+  // Whatever happens now, this motor does not look at rest when the power goes, and no other motor
+  // has the counter that it moves by.
   bool marked(MotorId motor) const;
   // Makes it so, which takes a moment, or says why that does not come to pass.
   Result<void> want_mark(std::int64_t now_us, MotorId motor);
@@ -85,12 +90,20 @@ class Keeper {
     // Number of the last motion of whose end the disk may know.
     std::uint64_t ended = 0;
     bool unguarded = false;
+    bool present = false;  // told of, since this began
     std::optional<std::int64_t> wanted_us{};  // since when its mark is wanted and not there
+    std::optional<Record> record_on_disk{};
+    std::optional<std::int64_t> record_wanted_us{};  // since when it is, and of another counter
   };
+  static bool has_mark(const Motor& motor);
+  static bool has_counter(const Motor& motor);
+  Result<void> want_counter(std::int64_t now_us, Motor& motor);
   void tell(Motor& motor, Record record);
+  void take_output(Motor& motor, const Record& record);
 
   Backend& backend_;
   ById<MotorId, Motor> motors_;
+  std::map<std::string, Record> others_;  // of motors that are not configured now
   std::vector<MotorId> to_mark_;
   std::vector<std::pair<MotorId, std::uint64_t>> marking_;  // under way
   std::optional<std::string> mark_error_;

@@ -25,7 +25,7 @@ struct Record {
   Trust trust = Trust::kUnconfirmed;
   std::string reason{};  // of kUncertain
   std::int64_t utime_us = 0;
-  // Whose counter these steps are.
+  // Whose counter these steps are; "": of none.
   std::string unique_id{};
   std::uint16_t boot_number = 0;
   std::uint8_t output = 0;
@@ -35,10 +35,21 @@ struct Record {
   friend bool operator==(const Record&, const Record&) = default;
 };
 
+// A position belongs to an output of an MCU: to its counter of steps.
+inline bool same_counter(const Record& a, const Record& b) {
+  return a.unique_id == b.unique_id && a.output == b.output;
+}
+
+// Its output has become that of this motor: where it stands itself nobody knows any more. It has no
+// counter then.
+void give_up_output(Record& record, const std::string& to);
+
 // What was set in operation in place of a key of bushd.toml: it counts until that is edited.
 struct Setting {
   std::string value{};
-  std::string replaces{};  // as the file had it; "" if it had none
+  // Its line of the file, "offset = 0"; "" if it was left out. Of stores older than that, the value
+  // that counted, "0".
+  std::string replaces{};
   friend bool operator==(const Setting&, const Setting&) = default;
 };
 using Settings = std::map<std::string, Setting>;  // by key: offset, direction, soft_limits

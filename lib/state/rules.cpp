@@ -29,19 +29,19 @@ bool same_counter(const Record& record, const Seen& seen) {
 // Why this is not the counter that the steps were counted by, or not the motor that it counted for.
 std::optional<std::string> changed(const Record& record, const Seen& seen) {
   if (record.unique_id != seen.unique_id) {
-    return "MCU " + seen.mcu + " is another one now: its unique id is " + seen.unique_id +
-           ", not " + record.unique_id;
+    return "the MCU with unique id " + seen.unique_id + " has taken the place of that with " +
+           record.unique_id + " as MCU " + seen.mcu;
   }
   if (record.output != seen.output) {
-    return "it is at output " + std::to_string(seen.output) + " of MCU " + seen.mcu +
-           " now, not at " + std::to_string(record.output);
+    return "it was moved from output " + std::to_string(record.output) + " of MCU " + seen.mcu +
+           " to output " + std::to_string(seen.output);
   }
   if (record.steps_per_unit != seen.steps_per_unit) {
     const auto text = [](const std::string& scale) {
       return scale.empty() ? std::string("none") : scale;
     };
-    return "its steps_per_unit is " + text(seen.steps_per_unit) + " now, was " +
-           text(record.steps_per_unit);
+    return "its steps_per_unit was changed from " + text(record.steps_per_unit) + " to " +
+           text(seen.steps_per_unit);
   }
   return std::nullopt;
 }
@@ -58,7 +58,29 @@ std::optional<std::string> may_have_moved(const Kept& kept, const Seen& seen) {
   return std::nullopt;
 }
 
+// Nobody has ever said where a motor at this output stands: that is not known worse than before.
+Verdict on_new_name(const Kept& kept, const Seen& seen) {
+  const Owner& before = *seen.before;
+  Verdict verdict{};
+  if (before.record.boot_number != seen.boot_number) verdict.set_steps = before.record.steps;
+  if (before.record.trust == Trust::kUnconfirmed && !kept.record) return verdict;
+  verdict.trust = Trust::kUncertain;
+  verdict.reason = "output " + std::to_string(seen.output) + " of MCU " + seen.mcu +
+                   " was motor \"" + before.motor + "\" before" +
+                   last_known(before.record, seen);
+  return verdict;
+}
+
 }  // namespace
+
+void give_up_output(Record& record, const std::string& to) {
+  if (record.trust != Trust::kUncertain) {
+    record.reason = "its output has become that of motor \"" + to + "\"" + last_known(record, {});
+    record.trust = Trust::kUncertain;
+  }
+  record.unique_id.clear();
+  record.at_rest = false;
+}
 
 std::string time_text(std::int64_t utime_us) {
   const std::time_t seconds = static_cast<std::time_t>(utime_us / 1'000'000);
@@ -70,6 +92,7 @@ std::string time_text(std::int64_t utime_us) {
 }
 
 Verdict on_connecting(const Kept& kept, const Seen& seen) {
+  if (seen.before) return on_new_name(kept, seen);
   if (!kept.record) return {};
   const Record& record = *kept.record;
   const bool same_boot = same_counter(record, seen) && record.boot_number == seen.boot_number;

@@ -9,6 +9,12 @@
 
 namespace bushd::state {
 
+// A motor, and what is kept of it.
+struct Owner {
+  std::string motor{};
+  Record record{};
+};
+
 // What is seen of a motor when its MCU goes online.
 struct Seen {
   std::string mcu{};  // for texts
@@ -17,7 +23,10 @@ struct Seen {
   std::uint8_t output = 0;
   std::string steps_per_unit{};
   std::int64_t steps = 0;       // as the MCU counts them now
-  std::string position_text{};  // of the kept steps, in its unit; "" if there is none
+  // Whose position this output's counter was until now, if that was another motor.
+  std::optional<Owner> before{};
+  // Of the kept steps, or those of the motor before, in the motor's unit; "" if there is none.
+  std::string position_text{};
   bool local = false;           // people may have moved it unseen
   // It stands where a switch stops it immediately: nobody saw from which speed.
   bool may_have_overrun = false;
@@ -31,7 +40,9 @@ struct Verdict {
 };
 
 // Same MCU and boot: its counter counts. Booted anew: the motor stands where it stood, if it stood.
-// Everything else is uncertain, and the reason says what was known last, and when.
+// Everything else is uncertain, and the reason says what was known last, and when. An output that
+// was another motor's may have been given another name, or another cable: its counter goes on, and
+// people have to say whether it is this motor's position.
 Verdict on_connecting(const Kept& kept, const Seen& seen);
 
 // "2026-11-20 17:03:12 UTC"

@@ -182,5 +182,28 @@ TEST(Array, AnEmergencyStopEndsIt) {
   EXPECT_EQ(lab.shaft_steps("m03"), lab.motor("m03").position_steps);
 }
 
+// One that has come to its last row waits for its settling time, though another one has ended.
+TEST(Array, OneThatArrivesSettlesThoughAnotherHasEnded) {
+  int alone = 0;
+  for (std::int64_t left = 1; left < 8; ++left) {
+    SCOPED_TRACE(left);
+    Lab lab(with_keys(
+        with_keys(hall(2, 2), "m03", "limit = \"positive\"\nlimit_action = \"immediate\"\n"), "m01",
+        "settle_ms = 400\n"));
+    lab.connect();
+    lab.wait(lab.send(part_of(Part::kLastRows, {0, 1.2}, {0, 0, 120, 120})));
+    const auto run = lab.send(part_of(Part::kRun));
+    ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") >= 120 - left; }));
+    lab.bus(0).mcu(1).set_inputs({0b001, 0});
+    lab.run_until([&] { return lab.shaft_steps("m01") >= 120; }, 0.5);
+    const std::int64_t arrived_us = lab.now_us();
+    const Answer result = lab.wait(run);
+    if (result.motor_results != std::vector<std::string>{"reached", "limit"}) continue;
+    ++alone;
+    EXPECT_GE(lab.now_us() - arrived_us, 400'000);
+  }
+  EXPECT_GE(alone, 1);
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -288,6 +288,62 @@ TEST(KeptPositions, AreKnownOnceTheyAreConfirmed) {
   EXPECT_THAT(lab.wait(lab.send(api::Confirm{{"m09"}})).reason, HasSubstr("there is no motor"));
 }
 
+// Whoever is answered finds it, also if the daemon is killed in the next moment.
+TEST(KeptPositions, AreConfirmedWhenTheDiskHasIt) {
+  KeptLab lab;
+  lab.send(Ask::kMoveBy, {"m01"}, {5000});
+  lab.run_for(0.7);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  ASSERT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+  lab.disk_us = 200'000;
+  const auto number = lab.send(api::Confirm{{"m01"}});
+  ASSERT_TRUE(lab.run_until([&] { return lab.has_result(number); }, 2));
+  EXPECT_EQ(lab.last_reply(number).result, "done");
+  lab.restart_daemon();
+  lab.reconnect();
+  lab.expect_at_shaft("m02", api::Trust::kRestored);
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+}
+
+TEST(KeptPositions, ConfirmedOnABrokenDiskAreNotSaidToBeDone) {
+  KeptLab lab;
+  lab.run_for(0.5);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  ASSERT_EQ(lab.motor("m01").trust, api::Trust::kRestored);
+  lab.disk().set_broken(true);
+  const Answer answer = lab.wait(lab.send(api::Confirm{{"m01"}}));
+  EXPECT_EQ(answer.result, "fault");
+  EXPECT_THAT(answer.reason, HasSubstr("lost if bushd ends before"));
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown) << "until then it counts";
+  lab.disk().set_broken(false);
+  lab.run_for(2.5);
+  lab.restart_daemon();
+  lab.reconnect();
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+}
+
+// The disk has its motion once a second; the daemon has heard more.
+TEST(KeptPositions, LastKnownAreThoseHeardLast) {
+  for (const bool restart : {false, true}) {
+    KeptLab lab;
+    const auto number = lab.send(Ask::kMoveBy, {"m01"}, {5000});
+    lab.run_for(1.9);
+    lab.bus(0).reboot(0);
+    lab.wait(number);
+    const std::int64_t heard = lab.motor("m01").position_steps;
+    const auto asked = lab.send(api::GetHistory{.motor = "m01", .most = 1});
+    lab.wait(asked);
+    ASSERT_EQ(lab.history(asked).size(), 1u);
+    EXPECT_EQ(lab.history(asked)[0].to_steps, heard);
+    if (restart) lab.restart_daemon();
+    lab.reconnect();
+    EXPECT_EQ(lab.motor("m01").position_steps, heard) << "which people may confirm";
+    lab.expect_refused("m01", "last known: " + std::to_string(heard) + " steps, in motion");
+  }
+}
+
 TEST(KeptPositions, AreOfAnotherScaleUntilSomebodyConfirmsThem) {
   std::string toml = hall(1, 2);
   toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n");
@@ -297,7 +353,7 @@ TEST(KeptPositions, AreOfAnotherScaleUntilSomebodyConfirmsThem) {
   toml.replace(toml.find("400"), 3, "800");
   lab.use_configuration(toml);
   lab.reconnect();
-  lab.expect_refused("m01", "its steps_per_unit is 800 now, was 400");
+  lab.expect_refused("m01", "its steps_per_unit was changed from 400 to 800");
   EXPECT_EQ(lab.wait(lab.send(api::Confirm{{"m01"}})).result, "done");
   lab.expect_at_shaft("m01", api::Trust::kKnown);
 }

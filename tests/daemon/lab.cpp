@@ -116,12 +116,14 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
     }
   }
   for (std::size_t b = 0; b < config_.buses.size(); ++b) {
+    std::uint64_t unique_id = b << 32;
     for (std::size_t m = 0; m < config_.mcus.size(); ++m) {
       if (config_.mcus[m].bus.value != b || buses_[b].drive || buses_[b].board) continue;
       // Each boots at another time, so that their ticks have nothing in common by themselves.
       sim::McuOptions options{.address = config_.mcus[m].address.value,
                               .boot_number = static_cast<std::uint16_t>(100 * b + m + 1),
                               .boot_ns = static_cast<std::int64_t>(m) * 777'777};
+      options.unique_id = ++unique_id;
       options.disabled_capabilities = disabled_capabilities;
       if (config_.mcus[m].emission.measures()) options.supply = sim::SupplyRules{};
       buses_[b].bus->add_mcu(options);

@@ -12,6 +12,8 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::IsSupersetOf;
+using testing::Not;
 
 // m01 has a unit, m02 has none.
 std::string blade(const std::string& keys = "offset = 10\nsoft_limits = [-5, 5.5]\n") {
@@ -268,6 +270,23 @@ TEST(MotorSettings, OfTheMcuAreRefusedWhereTheyDoNotApplyOrAnotherMotorMoves) {
                      "all of them are at rest");
   lab.expect_done("m01", "soft_limits", "[-5, 500]");
   EXPECT_EQ(lab.wait(move).result, "reached");
+}
+
+// A default that is written is an edit, and one that is taken out too.
+TEST(MotorSettings, EndWhenTheFileGetsOrLosesAKeyWithItsDefault) {
+  for (const bool at_first : {false, true}) {
+    SettingsLab lab(blade(at_first ? "offset = 0\nlocal = false\n" : ""));
+    lab.expect_done("m01", "offset", "7");
+    lab.expect_done("m01", "local", "true");
+    lab.restart(blade(at_first ? "offset = 0.0\nlocal = false\n" : ""));
+    EXPECT_THAT(lab.show("m01"), IsSupersetOf({"m01 offset = 7, in the file 0",
+                                               "m01 local = true, in the file false"}));
+    lab.restart(blade(at_first ? "local = false\n" : "offset = 0\n"));
+    EXPECT_THAT(lab.show("m01"), IsSupersetOf({"m01 offset = 0, in the file 0",
+                                               "m01 local = true, in the file false"}));
+    lab.restart(blade(at_first ? "" : "offset = 0\nlocal = false\n"));
+    EXPECT_THAT(lab.show("m01"), Not(Contains(HasSubstr("local"))));
+  }
 }
 
 TEST(MotorSettings, AreKeptOverPowerCutsUntilTheFileIsEdited) {

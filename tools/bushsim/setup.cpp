@@ -30,7 +30,8 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
                 .pulses = candidate.kind == bushd::config::BusKind::kSerialPulse,
                 .addresses = {},
                 .measuring = {},
-                .board_start_hz = candidate.start_hz};
+                .board_start_hz = candidate.start_hz,
+                .first_unique_id = (std::uint64_t{i} << 32) + 1};
     for (const auto& mcu : config->mcus) {
       if (mcu.bus.value != i) continue;
       setup.addresses.push_back(mcu.address.value);

@@ -19,6 +19,7 @@ struct Setup {
   std::vector<std::uint8_t> addresses;  // at least one
   std::set<std::uint8_t> measuring;     // of these, the MCUs that measure their supply current
   std::uint32_t board_start_hz = 0;     // F_start of a commutator board; 0: it is none
+  std::uint64_t first_unique_id = 1;    // of its MCUs: other buses have others
 };
 
 // `bus` may be empty if the configuration has one bus only.

@@ -49,13 +49,14 @@ constexpr std::uint64_t kCollisionsReported = 10;
 // Precondition: this bushsim can run the image (parse_images).
 std::unique_ptr<Mcu> make_mcu([[maybe_unused]] const Image& image,
                               [[maybe_unused]] std::uint8_t address,
+                              [[maybe_unused]] std::uint64_t unique_id,
                               [[maybe_unused]] std::uint16_t boots,
                               [[maybe_unused]] std::size_t index,
                               [[maybe_unused]] Mcu::Driver& driver,
                               [[maybe_unused]] EdgeSink* sink) {
 #ifdef BUSHSIM_AVR
   if (image.chip == "atmega2560" || image.chip == "atmega1284p") {
-    bushd::sim::AvrOptions options{image.path, address, index + 1, boots};
+    bushd::sim::AvrOptions options{image.path, address, unique_id, boots};
     options.chip = image.chip;
     // Its windings are there, whether its comparators are used or not.
     if (image.chip == "atmega1284p") options.power_stage = bushd::sim::PowerStageRules{};
@@ -64,7 +65,7 @@ std::unique_ptr<Mcu> make_mcu([[maybe_unused]] const Image& image,
 #endif
 #ifdef BUSHSIM_QEMU
   if (image.chip == "lm3s6965") {
-    const bushd::sim::QemuOptions options{image.path, address, index + 1, boots};
+    const bushd::sim::QemuOptions options{image.path, address, unique_id, boots};
     return std::make_unique<bushd::sim::QemuMcu>(options, index, driver, sink);
   }
 #endif
@@ -95,8 +96,10 @@ void Simulator::add_mcus(const Options& options) {
     const auto image = options.images.find(address);
     is_virtual_.push_back(image == options.images.end());
     if (is_virtual_.back()) {
-      bushd::sim::McuOptions mcu{
-          .address = address, .boot_number = options.boot_number, .boot_ns = boot_ns};
+      bushd::sim::McuOptions mcu{.address = address,
+                                 .boot_number = options.boot_number,
+                                 .unique_id = setup_.first_unique_id + bus_.mcu_count(),
+                                 .boot_ns = boot_ns};
       if (setup_.measuring.contains(address)) mcu.supply = bushd::sim::SupplyRules{};
       bus_.add_mcu(mcu);
       for (const SwitchAt& one : options.switches) {
@@ -108,7 +111,8 @@ void Simulator::add_mcus(const Options& options) {
     }
     bus_.add_mcu([&](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
       const auto boots = static_cast<std::uint16_t>(options.boot_number - 1);
-      return make_mcu(image->second, address, boots, index, driver, sink);
+      return make_mcu(image->second, address, setup_.first_unique_id + index, boots, index, driver,
+                      sink);
     });
   }
 }

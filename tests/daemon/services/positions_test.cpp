@@ -3,14 +3,22 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "daemon/lab.h"
 #include "daemon/live_bench.h"
 #include "daemon/services/stops.h"
+#include "engine/frame.h"
 
 namespace bushd::daemon {
 namespace {
 
 using test::LiveBench;
 using testing::HasSubstr;
+
+std::string with_unit(std::string toml) {
+  return toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n");
+}
 
 struct PositionsBench : LiveBench {
   PositionsBench() { connect(stops); }  // what connect() serves besides is all that is needed
@@ -61,6 +69,47 @@ TEST(Positions, AreSetAtRestOnlyAndWithinTheirRange) {
   EXPECT_THAT(bench.refusal(5), HasSubstr("its position is being set"));
   bench.result(4);
   EXPECT_EQ(bench.of("m01").position_steps(), 1);
+}
+
+// Of those that are set, some may be, and offsets are none of the MCU's.
+TEST(Positions, SetByHalvesAreSaidAndOffsetsStayThen) {
+  test::Lab lab(with_unit(test::hall(2, 2)));
+  lab.connect();
+  lab.on_send = [](std::size_t, std::vector<std::uint8_t>& bytes) {
+    bushd_receiver receiver{};
+    bushd_frame frame;
+    for (const std::uint8_t byte : bytes) {
+      if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
+      if (frame.address == 2 && frame.type == BUSHD_MSG_SET_POSITION) return false;
+    }
+    return true;
+  };
+  const auto number = lab.send(api::SetPosition{
+      {{"m01", api::UserUnits{5}}, {"m02", std::int64_t{77}}, {"m03", std::int64_t{-3}}}});
+  lab.run_for(1);
+  EXPECT_EQ(lab.motor("m01").user, 0) << "not before the MCUs have the others";
+  const test::Answer meanwhile = lab.wait(lab.send(test::Ask::kMoveBy, {"m01"}, {10}));
+  EXPECT_THAT(meanwhile.reason, HasSubstr("its position is being set"));
+  const test::Answer answer = lab.wait(number);
+  EXPECT_EQ(answer.result, "fault");
+  EXPECT_THAT(answer.reason, HasSubstr("MCU hall:2 did not confirm it in time"));
+  EXPECT_THAT(answer.reason, HasSubstr("; set: m02; not set: m03, m01"));
+  EXPECT_EQ(lab.motor("m01").user, 0);
+  EXPECT_EQ(lab.motor("m02").position_steps, 77);
+  EXPECT_EQ(std::ranges::count_if(lab.move_lines(),
+                                  [](const std::string& line) {
+                                    return line.find("\"event\":\"set\",\"from_steps\":0,\"motor\":"
+                                                     "\"m02\"") != std::string::npos;
+                                  }),
+            2)
+      << "when it was connected, and now";
+  lab.on_send = {};
+  EXPECT_EQ(lab.wait(lab.send(api::SetPosition{{{"m01", api::UserUnits{5}},
+                                                {"m02", std::int64_t{77}},
+                                                {"m03", std::int64_t{-3}}}}))
+                .result,
+            "done");
+  EXPECT_EQ(lab.motor("m01").user, 5);
 }
 
 }  // namespace
