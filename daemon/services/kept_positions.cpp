@@ -138,14 +138,14 @@ void KeptPositions::answer_open() {
     if (keeper_->kept_up_to() < *open.number && !trouble) return false;
     if (trouble) {
       if (required_) open.done.outcome = api::Outcome::kFault;
-      open.done.reason += "; that is not on the disk, and lost if bushd ends before it is: " +
-                          *trouble + "; the disk is tried again once a second";
+      open.done.reason +=
+          "; that is not on the disk, and lost if bushd ends before it is: " + *trouble +
+          "; the disk is tried again once a second";
     }
     open.asker.answer(open.done);
     return true;
   });
 }
-
 
 void KeptPositions::request(const api::Asker& asker, const api::GetHistory& request) {
   const auto motor = installation_.find(request.motor);
@@ -306,10 +306,18 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
     verdict.reason = *motor.uncertain_reason();
   }
   take(id, verdict);
-  if (!verdict.set_steps) return;
+  if (!verdict.set_steps) return ask_for_kept(id);
   motors_[id].restoring = Restoring{.steps = *verdict.set_steps, .reason = verdict.reason};
   motor.restoring(true);
   mcu.set_position(motor.output(), static_cast<std::int32_t>(*verdict.set_steps));
+}
+
+// Where it stands, or was bound for, is where it was told to go.
+void KeptPositions::ask_for_kept(MotorId id) {
+  motion::Motor& motor = installation_[id];
+  const std::optional<state::Record>& kept = keeper_->kept(id).record;
+  if (!kept || kept->target_parts == 0 || motor.uncertain_reason()) return;
+  motor.ask_for(units::Steps{kept->target_steps, kept->target_parts});
 }
 
 void KeptPositions::take(MotorId id, const state::Verdict& verdict) {
@@ -343,10 +351,9 @@ void KeptPositions::keep_heard(const Mcu& mcu) {
     state::Record record = *kept;
     record.steps = motor.position_steps();
     record.utime_us = motor.trust({}).heard_utime_us.value_or(outputs_.wall_clock_us());
-    const bool is_its_own =
-        state::same_counter(record, {.unique_id = heard->unique_id,
-                                     .output = motor.output().value}) &&
-        record.boot_number == heard->boot_number;
+    const bool is_its_own = state::same_counter(record, {.unique_id = heard->unique_id,
+                                                         .output = motor.output().value}) &&
+                            record.boot_number == heard->boot_number;
     if (is_its_own && record.steps != kept->steps) keeper_->moves(id, std::move(record));
   }
 }
@@ -378,6 +385,7 @@ void KeptPositions::follow_restoring(const Mcu& mcu, MotorId id) {
     return;
   }
   journal_.position_set(id, 0, {});
+  ask_for_kept(id);
   if (motor.restored_reason()) {
     outputs_.log(LogLevel::kInfo, id,
                  motor.name() + ": position " + std::to_string(restoring.steps) +
@@ -422,8 +430,11 @@ void KeptPositions::keep(std::int64_t now_us, const Mcu& mcu, MotorId id) {
 void KeptPositions::keep_at_rest(const Mcu& mcu, MotorId id) {
   std::optional<Unmoved>& unmoved = motors_[id].unmoved;
   state::Record record = record_of(mcu, id);
-  const bool as_before = unmoved && record.steps == unmoved->steps &&
-                         installation_[id].uncertain_reason() == unmoved->reason;
+  const bool as_before =
+      unmoved && record.steps == unmoved->steps &&
+      installation_[id].uncertain_reason() == unmoved->reason &&
+      // Whose position it was may have gone to another output: then nobody else keeps it.
+      (unmoved->record || keeper_->other_at(id, record.unique_id, record.output));
   if (!as_before) {
     unmoved.reset();
     keeper_->stands(id, std::move(record));
@@ -434,12 +445,16 @@ void KeptPositions::keep_at_rest(const Mcu& mcu, MotorId id) {
 
 state::Record KeptPositions::record_of(const Mcu& mcu, MotorId id) const {
   const motion::Motor& motor = installation_[id];
+  const units::Steps asked_for = motor.asked_for().value_or(units::Steps{});
+  const bool is_whole = asked_for.parts == 0;
   return {.steps = motor.position_steps(),
           .steps_per_unit = scale_text(motor),
           .trust = trust_of(motor),
           .reason = motor.uncertain_reason() ? *motor.uncertain_reason()
                                              : motor.restored_reason().value_or(""),
           .utime_us = outputs_.wall_clock_us(),
+          .target_steps = is_whole ? 0 : asked_for.whole,
+          .target_parts = asked_for.parts,
           .unique_id = mcus_[mcu.id].heard->unique_id,
           .boot_number = mcus_[mcu.id].heard->boot_number,
           .output = motor.output().value};

@@ -105,6 +105,7 @@ class KeptPositions final : public Service {
   void keep(std::int64_t now_us, const Mcu& mcu, MotorId id);
   void keep_at_rest(const Mcu& mcu, MotorId id);
   state::Record record_of(const Mcu& mcu, MotorId id) const;
+  void ask_for_kept(MotorId id);
   void keep_confirmed(MotorId id);
   void tell_counter(MotorId id);
   void keep_heard(const Mcu& mcu);

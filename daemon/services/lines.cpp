@@ -62,7 +62,7 @@ void Lines::start(std::int64_t now_us, const api::Asker& asker, Line line) {
       const auto stands = moves_.go_on(now_us, motor, installation_[motor].position_steps());
       if (!stands) open_.end(motor, api::Outcome::kStopped, stands.error().text());
     }
-    return;
+    return ask_for_end(line);
   }
   Line& kept = lines_.emplace(number, std::move(line)).first->second;
   log(kept);
@@ -90,11 +90,20 @@ void Lines::open(const api::Asker& asker, std::uint64_t number, const Line& line
   // By a table of its own a motor makes what is a move for everybody.
   const auto purpose = line.by ? OpenMoves::Purpose::kMove : OpenMoves::Purpose::kLine;
   open_.open(asker, line.motors, purpose, line.by);
+  ask_for_end(line);
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     open_.planned(line.motors[i], static_cast<int>(line.points.size()), line.most_steps_per_s(i));
   }
   if (line.longest() == 0 || line.by) return;
   open_.conclude(line.motors.front(), [this, number] { return conclusion(number); });
+}
+
+// A path leads through many points, which are rounded each.
+void Lines::ask_for_end(const Line& line) {
+  const std::vector<units::Steps>& ends = line.points.back().asked_for;
+  for (std::size_t i = 0; i < line.motors.size(); ++i) {
+    installation_[line.motors[i]].ask_for(ends.empty() ? std::nullopt : std::optional(ends[i]));
+  }
 }
 
 // The MCUs make the run themselves if all of them can: it is slow enough, they have its table, and
@@ -191,28 +200,29 @@ Result<std::uint64_t> Lines::number_of(const std::vector<MotorId>& motors) const
 
 // The step of the line at which all motors are where they are asked to be.
 Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId>& motors,
-                                     const api::MoveLine& request) const {
+                                     const api::MoveLine& request,
+                                     std::vector<units::Steps>& targets) const {
   const std::vector<motion::Way::Motor>& ways = line.way.motors();
-  std::vector<std::int64_t> targets(motors.size());
+  targets.resize(motors.size());
   std::optional<std::int64_t> step;
   for (std::size_t i = 0; i < motors.size(); ++i) {
     const motion::Motor& motor = installation_[motors[i]];
     const bool absolute = request.kind == api::Move::Kind::kAbsolute;
     const api::Amount& amount = request.motors[i].amount;
-    const auto steps = absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
+    const auto steps = absolute ? motor.position_of(amount) : motor.distance_of(amount);
     if (!steps) return fail(motor.name() + ": " + steps.error().message);
     const auto at =
         static_cast<std::size_t>(std::ranges::find(line.motors, motors[i]) - line.motors.begin());
     // Compared before any arithmetic: the sum of two values from outside could overflow.
-    if (std::abs(*steps / 2) > motion::Motor::kMaxPosition) {
-      return fail(fmt::format("{}: {} steps is out of range; allowed: +-{}", motor.name(), *steps,
-                              motion::Motor::kMaxPosition));
+    if (std::abs(steps->whole / 2) > motion::Motor::kMaxPosition) {
+      return fail(fmt::format("{}: {} steps is out of range; allowed: +-{}", motor.name(),
+                              steps->whole, motion::Motor::kMaxPosition));
     }
-    const auto from = absolute ? Result<std::int64_t>(0) : motor.distance_from();
+    const auto from = absolute ? Result<units::Steps>() : motor.distance_from();
     if (!from) return fail(motor.name() + ": " + from.error().message);
     targets[at] = *steps + *from;
     if (line.way.increment(at) != line.way.longest()) continue;
-    step = (targets[at] - ways[at].from) * (ways[at].to < ways[at].from ? -1 : 1);
+    step = (targets[at].whole - ways[at].from) * (ways[at].to < ways[at].from ? -1 : 1);
   }
   const std::uint32_t end = line.target;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
@@ -221,15 +231,16 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
       return fail(
           fmt::format("{} is beyond the ends of the line that is under way; stop it first, "
                       "or wait for its result",
-                      motor.coordinates().text(targets[i])));
+                      motor.coordinates().text(targets[i].whole)));
     }
     const auto s = static_cast<std::uint32_t>(*step);
     const std::int64_t on_way = line.way.position_at(i, s);
-    if (targets[i] == on_way) continue;
-    return fail(fmt::format(
-        "{}: {} is not on the line that is under way, which leads through {} "
-        "there; stop it first, or wait for its result",
-        motor.name(), motor.coordinates().text(targets[i]), motor.coordinates().text(on_way)));
+    if (targets[i].whole == on_way) continue;
+    return fail(
+        fmt::format("{}: {} is not on the line that is under way, which leads through {} "
+                    "there; stop it first, or wait for its result",
+                    motor.name(), motor.coordinates().text(targets[i].whole),
+                    motor.coordinates().text(on_way)));
   }
   return static_cast<std::uint32_t>(*step);
 }
@@ -260,7 +271,8 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
     if (!floor) return refuse(floor.error().text());
     floors.push_back(*floor);
   }
-  const auto step = step_of(line, motors, request);
+  std::vector<units::Steps> targets;
+  const auto step = step_of(line, motors, request, targets);
   if (!step) return refuse(step.error().text());
   if (!line.way.set_floors(floors)) {
     return refuse("that is slower than this line can be told; stop it first");
@@ -270,6 +282,7 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   line.target = *step;
   Point& to = line.points.front();
   to.floors = floors;
+  to.asked_for = std::move(targets);
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     to.steps[i] = line.way.position_at(i, *step);
     motion::OnLine now = *installation_[line.motors[i]].as<motion::OnLine>();

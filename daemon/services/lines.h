@@ -70,6 +70,7 @@ class Lines final : public Service {
   struct Point {
     std::vector<std::int64_t> steps;
     std::vector<std::uint16_t> floors;
+    std::vector<units::Steps> asked_for{};  // of the last point of a line
   };
   // By the trigger.
   struct Begin {
@@ -177,8 +178,11 @@ class Lines final : public Service {
   Result<std::uint64_t> number_of(const std::vector<MotorId>& motors) const;
   void redirect(std::int64_t now_us, const api::Asker& asker, const std::vector<MotorId>& motors,
                 const api::MoveLine& request);
+  // `targets`: of the line's motors, in their order.
   Result<std::uint32_t> step_of(const Line& line, const std::vector<MotorId>& motors,
-                                const api::MoveLine& request) const;
+                                const api::MoveLine& request,
+                                std::vector<units::Steps>& targets) const;
+  void ask_for_end(const Line& line);
 
   const motion::OnLine* on_line(MotorId motor, std::uint64_t number) const;
   // Returns false when none of its motors is on it any more.

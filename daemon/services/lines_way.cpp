@@ -101,7 +101,7 @@ Result<std::vector<Lines::Point>> Lines::points_of(const Line& line,
     if (!floor) return fail(floor.error());
     const auto target = moves_.target_of(motors[i], request.motors[i].amount, request.kind, *floor);
     if (!target) return fail(target.error());
-    const auto legs = motor.legs_to(*target, *floor);
+    const auto legs = motor.legs_to(target->whole, *floor);
     if (!legs) return fail(motor.name() + ": " + legs.error().message);
     const motion::Leg& last = legs->back();
     const bool straight = legs->size() == 1;
@@ -109,12 +109,14 @@ Result<std::vector<Lines::Point>> Lines::points_of(const Line& line,
     const auto slow = floor_on(line, i, last.floor);
     if (!fast || !slow) return fail(fast ? slow.error() : fast.error());
     approach = approach || !straight;
-    to.steps.push_back(*target);
+    to.steps.push_back(target->whole);
     to.floors.push_back(straight ? *slow : *fast);
-    back.steps.push_back(straight ? *target : legs->front().target);
+    back.steps.push_back(straight ? target->whole : legs->front().target);
     back.floors.push_back(*fast);
-    again.steps.push_back(*target);
+    again.steps.push_back(target->whole);
     again.floors.push_back(*slow);
+    to.asked_for.push_back(*target);
+    again.asked_for.push_back(*target);
   }
   if (!approach) return std::vector<Point>{std::move(to)};
   if (motors.size() == 1) return std::vector<Point>{std::move(back), std::move(again)};

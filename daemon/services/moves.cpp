@@ -60,9 +60,9 @@ Result<Moves::Part> Moves::part_of(MotorId motor, const api::Amount& amount,
   if (!floor) return fail(floor.error());
   const auto target = target_of(motor, amount, move.kind, *floor);
   if (!target) return fail(target.error());
-  auto legs = installation_[motor].legs_to(*target, *floor);
+  auto legs = installation_[motor].legs_to(target->whole, *floor);
   if (!legs) return fail(installation_[motor].name() + ": " + legs.error().message);
-  return Part{.motor = motor, .legs = std::move(*legs)};
+  return Part{.motor = motor, .target = *target, .legs = std::move(*legs)};
 }
 
 Result<std::uint16_t> Moves::floor_of(MotorId id, const std::optional<api::Speed>& speed) const {
@@ -72,13 +72,13 @@ Result<std::uint16_t> Moves::floor_of(MotorId id, const std::optional<api::Speed
   return floor;
 }
 
-Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount, api::Move::Kind kind,
+Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api::Move::Kind kind,
                                       std::uint16_t floor) const {
   const motion::Motor& motor = installation_[id];
   const bool absolute = kind == api::Move::Kind::kAbsolute;
-  const auto counted = absolute ? motor.steps_of_position(amount) : motor.steps_of_distance(amount);
+  const auto counted = absolute ? motor.position_of(amount) : motor.distance_of(amount);
   if (!counted) return fail(motor.name() + ": " + counted.error().message);
-  const std::int64_t steps = *counted;
+  const std::int64_t steps = counted->whole;
   // Compared before any arithmetic: the sum of two values from outside could overflow.
   if (steps > 2 * motion::Motor::kMaxPosition || steps < -2 * motion::Motor::kMaxPosition) {
     return fail(motor.name() + ": " + std::to_string(steps) +
@@ -87,10 +87,11 @@ Result<std::int64_t> Moves::target_of(MotorId id, const api::Amount& amount, api
   }
   const auto refuse = [&motor](const Error& why) { return fail(motor.name() + ": " + why.text()); };
   if (const auto may = interlocks_.may_move(id); !may) return refuse(may.error());
-  const auto from = absolute ? Result<std::int64_t>(0) : motor.distance_from();
+  const auto from = absolute ? Result<units::Steps>() : motor.distance_from();
   if (!from) return refuse(from.error());
-  if (const auto may = motor.may_move_to(*from + steps, floor); !may) return refuse(may.error());
-  return *from + steps;
+  const units::Steps target = *from + *counted;
+  if (const auto may = motor.may_move_to(target.whole, floor); !may) return refuse(may.error());
+  return target;
 }
 
 void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts) {
@@ -128,6 +129,7 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
       to_begin_.push_back(part.motor);
     }
     motor.go_on({part.legs.begin() + 1, part.legs.end()});
+    motor.ask_for(part.target);
     const auto fastest = std::ranges::min_element(part.legs, {}, &motion::Leg::floor);
     open_.planned(part.motor, static_cast<int>(part.legs.size()),
                   motor.axis().most_steps_per_s(fastest->floor));
@@ -214,6 +216,7 @@ Result<std::int64_t> Moves::go_on(std::int64_t now_us, MotorId id, const api::Am
   if (!part) return fail(part.error());
   const auto& [target, floor] = part->legs.front();
   installation_[id].go_on({part->legs.begin() + 1, part->legs.end()});
+  installation_[id].ask_for(part->target);
   const Mcu& mcu = installation_.mcu_of(id);
   start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), floor);
   return part->legs.back().target;

@@ -37,8 +37,8 @@ class Moves final : public Service {
   void request(std::int64_t now_us, const api::Asker& asker, const api::Move& move);
 
   // Checks where a motor of a request may go, "NAME: WHY" if not. A distance counts from
-  // motion::Motor::distance_from.
-  Result<std::int64_t> target_of(MotorId motor, const api::Amount& amount, api::Move::Kind kind,
+  // motion::Motor::distance_from. The steps of it are `whole`.
+  Result<units::Steps> target_of(MotorId motor, const api::Amount& amount, api::Move::Kind kind,
                                  std::uint16_t floor) const;
   // motion::Motor::floor_at, "NAME: WHY" if there is none.
   Result<std::uint16_t> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
@@ -94,6 +94,7 @@ class Moves final : public Service {
  private:
   struct Part {
     MotorId motor;
+    units::Steps target;            // for motion::Motor::ask_for
     std::vector<motion::Leg> legs;  // at least one
   };
   Result<std::vector<Part>> parts_of(const api::Move& move) const;

@@ -144,6 +144,7 @@ void Positions::put(Offset& offset, const api::Asker& by) {
   motion::Motor& motor = installation_[offset.motor];
   const units::Coordinates before = motor.coordinates();
   motor.set_coordinates(std::move(offset.coordinates));
+  motor.ask_for({});
   journal_.offset_set(offset.motor, by);
   if (offset_listener_) offset_listener_(offset.motor, before, by);
 }
@@ -151,6 +152,7 @@ void Positions::put(Offset& offset, const api::Asker& by) {
 void Positions::note(const Part& part, const api::Asker& by) {
   motion::Motor& motor = installation_[part.motor];
   motor.position_is_known();
+  motor.ask_for({});
   journal_.position_set(part.motor, part.from_steps, by);
   if (listener_) listener_(part.motor, part.from_steps, by);
   outputs_.log(LogLevel::kInfo, part.motor,

@@ -64,6 +64,18 @@ std::string text_of(const config::PseudoAxis& axis, double position) {
   return fmt::format("{:.{}f} {}", position, axis.decimals, axis.unit);
 }
 
+// Other steps, or by more of one than what is computed in doubles may be off.
+bool differs(const units::Steps& a, const units::Steps& b) {
+  constexpr std::int64_t kLeastParts = 1 << 12;  // 1e-6 of a step
+  return a.whole != b.whole || std::abs(a.parts - b.parts) >= kLeastParts;
+}
+
+// A motor without a unit has whole steps only.
+api::Amount amount_of(const motion::Motor& motor, double user, const units::Steps& steps) {
+  if (motor.coordinates().has_unit()) return api::UserUnits{user};
+  return steps.whole;
+}
+
 // Of all motors together, but for the position.
 void take_worst(api::MotorState& all, const api::MotorState& motor) {
   if (motor.activity != api::Activity::kResting) all.activity = api::Activity::kMoving;
@@ -210,7 +222,7 @@ Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
   const auto first = std::ranges::find_if(move.motors, is_computed);
   const config::Pseudo& pseudo = installation_.config().pseudos[find(first->motor)->pseudo];
   // Those that are not named keep to where they are, or have been told to go.
-  std::vector<std::int64_t> from;
+  std::vector<units::Steps> from;
   std::vector<double> now;
   for (const MotorId id : pseudo.motors) {
     const motion::Motor& motor = installation_[id];
@@ -226,17 +238,20 @@ Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
 
   api::MoveLine line{.kind = api::Move::Kind::kAbsolute, .motors = {}, .dry_run = move.dry_run};
   double longest = 0;  // way of a motor, in its unit
+  bool steps = false;  // some motor makes one
   for (std::size_t j = 0; j < motors->size(); ++j) {
     const motion::Motor& motor = installation_[pseudo.motors[j]];
-    const auto steps = motor.coordinates().steps_of_user((*motors)[j]);
-    if (!steps) return fail(motor.name() + ": " + steps.error().message);
+    const auto target = motor.coordinates().unrounded_of_user((*motors)[j]);
+    if (!target) return fail(motor.name() + ": " + target.error().message);
     longest = std::max(longest, std::abs((*motors)[j] - now[j]));
-    if (*steps != from[j]) line.motors.push_back({motor.name(), *steps});
+    if (!differs(*target, from[j])) continue;
+    steps = steps || target->whole != from[j].whole;
+    line.motors.push_back({motor.name(), amount_of(motor, (*motors)[j], *target)});
   }
   // Where it stands already; its first motor says so.
   if (line.motors.empty()) {
     const motion::Motor& motor = installation_[pseudo.motors.front()];
-    line.motors.push_back({motor.name(), from.front()});
+    line.motors.push_back({motor.name(), amount_of(motor, now.front(), from.front())});
   }
   if (move.speed) {
     if (move.speed->in_steps) {
@@ -251,7 +266,8 @@ Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
     line.speed = move.speed;
     if (farthest > 0 && longest > 0) line.speed->per_s *= longest / farthest;
   }
-  if (line.motors.size() > 1) return api::Request(std::move(line));
+  // Less than a step of all is what they have been told, and no way.
+  if (steps && line.motors.size() > 1) return api::Request(std::move(line));
   return api::Request(api::Move{.kind = line.kind,
                                 .motors = std::move(line.motors),
                                 .dry_run = line.dry_run,

@@ -34,6 +34,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   }
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId motor = (*motors)[i];
+    installation_[motor].ask_for(target_of(motor, request.motors[i].amount, request));
     installation_[motor].arm(numbers[installation_.config()[motor].mcu], steps[i],
                              floor_of(motor, request));
   }
@@ -59,16 +60,23 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
   return motors;
 }
 
-// Precondition, as of steps_of: motors_of has no objection.
+// Precondition, as of what follows: motors_of has no objection.
 std::uint16_t Trigger::floor_of(MotorId motor, const api::Arm& request) const {
   return *moves_.floor_of(motor, request.speed);
+}
+
+units::Steps Trigger::target_of(MotorId motor, const api::Amount& amount,
+                                const api::Arm& request) const {
+  return *moves_.target_of(motor, amount, api::Move::Kind::kRelative, floor_of(motor, request));
 }
 
 std::vector<std::int64_t> Trigger::steps_of(const std::vector<MotorId>& motors,
                                             const api::Arm& request) const {
   std::vector<std::int64_t> steps;
   for (std::size_t i = 0; i < motors.size(); ++i) {
-    steps.push_back(*installation_[motors[i]].steps_of_distance(request.motors[i].amount));
+    const motion::Motor& motor = installation_[motors[i]];
+    steps.push_back(target_of(motors[i], request.motors[i].amount, request).whole -
+                    motor.position_steps());
   }
   return steps;
 }

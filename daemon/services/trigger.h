@@ -40,6 +40,7 @@ class Trigger final : public Service {
     std::string done;
   };
   Result<std::vector<MotorId>> motors_of(const api::Arm& request) const;
+  units::Steps target_of(MotorId motor, const api::Amount& amount, const api::Arm& request) const;
   std::vector<std::int64_t> steps_of(const std::vector<MotorId>& motors,
                                      const api::Arm& request) const;
   std::uint16_t floor_of(MotorId motor, const api::Arm& request) const;

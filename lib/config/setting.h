@@ -67,7 +67,8 @@ std::string text_of(const Settings& settings, SettingKey key);
 // "offset = 12.5"; "" if it was left out.
 std::string line_of(const Settings& settings, SettingKey key);
 
-// With another value, written. Beside the texts above, soft limits may come without brackets and blanks:
+// With another value, written. Beside the texts above, soft limits may come without brackets and
+// blanks:
 // "-5,30", and inline tables without names, in their order: "100,1500,500" and
 // "1500,1000,300,fast". Errors name key, value, cause and what is allowed, not the motor.
 Result<Settings> with(Settings settings, SettingKey key, std::string_view text);

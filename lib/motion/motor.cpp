@@ -65,6 +65,7 @@ void Motor::follow(TrajectoryShare share, Tick start) {
   activity_ = Moving{};
   pause_ = Pause::kNo;
   further_.clear();
+  asked_for_.reset();
   axis_.start_trajectory(std::move(share), start);
 }
 
@@ -179,7 +180,14 @@ std::vector<Event> Motor::report(const Report& report) {
   // Of one that is homed who has asked for that knows what its position is.
   if (by_itself) follow_count(before);
   follow_autonomous(report.of_mcu, free && position_ != before);
+  follow_asked_for();
   return events;
+}
+
+// Where it stands elsewhere, or people move it, what it was told before has ended.
+void Motor::follow_asked_for() {
+  if (!asked_for_ || has_plan()) return;
+  if (autonomous_ || (is<Resting>() && asked_for_->whole != position_)) asked_for_.reset();
 }
 
 // No move has led to where it stands.

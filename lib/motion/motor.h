@@ -166,9 +166,12 @@ class Motor {
   // Where it will stand when all is done, and it has been resumed if it is paused. Where it is, as
   // long as nobody has said where it is to stand.
   std::int64_t target_steps() const;
-  // What a distance is counted from: where it stands, or has been told to go, or, if it is being
-  // stopped, where it will stand. Error: nobody has said where, or the motion there is paused.
-  Result<std::int64_t> distance_from() const;
+  // What a distance is counted from: where it stands, or has been told to go, as it was asked for,
+  // not rounded to a step; or, if it is being stopped, where it will stand. Error: nobody has said
+  // where, or the motion there is paused.
+  Result<units::Steps> distance_from() const;
+  // Where it was told to go last, while it is there or bound for it.
+  const std::optional<units::Steps>& asked_for() const { return asked_for_; }
   double velocity_steps_per_s() const { return moves() ? axis_.velocity_steps_per_s() : 0.0; }
   // Why steps may be lost, so that it may not move. Nothing: none are, as far as this daemon knows.
   const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
@@ -200,7 +203,9 @@ class Motor {
   Result<std::uint16_t> floor_at(const std::optional<api::Speed>& speed) const;
   // An amount in steps. Errors: not finite, beyond what is counted.
   Result<std::int64_t> steps_of_position(const api::Amount& position) const;
-  Result<std::int64_t> steps_of_distance(const api::Amount& distance) const;
+  // The same, not rounded.
+  Result<units::Steps> position_of(const api::Amount& position) const;
+  Result<units::Steps> distance_of(const api::Amount& distance) const;
   // Where it may be, by its soft limits, or as far as positions are counted.
   std::int64_t lowest() const;
   std::int64_t highest() const;
@@ -209,6 +214,8 @@ class Motor {
   // From rest, or from the turning point of a motion.
   void start(std::int64_t target, Tick start, std::uint16_t floor = 0);
   void aim(std::int64_t target, std::uint16_t floor = 0);
+  // Where all that it has been told leads; nothing: nobody has said that in numbers.
+  void ask_for(std::optional<units::Steps> target) { asked_for_ = target; }
   // The same for a run of a line.
   void start_line(const OnLine& on_line, LineShare share, Tick start, std::uint16_t floor);
   void aim_on_line(const OnLine& on_line, std::uint32_t line_step, std::uint16_t floor);
@@ -230,7 +237,10 @@ class Motor {
   // start() is for it, not aim().
   bool stands() const { return !has_plan() || rests_in_pause(); }
   // Its motion goes on until somebody ends it: where its runs lead nobody has asked for.
-  void jogs(bool now) { jogs_ = now; }
+  void jogs(bool now) {
+    jogs_ = now;
+    if (now) asked_for_.reset();
+  }
   bool jogs() const { return jogs_; }
   void hold(bool now) { held_ = now; }
   bool is_held() const { return held_; }
@@ -247,9 +257,15 @@ class Motor {
   bool change(Tick at, std::uint32_t least_end = 0) {
     return has_plan() && axis_.change(at, least_end);
   }
-  void home() { activity_ = Homing{}; }
+  void home() {
+    activity_ = Homing{};
+    asked_for_.reset();
+  }
   void end_homing(bool found);
-  void travel() { activity_ = Travelling{}; }
+  void travel() {
+    activity_ = Travelling{};
+    asked_for_.reset();
+  }
   void end_travel();
   void set_coordinates(units::Coordinates coordinates) {
     setup_.coordinates = std::move(coordinates);
@@ -311,6 +327,8 @@ class Motor {
   void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();
   std::string did_not_start() const;
+  Result<std::int64_t> rounded_distance_from() const;
+  void follow_asked_for();
 
   MotorSetup setup_;
   Axis axis_;
@@ -320,6 +338,7 @@ class Motor {
   Pause pause_ = Pause::kNo;
   bool jogs_ = false;
   bool held_ = false;
+  std::optional<units::Steps> asked_for_;
   std::int64_t position_ = 0;
   std::optional<std::uint16_t> boot_number_;
   // Somebody has said where it stands, or its switch has. What an earlier daemon was told, and

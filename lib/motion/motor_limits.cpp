@@ -75,7 +75,13 @@ Result<void> Motor::may_be_moved_within(std::int64_t steps) const {
       position_, steps, kMaxPosition));
 }
 
-Result<std::int64_t> Motor::distance_from() const {
+Result<units::Steps> Motor::distance_from() const {
+  const auto rounded = rounded_distance_from();
+  if (!rounded) return fail(rounded.error());
+  return asked_for_ && asked_for_->whole == *rounded ? *asked_for_ : units::Steps{*rounded};
+}
+
+Result<std::int64_t> Motor::rounded_distance_from() const {
   constexpr const char* kRemedy = "wait until it stands, or move it to a position";
   if (!has_plan()) {
     if (auto may = may_be_used(); !may) return fail(may.error());
@@ -213,10 +219,16 @@ Result<std::int64_t> Motor::steps_of_position(const api::Amount& position) const
   return setup_.coordinates.steps_of_user(std::get<api::UserUnits>(position).value);
 }
 
-Result<std::int64_t> Motor::steps_of_distance(const api::Amount& distance) const {
+Result<units::Steps> Motor::position_of(const api::Amount& position) const {
+  if (auto good = is_amount(position); !good) return fail(good.error());
+  if (const auto* steps = std::get_if<std::int64_t>(&position)) return units::Steps{*steps};
+  return setup_.coordinates.unrounded_of_user(std::get<api::UserUnits>(position).value);
+}
+
+Result<units::Steps> Motor::distance_of(const api::Amount& distance) const {
   if (auto good = is_amount(distance); !good) return fail(good.error());
-  if (const auto* steps = std::get_if<std::int64_t>(&distance)) return *steps;
-  return setup_.coordinates.steps_of_distance(std::get<api::UserUnits>(distance).value);
+  if (const auto* steps = std::get_if<std::int64_t>(&distance)) return units::Steps{*steps};
+  return setup_.coordinates.unrounded_of_distance(std::get<api::UserUnits>(distance).value);
 }
 
 }  // namespace bushd::motion

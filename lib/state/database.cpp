@@ -66,7 +66,12 @@ UPDATE position SET unique_id = '', at_rest = 0, trust = 'uncertain',
       AND newer.rowid > position.rowid);
 )";
 
-constexpr std::array kVersions = {kVersion1, kVersion2, kVersion3};
+constexpr const char* kVersion4 = R"(
+ALTER TABLE position ADD COLUMN target_steps INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE position ADD COLUMN target_parts INTEGER NOT NULL DEFAULT 0;
+)";
+
+constexpr std::array kVersions = {kVersion1, kVersion2, kVersion3, kVersion4};
 constexpr std::array kTrust = {"unconfirmed", "known", "restored", "uncertain"};
 
 Trust trust_of(const std::string& word) {
@@ -279,7 +284,8 @@ Result<bool> Database::end_unguarded() {
 Result<std::map<std::string, Record>> Database::records() {
   Statement select(sqlite_,
                    "SELECT motor, steps, steps_per_unit, trust, reason, utime_us, unique_id,"
-                   " boot_number, output, at_rest, motion FROM position");
+                   " boot_number, output, at_rest, motion, target_steps, target_parts"
+                   " FROM position");
   std::map<std::string, Record> records;
   while (true) {
     const auto row = select.step();
@@ -290,6 +296,8 @@ Result<std::map<std::string, Record>> Database::records() {
                                .trust = trust_of(select.text(3)),
                                .reason = select.text(4),
                                .utime_us = select.number(5),
+                               .target_steps = select.number(11),
+                               .target_parts = select.number(12),
                                .unique_id = select.text(6),
                                .boot_number = static_cast<std::uint16_t>(select.number(7)),
                                .output = static_cast<std::uint8_t>(select.number(8)),
@@ -351,8 +359,8 @@ Result<void> Database::write(const Batch& batch) {
 Result<void> Database::put(const std::string& motor, const Record& record) {
   Statement insert(sqlite_,
                    "INSERT OR REPLACE INTO position (motor, steps, steps_per_unit, trust, reason,"
-                   " utime_us, unique_id, boot_number, output, at_rest, motion)"
-                   " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+                   " utime_us, unique_id, boot_number, output, at_rest, motion, target_steps,"
+                   " target_parts) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   return insert.bind(motor)
       .bind(record.steps)
       .bind(record.steps_per_unit)
@@ -364,6 +372,8 @@ Result<void> Database::put(const std::string& motor, const Record& record) {
       .bind(std::int64_t{record.output})
       .bind(std::int64_t{record.at_rest})
       .bind(static_cast<std::int64_t>(record.motion))
+      .bind(record.target_steps)
+      .bind(record.target_parts)
       .run();
 }
 

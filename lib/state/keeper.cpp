@@ -61,8 +61,7 @@ bool Keeper::has_mark(const Motor& motor) {
 bool Keeper::has_counter(const Motor& motor) {
   const auto& [told, there] = std::tie(motor.kept.record, motor.record_on_disk);
   return !told || told->unique_id.empty() ||
-         (there && same_counter(*told, *there) &&
-                   told->steps_per_unit == there->steps_per_unit);
+         (there && same_counter(*told, *there) && told->steps_per_unit == there->steps_per_unit);
 }
 
 bool Keeper::marked(MotorId id) const {
@@ -112,8 +111,8 @@ bool Keeper::any_unguarded() const {
   return std::ranges::any_of(motors_, &Motor::unguarded);
 }
 
-// An output is one motor's at a time: a name that had it before does not find its old position there
-// when it comes back.
+// An output is one motor's at a time: a name that had it before does not find its old position
+// there when it comes back.
 void Keeper::take_output(Motor& motor, const Record& record) {
   const bool has_it = motor.kept.record && same_counter(*motor.kept.record, record);
   if (std::exchange(motor.present, true) && has_it) return;

@@ -90,7 +90,7 @@ class Keeper {
     // Number of the last motion of whose end the disk may know.
     std::uint64_t ended = 0;
     bool unguarded = false;
-    bool present = false;  // told of, since this began
+    bool present = false;                     // told of, since this began
     std::optional<std::int64_t> wanted_us{};  // since when its mark is wanted and not there
     std::optional<Record> record_on_disk{};
     std::optional<std::int64_t> record_wanted_us{};  // since when it is, and of another counter

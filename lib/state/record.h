@@ -25,6 +25,10 @@ struct Record {
   Trust trust = Trust::kUnconfirmed;
   std::string reason{};  // of kUncertain
   std::int64_t utime_us = 0;
+  // Where it was told to go last, if that is no whole number of steps: what is beyond
+  // `target_steps`, in 2^-32 of a step; 0: nothing.
+  std::int64_t target_steps = 0;
+  std::int64_t target_parts = 0;
   // Whose counter these steps are; "": of none.
   std::string unique_id{};
   std::uint16_t boot_number = 0;

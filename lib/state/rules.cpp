@@ -66,8 +66,7 @@ Verdict on_new_name(const Kept& kept, const Seen& seen) {
   if (before.record.trust == Trust::kUnconfirmed && !kept.record) return verdict;
   verdict.trust = Trust::kUncertain;
   verdict.reason = "output " + std::to_string(seen.output) + " of MCU " + seen.mcu +
-                   " was motor \"" + before.motor + "\" before" +
-                   last_known(before.record, seen);
+                   " was motor \"" + before.motor + "\" before" + last_known(before.record, seen);
   return verdict;
 }
 

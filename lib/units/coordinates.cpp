@@ -50,6 +50,15 @@ Result<mpq_class> number(double value) {
   return *out;
 }
 
+constexpr std::int64_t kPartsPerStep = std::int64_t{1} << 32;
+
+Result<Steps> unrounded_from(const mpq_class& exact_steps) {
+  const auto whole = steps_from(exact_steps);
+  if (!whole) return fail(whole.error());
+  const mpq_class beyond = exact_steps - mpq_class(static_cast<long>(*whole));
+  return Steps{*whole, nearest(beyond * mpq_class(static_cast<long>(kPartsPerStep))).get_si()};
+}
+
 std::int64_t clamped(const mpz_class& steps) {
   if (steps > Coordinates::kMaxSteps) return Coordinates::kMaxSteps;
   if (steps < -Coordinates::kMaxSteps) return -Coordinates::kMaxSteps;
@@ -72,6 +81,18 @@ double user_position(const Scale& scale, long double dial) {
 }
 
 }  // namespace
+
+Steps operator+(const Steps& a, const Steps& b) {
+  Steps sum{a.whole + b.whole, a.parts + b.parts};
+  if (sum.parts > kPartsPerStep / 2) {
+    sum.whole += 1;
+    sum.parts -= kPartsPerStep;
+  } else if (sum.parts < -kPartsPerStep / 2) {
+    sum.whole -= 1;
+    sum.parts += kPartsPerStep;
+  }
+  return sum;
+}
 
 Result<Coordinates> Coordinates::make(Scale scale) {
   const auto offset = number(scale.offset);
@@ -108,6 +129,12 @@ double Coordinates::user_of(std::int64_t steps) const {
   return user_position(scale_, dial(scale_.steps_per_unit, steps));
 }
 
+double Coordinates::user_of(const Steps& steps) const {
+  const long double beyond = static_cast<long double>(steps.parts) / kPartsPerStep;
+  return user_position(
+      scale_, dial(scale_.steps_per_unit, steps.whole) + beyond * dial(scale_.steps_per_unit, 1));
+}
+
 SoftLimits Coordinates::on_user_scale(const SoftLimits& dial) const {
   const double low = user_position(scale_, widened(dial.low));
   const double high = user_position(scale_, widened(dial.high));
@@ -126,6 +153,20 @@ Result<std::int64_t> Coordinates::steps_of_user(double user) const {
   mpq_class dial = *value - *exact(scale_.offset);
   if (scale_.negative) dial = -dial;
   return steps_from(dial * as_mpq(scale_.steps_per_unit));
+}
+
+Result<Steps> Coordinates::unrounded_of_user(double user) const {
+  const auto value = number(user);
+  if (!value) return fail(value.error());
+  mpq_class dial = *value - *exact(scale_.offset);
+  if (scale_.negative) dial = -dial;
+  return unrounded_from(dial * as_mpq(scale_.steps_per_unit));
+}
+
+Result<Steps> Coordinates::unrounded_of_distance(double user_units) const {
+  const auto value = number(user_units);
+  if (!value) return fail(value.error());
+  return unrounded_from((scale_.negative ? -*value : *value) * as_mpq(scale_.steps_per_unit));
 }
 
 Result<std::int64_t> Coordinates::parts_of_user(double user) const {

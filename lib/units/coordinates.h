@@ -34,6 +34,16 @@ struct SoftLimits {
   friend bool operator==(const SoftLimits&, const SoftLimits&) = default;
 };
 
+// Steps that are not rounded: the nearest whole number, and what is beyond it, in 2^-32 of a step;
+// half a step at most.
+struct Steps {
+  std::int64_t whole = 0;
+  std::int64_t parts = 0;
+  friend bool operator==(const Steps&, const Steps&) = default;
+};
+// A whole number of steps moves `whole` by itself. Precondition: no overflow.
+Steps operator+(const Steps& a, const Steps& b);
+
 class Coordinates {
  public:
   // MCUs count positions in 32 bits.
@@ -61,6 +71,10 @@ class Coordinates {
   // The nearest step, ties away from 0. Errors: not finite, beyond +-kMaxSteps.
   Result<std::int64_t> steps_of_dial(double dial) const;
   Result<std::int64_t> steps_of_user(double user) const;
+  // The same, not rounded.
+  Result<Steps> unrounded_of_user(double user) const;
+  Result<Steps> unrounded_of_distance(double user_units) const;
+  double user_of(const Steps& steps) const;
   // In 2^-32 of a step, the nearest.
   Result<std::int64_t> parts_of_user(double user) const;
   // Of a distance on the user's scale, with its sign.

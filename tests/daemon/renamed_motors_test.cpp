@@ -68,7 +68,8 @@ TEST(RenamedMotors, HaveThePositionOfTheirOutputAndPeopleSayWhetherItIsTheirs) {
     RenamedLab lab;
     lab.use(with(lab.toml, kM01, kOther));
     if (power_cut) lab.cut_all_power();
-    lab.expect_uncertain("other", "output 0 of MCU hall:1 was motor \"m01\" before; last known: 300");
+    lab.expect_uncertain("other",
+                         "output 0 of MCU hall:1 was motor \"m01\" before; last known: 300");
     lab.expect_trusted("m02", power_cut ? api::Trust::kRestored : api::Trust::kKnown);
     lab.confirm("other");
     lab.reach("other", 10);

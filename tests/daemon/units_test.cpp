@@ -170,6 +170,7 @@ TEST(SoftLimits, WhoStandsBeyondMayMoveTowardsThem) {
 // unit.
 struct Model {
   std::int64_t steps = 0;
+  std::int64_t asked = 0;   // where it was told to go, thousandths of a step
   std::int64_t offset = 0;  // thousandths
   int sign = 1;
 
@@ -209,25 +210,33 @@ TEST(Units, RandomRequestsAgreeWithTheModel) {
           if (model.steps % 7 != 0) break;
           ASSERT_EQ(lab.wait(lab.send(set(user))).result, "done");
           model.offset = number - sign * model.steps / 7 * 1000;
+          model.asked = model.steps * 1000;
           break;
         case 1:
           ASSERT_EQ(lab.wait(lab.send(set(user, true))).result, "done");
           model.steps = Model::nearest(number * 7, 1000);
           turned += model.steps - before;
+          model.asked = model.steps * 1000;
           break;
         case 2:
         case 3: {
-          const std::int64_t target = before + sign * Model::nearest(number * 7, 1000);
+          const std::int64_t asked = model.asked + sign * number * 7;
+          if (std::abs(asked) % 1000 == 500) break;  // either way
+          const std::int64_t target = Model::nearest(asked, 1000);
           const bool allowed = Model::allowed(target, before);
           ASSERT_EQ(lab.wait(lab.send(by(user))).result, allowed ? "reached" : "refused") << i;
-          if (allowed) model.steps = target;
+          if (!allowed) break;
+          model.steps = target;
+          model.asked = asked;
           break;
         }
         default: {
           const std::int64_t target = model.steps_of_user(number);
           const bool allowed = Model::allowed(target, before);
           ASSERT_EQ(lab.wait(lab.send(to(user))).result, allowed ? "reached" : "refused") << i;
-          if (allowed) model.steps = target;
+          if (!allowed) break;
+          model.steps = target;
+          model.asked = sign * (number - model.offset) * 7;
         }
       }
       lab.run_for(0.1);

@@ -114,6 +114,67 @@ TEST_F(KeeperTest, ARestThatHasNotGoneOutIsTakenBack) {
   EXPECT_THAT(disk.marks, SizeIs(1));
 }
 
+Record at_output(std::uint8_t output, std::int64_t steps = 0) {
+  return {
+      .steps = steps, .trust = Trust::kKnown, .unique_id = "0123456789abcdef", .output = output};
+}
+
+TEST(Keeper, AMotorIsNotMarkedBeforeTheDiskKnowsItsCounter) {
+  Disk disk;
+  Keeper keeper({"theta"}, {{"theta", {.record = at_output(1)}}}, disk);
+  keeper.moves(MotorId{0}, at_output(2));
+  ASSERT_TRUE(keeper.want_mark(0, MotorId{0}));
+  keeper.step(0);
+  keeper.mark(0, {});
+  ASSERT_TRUE(keeper.want_mark(0, MotorId{0}));
+  EXPECT_FALSE(keeper.marked(MotorId{0}));
+  keeper.write(0, {});
+  ASSERT_TRUE(keeper.want_mark(0, MotorId{0}));
+  if (!keeper.marked(MotorId{0})) {
+    keeper.step(0);
+    keeper.mark(0, {});
+  }
+  EXPECT_TRUE(keeper.marked(MotorId{0}));
+  EXPECT_THAT(disk.writes, SizeIs(1));
+}
+
+TEST(Keeper, ADiskThatDoesNotTakeItsCounterIsSaid) {
+  Disk disk;
+  Keeper keeper({"theta"}, {{"theta", {.record = at_output(1)}}}, disk);
+  keeper.moves(MotorId{0}, at_output(2));
+  ASSERT_TRUE(keeper.want_mark(0, MotorId{0}));
+  keeper.step(0);
+  keeper.mark(0, {});
+  keeper.write(0, fail("disk full"));
+  ASSERT_TRUE(keeper.want_mark(Keeper::kPatienceUs - 1, MotorId{0}));
+  const auto wanted = keeper.want_mark(Keeper::kPatienceUs, MotorId{0});
+  ASSERT_FALSE(wanted);
+  EXPECT_EQ(wanted.error().text(), "disk full");
+}
+
+TEST(Keeper, AnOutputIsOneMotorsAtATime) {
+  Disk disk;
+  Keeper keeper({"phi", "theta"},
+                {{"phi", {.record = at_output(1)}},
+                 {"theta", {.record = at_output(2)}},
+                 {"old", {.record = at_output(3, 77)}}},
+                disk);
+  EXPECT_EQ(keeper.other_at(kPhi, "0123456789abcdef", 3)->motor, "old");
+  EXPECT_EQ(keeper.other_at(kPhi, "0123456789abcdef", 3)->record.steps, 77);
+  EXPECT_FALSE(keeper.other_at(kPhi, "0123456789abcdef", 1)) << "its own";
+  EXPECT_FALSE(keeper.other_at(kPhi, "fedcba9876543210", 3));
+  keeper.stands(kTheta, at_output(3));
+  EXPECT_FALSE(keeper.other_at(kPhi, "0123456789abcdef", 3));
+  keeper.stands(kPhi, at_output(2));
+  keeper.step(0);
+  ASSERT_THAT(disk.writes, SizeIs(1));
+  const auto& records = disk.writes[0].records;
+  EXPECT_EQ(records.at("old").trust, Trust::kUncertain);
+  EXPECT_EQ(records.at("old").unique_id, "");
+  EXPECT_EQ(records.at("theta").output, 3);
+  EXPECT_EQ(records.at("phi").output, 2);
+}
+
 TEST_F(KeeperTest, NothingNewIsNotWritten) {
   stand(kTheta, 100);
   EXPECT_EQ(keeper.told(), 1u);

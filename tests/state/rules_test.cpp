@@ -63,6 +63,40 @@ TEST(Rules, ASwitchThatStopsImmediatelyMakesTheSameBootUncertain) {
   EXPECT_EQ(on_connecting({.record = a_record(), .motion = 6}, seen).trust, Trust::kUncertain);
 }
 
+// Its own record may say what it likes.
+TEST(Rules, AnOutputThatWasAnotherMotorsIsUncertainAndItsCounterGoesOn) {
+  for (const bool has_own : {false, true}) {
+    for (const bool other_boot : {false, true}) {
+      Kept kept{.motion = 5};
+      if (has_own) kept.record = a_record();
+      Seen seen = a_sight();
+      seen.before = Owner{"phi", a_record()};
+      seen.before->record.steps = -70;
+      if (other_boot) seen.boot_number = 8;
+      const Verdict verdict = on_connecting(kept, seen);
+      EXPECT_EQ(verdict.trust, Trust::kUncertain);
+      EXPECT_EQ(verdict.set_steps, other_boot ? std::optional<std::int64_t>(-70) : std::nullopt);
+      EXPECT_EQ(verdict.reason,
+                "output 2 of MCU hall:1 was motor \"phi\" before; last known: -70 steps at "
+                "2026-11-20 17:00:00 UTC");
+    }
+  }
+}
+
+TEST(Rules, WhoGivesUpItsOutputSaysToWhom) {
+  Record record = a_record();
+  give_up_output(record, "phi");
+  EXPECT_EQ(record.trust, Trust::kUncertain);
+  EXPECT_FALSE(same_counter(record, a_record()));
+  const Verdict verdict = on_connecting({.record = record, .motion = 5}, a_sight());
+  EXPECT_EQ(verdict.trust, Trust::kUncertain);
+  EXPECT_THAT(verdict.reason, HasSubstr("its output has become that of motor \"phi\"; last known: "
+                                        "1200 steps"));
+  // What was said before is said still.
+  give_up_output(record, "chi");
+  EXPECT_THAT(record.reason, HasSubstr("phi"));
+}
+
 // Every combination of what can differ, against the rules as they are said.
 TEST(Rules, EveryCombination) {
   int combinations = 0;

@@ -374,6 +374,44 @@ TEST(Database, TheFirstVersionKeepsItsHistory) {
   EXPECT_THAT(*opened->history("theta", 3), ElementsAre(move));
 }
 
+// Older daemons left names behind at outputs that had become those of others.
+TEST(Database, AnOutputIsThatOfTheNameThatWasWrittenLast) {
+  sim::SimDisk disk(1);
+  std::vector<std::string> notes;
+  {
+    // As they wrote them, in this order.
+    std::vector<const char*> versions(all_versions().begin(), all_versions().begin() + 2);
+    const std::string with_rows = std::string(versions.back()) +
+                                  "INSERT INTO position VALUES ('theta', 1200, '400', 'known', '',"
+                                  " 1, '0123456789abcdef', 7, 2, 1, 5);"
+                                  "INSERT INTO position VALUES ('phi', 1200, '400', 'known', '',"
+                                  " 1, '0123456789abcdef', 7, 2, 1, 5);";
+    versions.back() = with_rows.c_str();
+    const auto opened = Database::open(disk, kDatabase, 0, notes, versions);
+    ASSERT_TRUE(opened) << opened.error().text();
+  }
+  auto opened = Database::open(disk, kDatabase, 0, notes);
+  ASSERT_TRUE(opened) << opened.error().text();
+  const auto records = *opened->records();
+  EXPECT_EQ(records.at("phi").trust, Trust::kKnown);
+  EXPECT_EQ(records.at("theta").trust, Trust::kUncertain);
+  EXPECT_EQ(records.at("theta").unique_id, "");
+  EXPECT_THAT(records.at("theta").reason, HasSubstr("last known: 1200 steps"));
+}
+
+TEST(Database, KeepsATargetThatIsNoStep) {
+  sim::SimDisk disk(1);
+  std::vector<std::string> notes;
+  Record record = standing_at(1200, 1);
+  record.target_steps = 1200;
+  record.target_parts = -3;
+  {
+    auto opened = Database::open(disk, kDatabase, 0, notes);
+    ASSERT_TRUE(opened->write({.records = {{"theta", record}}}));
+  }
+  EXPECT_EQ(Database::open(disk, kDatabase, 0, notes)->records()->at("theta"), record);
+}
+
 // Nothing that was acknowledged is lost, and nothing that was not marked looks like a move.
 TEST(Store, SurvivesPowerCutsAtEveryWrite) {
   for (std::uint64_t cut = 1; cut < 120; ++cut) {

@@ -155,5 +155,20 @@ TEST(Coordinates, NearestStepByIntegers) {
   }));
 }
 
+TEST(Steps, AddUpToTheNearestWholeNumber) {
+  constexpr std::int64_t kHalf = std::int64_t{1} << 31;
+  EXPECT_EQ((Steps{3, kHalf} + Steps{1, 1}), (Steps{5, 1 - kHalf}));
+  EXPECT_EQ((Steps{-3, -kHalf} + Steps{0, -1}), (Steps{-4, kHalf - 1}));
+  EXPECT_EQ((Steps{5, -kHalf} + Steps{-10, 0}), (Steps{-5, -kHalf})) << "whole steps are whole";
+  const auto blade = Coordinates::make({.unit = "mm", .steps_per_unit = {10, 1}, .negative = true});
+  ASSERT_TRUE(blade);
+  Steps sum;
+  for (int i = 0; i < 1000; ++i) sum = sum + *blade->unrounded_of_distance(0.04);
+  EXPECT_EQ(sum.whole, -400);
+  EXPECT_LE(std::abs(sum.parts), 500) << "half a part each";
+  EXPECT_EQ(*blade->unrounded_of_user(0.25), (Steps{-3, kHalf})) << "a tie, away from 0";
+  EXPECT_NEAR(blade->user_of(Steps{-3, kHalf}), 0.25, 1e-15);
+}
+
 }  // namespace
 }  // namespace bushd::units

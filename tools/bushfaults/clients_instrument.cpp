@@ -9,7 +9,8 @@
 
 namespace bushfaults {
 
-// The same in user units: exactly, a little beside, at the farthest a tie; or about at a limit.
+// The same in user units: exactly; positions a little beside, at the farthest a tie, or about at a
+// limit. Distances are whole steps, so that it does not matter what the motor was told before.
 Request Clients::move_of_user() {
   Request request = move_or_retarget();
   const Units& units = witness_.units();
@@ -25,11 +26,13 @@ Request Clients::move_of_user() {
     const std::int64_t step = std::abs(units.micro_of_distance(motor, 1));
     const auto position = units.user_of(motor, amount);
     amount = absolute ? position.value_or(0) : units.micro_of_distance(motor, amount);
-    if (units.has_unit(motor)) amount += random_.between(-step / 2, step / 2);
+    if (absolute && units.has_unit(motor)) amount += random_.between(-step / 2, step / 2);
   }
   return request;
 }
 
+// Either offsets or positions: of both the offsets change when the MCUs have answered, which the
+// witness does not see.
 Request Clients::set_of_user() {
   Request request = make(Ask::kSetPosition);
   request.user = true;
@@ -44,6 +47,10 @@ Request Clients::set_of_user() {
     request.add(some[index].name,
                 random_.between(-kFarthestSteps / 4, kFarthestSteps / 4) * step + beside);
     some.erase(some.begin() + static_cast<std::ptrdiff_t>(index));
+    std::erase_if(some, [&](const Choice& other) {
+      return !request.dial &&
+             witness_.units().has_unit(index_of(other.name)) != witness_.units().has_unit(motor);
+    });
   }
   if (request.motors.empty()) request.add(any_motor(), 0);
   return request;
