@@ -28,7 +28,7 @@ class Positions final : public Service {
   using Listener = std::function<void(MotorId, std::int64_t from_steps, const api::Asker& by)>;
   void set_listener(Listener listener) { listener_ = std::move(listener); }
 
-  // Tells who asked, once what is to be kept of it is on the disk.
+  // Tells who has set offsets, once the disk has them.
   using Answerer = std::function<void(const api::Asker&, api::Completed)>;
   void set_answerer(Answerer answerer) { answerer_ = std::move(answerer); }
 
