@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -88,9 +89,7 @@ void Keypad::take(std::int64_t now_us, std::uint8_t byte) {
     case kSlower:
       delay_us_ += config_.slower_us;
       if (delay_us_ > config_.slowest_us) delay_us_ = config_.delay_us;
-      if (const int direction = session_->direction(); direction != 0) {
-        ask({.motor = motor_, .per_s = direction * 1e6 / delay_us_, .in_steps = true});
-      }
+      if (const int direction = session_->direction(); direction != 0) jog(direction);
       break;
     case kStop:
       ask({.motor = motor_, .per_s = 0, .in_steps = true});
@@ -109,7 +108,15 @@ void Keypad::go(std::int64_t now_us, int direction) {
   if (same) return;
   // Before it is asked for: the answer may come at once.
   session_->begins(direction);
-  ask({.motor = motor_, .per_s = direction * 1e6 / delay_us_, .in_steps = true});
+  jog(direction);
+}
+
+// A motor goes no faster than it is asked to, exactly, and by whole units of its table: of the two
+// fractions next to 1 / delay the one below it would cost a unit where the delay is a whole number
+// of them.
+void Keypad::jog(int direction) {
+  const double per_s = std::nextafter(1e6 / delay_us_, std::numeric_limits<double>::max());
+  ask({.motor = motor_, .per_s = direction * per_s, .in_steps = true});
 }
 
 void Keypad::ask(const api::Jog& jog) {

@@ -50,6 +50,7 @@ class Keypad {
   class KeypadSession;
   void take(std::int64_t now_us, std::uint8_t byte);
   void go(std::int64_t now_us, int direction);
+  void jog(int direction);
   void ask(const api::Jog& jog);
   void show();
 

@@ -207,7 +207,10 @@ void CamacMotors::end(std::int64_t now_us, Bushd2& module, const api::Reply& rep
   if (outcome == api::Outcome::kLimit) {
     (ended.program.left ? status.left_limit : status.right_limit) = true;
   } else if (outcome != api::Outcome::kStopped) {
-    status.not_connected = outcome.has_value();
+    const bool supplied =
+        (installation_.mcu_of(ended.motor).report().flags & BUSHD_FLAG_ENABLED) != 0;
+    status.supply_missing = outcome.has_value() && !supplied;
+    status.not_connected = outcome.has_value() && supplied;
   }
   module.ends(status);
 }

@@ -3,6 +3,11 @@
 #include "firmware/core/access.h"
 #include "firmware/core/state.h"
 
+// 1/64 step/s that the port keeps up with, unless its build says less.
+#ifndef BUSHD_MOST_VELOCITY
+#define BUSHD_MOST_VELOCITY BUSHD_VELOCITY_MOST
+#endif
+
 static bushd_velocity* loop_of(const bushd_mcu* mcu, uint8_t m) {
   return &mcu->config.velocity[m].loop;
 }
@@ -25,6 +30,7 @@ uint16_t bushd_mcu_moved_by_velocity(const bushd_mcu* mcu) {
 
 // Steps are a period apart, so a tick holds one more than whole periods at most.
 static bool has_room(const bushd_mcu* mcu, int32_t most) {
+  if (most > BUSHD_MOST_VELOCITY) return false;
   const uint32_t period_ns = bushd_velocity_period(most, most) * BUSHD_VELOCITY_INTERVAL_NS;
   return mcu->tick_ns / period_ns + 1u <= mcu->emission.grid.max_steps;
 }

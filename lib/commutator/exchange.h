@@ -59,6 +59,9 @@ class Exchange {
   // The motor named makes a step that many ns from now, or later. Its header goes before it if
   // another motor or direction was selected. Preconditions: free(), motor < kMotors.
   void step(std::int64_t now_us, unsigned motor, bool left, std::uint64_t delay_ns);
+  // The next step is the first of a motion: it begins with 0 and its header. A board that was reset
+  // since the last one waits for a header, and some codes look like one. Precondition: free().
+  void begin_motion() { selected_.reset(); }
   // The board has none of our codes.
   bool free() const { return !asked_; }
   // The step asked for is not made, if its code has not been sent. Else false: it is with the

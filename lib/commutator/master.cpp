@@ -164,7 +164,10 @@ void Master::ask(std::int64_t now_us) {
   const bool begins = !motion.asked && !motion.cut;
   if (begins && plan_ns(now_us) < motion.steps.start() * tick_ns_) return;
   // The first delay begins now, however late that is.
-  if (begins) set_clock(now_us, plan_ns(now_us));
+  if (begins) {
+    set_clock(now_us, plan_ns(now_us));
+    exchange_.begin_motion();
+  }
   const auto next = motion.cut ? std::nullopt : motion.steps.take();
   if (!next) return end_motion();
   motion.asked = next;
@@ -223,6 +226,8 @@ void Master::answered(std::int64_t now_us, const Status& status) {
                                                     : "the board did not make a step";
     uncertain(motor, what + ", and it stopped without its ramp");
     end_motion();
+    // Until it is tried again.
+    if (status.supply_missing) set_powered(false);
     return go_offline(now_us, what);
   }
   if (!(step.direction > 0 ? status.right_limit : status.left_limit)) return;
@@ -238,6 +243,11 @@ void Master::take_limits(const Status& status, std::uint8_t motor) {
   bushd_report& report = board_.view.report;
   set_bit(report.forbidden_positive, motor, status.right_limit);
   set_bit(report.forbidden_negative, motor, status.left_limit);
+}
+
+void Master::set_powered(bool on) {
+  std::uint8_t& flags = board_.view.report.flags;
+  flags = static_cast<std::uint8_t>(on ? flags | BUSHD_FLAG_ENABLED : flags & ~BUSHD_FLAG_ENABLED);
 }
 
 void Master::lost(std::int64_t now_us, const std::string& cause) {
@@ -287,6 +297,7 @@ void Master::go_online(std::int64_t now_us) {
   board_.view.phase = link::McuPhase::kOnline;
   board_.view.detail.clear();
   board_.view.identified = true;
+  set_powered(true);
   take_report(now_us);
   events_.emplace_back(link::McuOnline{kBoard});
 }

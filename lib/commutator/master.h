@@ -88,6 +88,7 @@ class Master final : public link::BusMaster {
   void set_clock(std::int64_t now_us, std::int64_t plan_ns);
   void handle(std::int64_t now_us, const Exchange::Event& event);
   void answered(std::int64_t now_us, const Status& status);
+  void set_powered(bool on);
   void lost(std::int64_t now_us, const std::string& cause);
   void take_limits(const Status& status, std::uint8_t motor);
   void ask(std::int64_t now_us);

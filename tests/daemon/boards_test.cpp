@@ -351,6 +351,17 @@ TEST(Boards, ALowerSpeedInMotionIsApproachedAlongTheTable) {
   }
 }
 
+// A board that was reset while it rested waits for a header, and the code 250 is one.
+TEST(Boards, EachMotionBeginsWithItsHeader) {
+  BoardLab lab;
+  EXPECT_EQ(lab.move("m0", 2).result, "reached");
+  const std::size_t before = lab.sent.size();
+  EXPECT_EQ(lab.move("m0", 2).result, "reached");
+  const std::vector<std::uint8_t> second(lab.sent.begin() + static_cast<std::ptrdiff_t>(before),
+                                         lab.sent.end());
+  EXPECT_EQ(second, (std::vector<std::uint8_t>{0, 0x80, 250, 250}));
+}
+
 // As the configuration is refused that names such a table.
 TEST(Boards, ATableFasterThanACodeIsNotPutInService) {
   BoardLab lab;
@@ -430,6 +441,17 @@ TEST(Boards, ProgramOfABushd2MovesAMotorBehindABoard) {
   lab.permit(1 | 1 << 5 | 1 << 6);
   ASSERT_TRUE(lab.wait_for_lam());
   EXPECT_EQ(lab.shaft_steps("m5"), -300);
+  EXPECT_EQ(lab.requests() & 0x1Fu, 1u << 2);
+
+  // Nor is the motor there.
+  lab.board(0).supply = true;
+  lab.board(0).motor(5).connected = false;
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
+  lab.wait(lab.send(Ask::kSetPosition, {"m5"}, {lab.shaft_steps("m5")}));
+  lab.naf(5, 0, 10);
+  lab.permit(1 | 1 << 5 | 1 << 6);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.requests() & 0x1Fu, 1u << 3);
 }
 
 }  // namespace

@@ -99,6 +99,22 @@ TEST(Keypads, LatchedKeyCountsUntilTheNextOne) {
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
 }
 
+// To the microsecond: 3 ms are 75 codes of 40 us, and not 76. A step more or less at either end.
+TEST(Keypads, ADelayOfWholeCodesIsThatDelay) {
+  KeypadLab lab("mode = \"latch\"\n");
+  lab.press(kKeyForward);
+  lab.live(1);
+  for (int delay_us = 3000; delay_us <= 4200; delay_us += 300) {
+    SCOPED_TRACE(std::to_string(delay_us) + " us");
+    const std::int64_t before = lab.shaft_steps("m01");
+    lab.live(6);
+    const double code_us = 40 * std::ceil(delay_us / 40.0);
+    EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m01") - before), 6e6 / code_us, 1.01);
+    lab.press(kKeySlower);
+    lab.live(0.5);
+  }
+}
+
 TEST(Keypads, SlowerIsShownAndTurnsRoundAtTheSlowest) {
   KeypadLab lab("mode = \"latch\"\n");
   EXPECT_EQ(lab.press(kKeySlower), "0330\n");

@@ -143,6 +143,19 @@ TEST_F(VelocityOfTheImage, TurnsAtATick) {
   end({0});
 }
 
+// As fast as the image takes it, with both, and no faster.
+TEST_F(VelocityOfTheImage, KeepsUpWithWhatItTakes) {
+  constexpr std::int32_t kMost = 6000 * 64;
+  ASSERT_NO_FATAL_FAILURE(set_up({{0, 200 * 64, kMost, 20000}, {1, 200 * 64, kMost, 20000}}));
+  hold(kForward, 0, 300);
+  hold(kReverse, 0, 400);
+  hold(0, 0, 300);
+  end({0, 1});
+  EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
+                                 bushd_set_velocity{0, 200 * 64, kMost + 1, 20000}),
+            BUSHD_E_CAPACITY);
+}
+
 // The limit of motor 0, with the button held; then back from it. Motor 1 goes on.
 TEST_F(VelocityOfTheImage, ALimitBrakesAlongTheRamp) {
   ASSERT_NO_FATAL_FAILURE(set_up({{0, 200 * 64, 2500 * 64, 5000}, {1, 150 * 64, 900 * 64, 1700}}));
