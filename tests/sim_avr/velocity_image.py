@@ -144,7 +144,7 @@ def judge(run):
 
 def main(program):
     runs = [run_of(trace) for trace in traces.recorded_by(program, "VelocityOfTheImage.*", "BUSHD_VELOCITY_TRACE")]
-    assert len(runs) == 4, f"{len(runs)} traces"
+    assert len(runs) == 5, f"{len(runs)} traces"
     for run in runs:
         steps, latest = judge(run)
         signs = {sign for *_, sign in predicted(run)}
