@@ -80,8 +80,8 @@ MotorStatus CamacMotors::status(int number) {
 bool CamacMotors::move(const Program& program) {
   const MotorId id = config_.motors[static_cast<std::size_t>(program.motor)];
   const motion::Motor& motor = installation_[id];
-  Result<void> may;
-  if (motor.has_plan()) may = fail("moves, by another's request");
+  Result<void> may = motor.may_be_used();
+  if (may && motor.has_plan()) may = fail("moves, by another's request");
   const auto table = table_of_program(program, config_.f_start_hz, name_);
   if (may && !table) may = fail(table.error());
   const std::int64_t steps = program.left ? -std::int64_t{program.steps} : program.steps;

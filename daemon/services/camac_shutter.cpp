@@ -57,8 +57,8 @@ bool CamacShutter::refuse(const std::string& why) {
 
 Result<void> CamacShutter::may_begin(std::int64_t steps) const {
   const motion::Motor& motor = installation_[motor_];
-  if (motor.has_plan()) return fail("moves, by another's request");
   if (auto may = interlocks_.may_move(motor_); !may) return may;
+  if (motor.has_plan()) return fail("moves, by another's request");
   return motor.may_move_to(motor.position_steps() + steps);
 }
 

@@ -95,7 +95,9 @@ Result<void> Drivers::may(std::uint8_t action, const std::vector<McuId>& mcus) c
   for (const McuId id : mcus) {
     for (const MotorId motor : installation_[id].motors()) {
       if (installation_[motor].is<motion::Resting>()) continue;
-      return fail(installation_[motor].busy_text() + "; stop it first");
+      const bool armed = installation_[motor].is<motion::Armed>();
+      return fail(installation_[motor].busy_text() +
+                  (armed ? "; disarm it first" : "; stop it first"));
     }
   }
   return {};

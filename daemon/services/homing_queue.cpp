@@ -132,8 +132,8 @@ Result<void> HomingQueue::may_home(MotorId id) const {
     return fail("no home switch configured: add 'home = {...}' to motor \"" +
                 installation_[id].name() + "\"");
   }
-  if (installation_[id].has_plan()) return fail("it moves; stop it first");
   if (auto may = interlocks_.may_move(id); !may) return may;
+  if (installation_[id].has_plan()) return fail("it moves; stop it first");
   if (!mcu.can_home()) {
     return fail("MCU " + mcu.name() +
                 " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");

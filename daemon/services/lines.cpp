@@ -229,9 +229,9 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
     const motion::Motor& motor = installation_[line.motors[i]];
     if (*step < 0 || *step > end) {
       return fail(
-          fmt::format("{} is beyond the ends of the line that is under way; stop it first, "
+          fmt::format("{}: {} is beyond the ends of the line that is under way; stop it first, "
                       "or wait for its result",
-                      motor.coordinates().text(targets[i].whole)));
+                      motor.name(), motor.coordinates().text(targets[i].whole)));
     }
     const auto s = static_cast<std::uint32_t>(*step);
     const std::int64_t on_way = line.way.position_at(i, s);

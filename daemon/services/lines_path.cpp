@@ -261,11 +261,11 @@ Result<void> Lines::may_begin(const Line& line) const {
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     const motion::Motor& motor = installation_[line.motors[i]];
     const std::string name = motor.name() + ": ";
-    if (motor.has_plan()) {
-      return fail(name + "it moves; a path begins at rest, so stop it or wait for its result");
-    }
     if (auto may = interlocks_.may_move(line.motors[i]); !may) {
       return fail(name + may.error().text());
+    }
+    if (motor.has_plan()) {
+      return fail(name + "it moves; a path begins at rest, so stop it or wait for its result");
     }
     if (motor.position_steps() != line.path->point(0, i) ||
         &installation_.table_of(line.motors[i])->view() != line.path->motors()[i].table) {

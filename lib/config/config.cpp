@@ -12,7 +12,8 @@
 namespace bushd::config {
 
 Result<Config> load(const std::filesystem::path& path) {
-  const auto text = tables::read_text(path);
+  const auto text = tables::read_text(
+      path, "a configuration of hundreds of motors needs a tenth of that: is it the right file?");
   if (!text) return fail(text.error());
   return parse(*text, path);
 }

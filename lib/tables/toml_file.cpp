@@ -90,7 +90,7 @@ tl::unexpected<Error> unreadable(const std::filesystem::path& path, std::string 
 
 }  // namespace
 
-Result<std::string> read_text(const std::filesystem::path& path) {
+Result<std::string> read_text(const std::filesystem::path& path, std::string_view largest) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) {
@@ -110,10 +110,7 @@ Result<std::string> read_text(const std::filesystem::path& path) {
   }
   if (file.bad()) return unreadable(path, std::strerror(errno));
   if (text.size() > kMaxFileBytes) {
-    return unreadable(path,
-                      fmt::format("larger than {} bytes, and the longest table allowed needs half "
-                                  "of that",
-                                  kMaxFileBytes));
+    return unreadable(path, fmt::format("larger than {} bytes, and {}", kMaxFileBytes, largest));
   }
   return text;
 }

@@ -16,8 +16,11 @@ namespace bushd::tables {
 // memory.
 inline constexpr std::size_t kMaxFileBytes = 2 * 1024 * 1024;
 
-// A regular file of at most kMaxFileBytes.
-Result<std::string> read_text(const std::filesystem::path& path);
+// A regular file of at most kMaxFileBytes. `largest`: how the error compares that to what is
+// needed.
+Result<std::string> read_text(
+    const std::filesystem::path& path,
+    std::string_view largest = "the longest table allowed needs half of that");
 
 // SHA-256 of a text, 64 hexadecimal digits.
 std::string text_sha256(std::string_view text);

@@ -9,6 +9,7 @@
 
 #include "config/config_file.h"
 #include "source_path.h"
+#include "tables/temp_directory.h"
 
 namespace bushd::config {
 namespace {
@@ -47,6 +48,14 @@ TEST(Config, GoodFileIsReadInItsOrder) {
   EXPECT_EQ(config->bus_of(slit).name, "roof");
   EXPECT_EQ(config->group_of(slit).name, "slits");
   EXPECT_EQ(config->table_of(slit).name(), "t");
+}
+
+TEST(Config, AFileThatIsTooLargeIsNotMeasuredByTables) {
+  const test::TempDirectory directory;
+  const auto path = directory.write("bushd.toml", std::string(3 * 1024 * 1024, '\n'));
+  const auto loaded = load(path);
+  ASSERT_FALSE(loaded);
+  EXPECT_THAT(loaded.error().text(), HasSubstr("larger than 2097152 bytes, and a configuration"));
 }
 
 TEST(Config, MannersOfABusHaveDefaults) {

@@ -217,7 +217,8 @@ TEST(Lines, WhatIsNotOnTheLineIsRefused) {
       refusal(line_to(kMotors, {2000, -1002, 500, 0})),
       HasSubstr(
           "m02: -1002 steps is not on the line that is under way, which leads through -1000"));
-  EXPECT_THAT(refusal(line_to(kMotors, {5000, -2500, 1250, 0})), HasSubstr("beyond the ends"));
+  EXPECT_THAT(refusal(line_to(kMotors, {5000, -2500, 1250, 0})),
+              HasSubstr("m01: 5000 steps is beyond the ends"));
   EXPECT_THAT(refusal(line_to({"m01", "m02"}, {2000, -1000})), HasSubstr("name all of them"));
   EXPECT_THAT(refusal(request_of(Ask::kMoveTo, {"m01"}, {10})), HasSubstr("moves on a line"));
   EXPECT_THAT(refusal(api::Jog{.motor = "m01", .per_s = 10, .in_steps = true}),

@@ -98,7 +98,8 @@ Result<TorqueCurve> parse_torque_csv(std::string_view text, double steps_per_tur
 }
 
 Result<TorqueCurve> load_torque_csv(const std::string& path, double steps_per_turn) {
-  const auto text = read_text(path);
+  const auto text =
+      read_text(path, "a motor's data need a hundredth of that: is it the right file?");
   if (!text) return fail(text.error());
   return parse_torque_csv(*text, steps_per_turn, path);
 }

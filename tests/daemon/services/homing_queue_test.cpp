@@ -84,6 +84,13 @@ TEST(HomingQueue, StopEndsIt) {
   EXPECT_EQ(bench.shaft_steps("m02"), 0);
 }
 
+TEST(HomingQueue, AMotorThatWaitsForTheTriggerIsSaidToDoThat) {
+  HomingBench bench;
+  bench.installation[bench.motor("m01")].arm(1, 40, 0);
+  bench.homing.request(bench.asker(1), api::Home{{"m01"}});
+  EXPECT_THAT(bench.refusal(1), HasSubstr("m01: waits for the trigger; disarm it first"));
+}
+
 TEST(HomingQueue, AMotorWithoutAHomeIsRefusedWithTheRemedy) {
   LiveBench bench;
   Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.local_inputs,
