@@ -305,14 +305,20 @@ bool MotorSettings::being_set_up(const Open& open) const {
   });
 }
 
-// Whoever has been answered finds it after a power cut, unless the disk fails, and its MCU has it,
-// unless that is offline.
-void MotorSettings::step(std::int64_t) {
-  std::erase_if(open_, [this](Open& open) {
+// Whoever has been told that it is done finds it after a power cut, and its MCU has it, unless that
+// is offline.
+void MotorSettings::step(std::int64_t now_us) {
+  std::erase_if(open_, [&](Open& open) {
     if (being_set_up(open)) return false;
-    const auto trouble = kept_.trouble();
-    if (kept_.kept_up_to() < open.number && !trouble) return false;
-    if (trouble) open.answer.reason += "; not on the disk yet: " + *trouble;
+    if (!open.until_us) open.until_us = now_us + kPatienceUs;
+    const bool kept = kept_.kept_up_to() >= open.number;
+    if (!kept && now_us < *open.until_us) return false;
+    if (!kept) {
+      open.answer.outcome = api::Outcome::kFault;
+      open.answer.reason += "; this counts, but is not on the disk, so it is lost if bushd ends: " +
+                            kept_.trouble().value_or("the disk does not answer") +
+                            ". It is tried again; 'bushctl doctor' tells of the disk";
+    }
     open.asker.answer(open.answer);
     return true;
   });

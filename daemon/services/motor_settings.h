@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@ namespace bushd::daemon {
 
 class MotorSettings final : public Service {
  public:
+  static constexpr std::int64_t kPatienceUs = 3'000'000;  // with the disk
+
   // `about_to_move`: a request for this motor has been taken and is not yet carried out.
   MotorSettings(Installation& installation, const Positions& positions, KeptPositions& kept,
                 Journal& journal, Outputs& outputs, std::function<bool(MotorId)> about_to_move);
@@ -55,6 +58,7 @@ class MotorSettings final : public Service {
     std::uint64_t number;  // of KeptPositions::told
     api::Completed answer;
     std::vector<MotorId> motors{};
+    std::optional<std::int64_t> until_us{};  // no longer is the disk waited for
   };
   config::Settings settings_of(MotorId motor) const;
   Result<Plan> plan_of(const api::Configure& request,

@@ -8,6 +8,7 @@
 namespace bushd::test {
 namespace {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -352,6 +353,36 @@ TEST(MotorSettings, AreToldAsDoneWhenTheDiskHasThem) {
       api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", "offset", "2.5"}}});
   lab.run_for(0.03);
   EXPECT_FALSE(lab.has_result(number));
+  EXPECT_EQ(lab.wait(number).result, "done");
+}
+
+TEST(MotorSettings, AreNotToldAsDoneWhileTheDiskDoesNotTakeThem) {
+  const api::Request change =
+      api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", "offset", "2.5"}}};
+  for (const bool hangs : {false, true}) {
+    SettingsLab lab;
+    lab.run_for(0.2);
+    lab.disk().set_broken(!hangs);
+    if (hangs) lab.disk_us = 100'000'000;
+    const auto number = lab.send(change);
+    lab.run_for(2.9);
+    EXPECT_FALSE(lab.has_result(number)) << "it may get there yet";
+    EXPECT_EQ(lab.wait(number).result, "fault");
+    EXPECT_THAT(lab.last_reply(number).reason,
+                AllOf(HasSubstr("m01: offset = 2.5; this counts, but is not on the disk"),
+                      HasSubstr(hangs ? "does not answer" : "disk")));
+    EXPECT_EQ(lab.motor("m01").user, 2.5);
+  }
+}
+
+TEST(MotorSettings, AreDoneWhenTheDiskTakesThemInTheEnd) {
+  SettingsLab lab;
+  lab.run_for(0.2);
+  lab.disk().set_broken(true);
+  const auto number = lab.send(
+      api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", "offset", "2.5"}}});
+  lab.run_for(0.5);
+  lab.disk().set_broken(false);
   EXPECT_EQ(lab.wait(number).result, "done");
 }
 

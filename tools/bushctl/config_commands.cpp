@@ -29,7 +29,7 @@ std::variant<api::Configuration, int> ask(Client& client, const api::Configure& 
   const auto* completed = std::get_if<api::Completed>(&*reply);
   const auto* configuration =
       completed == nullptr ? nullptr : std::get_if<api::Configuration>(&completed->detail);
-  if (configuration == nullptr) return refused(*reply);
+  if (configuration == nullptr || completed->outcome != api::Outcome::kDone) return refused(*reply);
   if (reason != nullptr) *reason = completed->reason;
   return *configuration;
 }
