@@ -32,9 +32,10 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
       trigger_(installation_, interlocks_, moves_, open_moves_),
+      while_connected_(installation_, moves_, open_moves_),
       position_compare_(installation_),
       pseudo_axes_(installation_),
-      state_(installation_, pseudo_axes_, outputs),
+      state_(installation_, pseudo_axes_, open_moves_, outputs),
       line_tables_(installation_, lines_),
       departures_(
           installation_, interlocks_, open_moves_, kept_, idle_drivers_, line_tables_,
@@ -62,6 +63,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 &drivers_,
                 &positions_,
                 &trigger_,
+                &while_connected_,
                 &position_compare_,
                 &tables_,
                 &departures_,
@@ -168,7 +170,11 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::UseTable& r) { tables_.request(asker, r); },
                  [&](const api::ReloadTables& r) { tables_.request(asker, r); },
                  [&](const api::Home& r) { homing_.request(asker, r); },
-                 [&](const api::Arm& r) { trigger_.request(asker, r); },
+                 [&](const api::Arm& r) {
+                   if (!r.while_connected || while_connected_.take(asker)) {
+                     trigger_.request(asker, r);
+                   }
+                 },
                  [&](const api::Disarm& r) { trigger_.request(asker, r); },
                  [&](const api::PositionCompare& r) { position_compare_.request(now, asker, r); },
                  [&](const api::ListTables& r) { outputs_.serve_tables(asker, r); },
@@ -186,7 +192,9 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::MovePath& r) { lines_.request(now, asker, r); },
                  [&](const api::Camac& r) { camac_.request(now, asker, r); },
                  [&](const api::Follow& r) { arrays_.request(now, asker, r); },
-                 [&](const api::ArmLine& r) { lines_.request(asker, r); },
+                 [&](const api::ArmLine& r) {
+                   if (!r.while_connected || while_connected_.take(asker)) lines_.request(asker, r);
+                 },
              },
              request);
 }

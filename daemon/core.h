@@ -40,6 +40,7 @@
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
 #include "daemon/services/trigger.h"
+#include "daemon/services/while_connected.h"
 #include "daemon/supervisor.h"
 
 namespace bushd::daemon {
@@ -124,6 +125,7 @@ class Core {
   LinkFaults link_faults_;
   Drivers drivers_;
   Trigger trigger_;
+  WhileConnected while_connected_;
   PositionCompare position_compare_;
   PseudoAxes pseudo_axes_;
   StatePublisher state_;

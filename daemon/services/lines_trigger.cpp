@@ -64,8 +64,8 @@ Result<void> Lines::may_wait(const Line& line) const {
     for (const MotorId other : mcu.motors()) {
       const motion::Motor& motor = installation_[other];
       if (motor.is<motion::Armed>()) {
-        return fail(fmt::format("{} waits for the trigger of MCU {} already; disarm it first",
-                                motor.name(), mcu.name()));
+        return fail(fmt::format("{} waits for the trigger of MCU {} already{}; disarm it first",
+                                motor.name(), mcu.name(), open_.asked_for_by(other)));
       }
       if (motor.is<motion::OnLine>() && motor.axis().line() && motor.axis().line()->in_mcus) {
         return fail(fmt::format(

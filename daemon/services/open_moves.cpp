@@ -141,4 +141,9 @@ const api::Asker* OpenMoves::asker_of(MotorId motor) const {
   return move ? &open_.at(*move).asker : nullptr;
 }
 
+std::string OpenMoves::asked_for_by(MotorId motor) const {
+  const api::Asker* asker = asker_of(motor);
+  return asker == nullptr ? "" : ", asked for by " + text_of(*asker);
+}
+
 }  // namespace bushd::daemon

@@ -74,6 +74,8 @@ class OpenMoves {
   bool together(MotorId a, MotorId b) const { return book_.move_of(a) == book_.move_of(b); }
   // Whose request it is; null if none.
   const api::Asker* asker_of(MotorId motor) const;
+  // For reasons: ", asked for by command 7 of panel"; "" if it is nobody's.
+  std::string asked_for_by(MotorId motor) const;
 
  private:
   struct Open {

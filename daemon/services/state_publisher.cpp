@@ -77,8 +77,11 @@ void show_inputs(const link::McuView& view, const config::MotorInputs& inputs,
 }  // namespace
 
 StatePublisher::StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
-                               Outputs& outputs)
-    : installation_(installation), pseudo_axes_(pseudo_axes), outputs_(outputs) {
+                               const OpenMoves& open_moves, Outputs& outputs)
+    : installation_(installation),
+      pseudo_axes_(pseudo_axes),
+      open_moves_(open_moves),
+      outputs_(outputs) {
   for (std::size_t i = 0; i < installation.config().state_parts(); ++i) described_.add();
 }
 
@@ -161,6 +164,8 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   state.heard_utime_us = trust.heard_utime_us;
   state.paused = motor.is_paused();
   state.held = motor.is_held();
+  const api::Asker* asker = open_moves_.asker_of(*mcu.motor_at(motor.output()));
+  if (motor.is<motion::Armed>() && asker != nullptr) state.armed_by = text_of(*asker);
   return state;
 }
 

@@ -7,6 +7,7 @@
 
 #include "daemon/installation.h"
 #include "daemon/outputs.h"
+#include "daemon/services/open_moves.h"
 #include "daemon/services/pseudo_axes.h"
 
 namespace bushd::daemon {
@@ -20,7 +21,8 @@ class StatePublisher {
   // Passed on to clients every few seconds only (Publishing).
   static constexpr std::int64_t kDescriptionPeriodUs = 500'000;
 
-  StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes, Outputs& outputs);
+  StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
+                 const OpenMoves& open_moves, Outputs& outputs);
 
   void step(std::int64_t now_us);
   // As it is now, whether due or not.
@@ -40,6 +42,7 @@ class StatePublisher {
   };
   Installation& installation_;
   const PseudoAxes& pseudo_axes_;
+  const OpenMoves& open_moves_;
   Outputs& outputs_;
   ById<McuId, Described> described_;  // then computed axes
   std::int64_t due_us_ = 0;

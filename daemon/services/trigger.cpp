@@ -93,7 +93,7 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
   for (const MotorId other : mcu.motors()) {
     if (!installation_[other].is<motion::Armed>()) continue;
     return fail(installation_[other].name() + " waits for the trigger of MCU " + mcu.name() +
-                " already; disarm it first");
+                " already" + open_moves_.asked_for_by(other) + "; disarm it first");
   }
   return {};
 }

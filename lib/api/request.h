@@ -187,6 +187,8 @@ struct Arm {
   std::int64_t delay_us = 0;          // 50..1650000, three ticks come on top
   std::vector<MotorAmount> motors{};  // by so much, not 0
   std::optional<Speed> speed{};
+  // They wait no more as soon as the client has gone; its transport has to tell that.
+  bool while_connected = false;
 };
 
 // Motors of one bus, at rest, wait for an edge at the trigger inputs of their MCUs and begin a line
@@ -200,6 +202,7 @@ struct ArmLine {
   std::vector<MotorAmount> motors{};   // as of MoveLine; each makes a step at least
   std::optional<Speed> speed{};        // as of MoveLine
   std::optional<double> duration_s{};  // as of MoveLine
+  bool while_connected = false;        // as of Arm
 };
 
 // Motors that wait for the trigger do so no more, nor do those armed with them; none named: all.

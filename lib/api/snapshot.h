@@ -34,8 +34,9 @@ struct MotorState {
   std::string uncertain_reason{};  // why it is not known; "" while it is
   // When the position was heard, microseconds since 1970, if Trust::kStale.
   std::optional<std::int64_t> heard_utime_us{};
-  bool paused = false;  // it ramps down, or stands, on the way to its target
-  bool held = false;    // no motion begins
+  bool paused = false;     // it ramps down, or stands, on the way to its target
+  bool held = false;       // no motion begins
+  std::string armed_by{};  // whose request it is to wait for the trigger by; "": it does not
   // While it moves on a line: the share of the line's run that has been made, as reported last, and
   // the time that the rest of it takes.
   struct Line {

@@ -15,7 +15,7 @@ constexpr Layout kRequest{"llsl"};
 constexpr Layout kBare{"t", {&kRequest}};
 constexpr Layout kMotors{"tnS", {&kRequest}};
 constexpr Layout kReplyHeader{"llslbssii"};
-constexpr Layout kMotor{"slddlddbsbbsssslbbbdd"};
+constexpr Layout kMotor{"slddlddbsbbsssslbbsbdd"};
 constexpr Layout kMotorAmount{"sbld"};
 constexpr Layout kMotorDescription{"shstsssbdbbdddd", {&kTableRef}};
 constexpr Layout kMcuHealth{"sisiisillllllliddb"};
@@ -33,8 +33,8 @@ BUSHD_LAYOUT(hello_t, "lsl")
 BUSHD_LAYOUT(welcome_t, "llsll")
 BUSHD_LAYOUT(subscribe_t, "bbb")
 
-BUSHD_LAYOUT(arm_t, "tbldbnT", {&kRequest, &kMotorAmount})
-BUSHD_LAYOUT(arm_line_t, "tblbdbdnT", {&kRequest, &kMotorAmount})
+BUSHD_LAYOUT(arm_t, "tbldbbnT", {&kRequest, &kMotorAmount})
+BUSHD_LAYOUT(arm_line_t, "tblbdbdbnT", {&kRequest, &kMotorAmount})
 BUSHD_LAYOUT(camac_request_t, "tibiiinBBBI", {&kRequest})
 BUSHD_LAYOUT(clear_faults_t, kMotors)
 BUSHD_LAYOUT(configure_t, "tbnSnSSSs", {&kRequest})

@@ -215,6 +215,7 @@ arm_t to_message(const api::Arm& arm) {
   arm_t message{};
   message.edge = arm.edge == api::Edge::kRising ? arm_t::RISING : arm_t::FALLING;
   message.delay_us = arm.delay_us;
+  message.while_connected = arm.while_connected ? 1 : 0;
   put_speed(message, arm.speed);
   put_motors(message, arm.motors);
   return message;
@@ -224,7 +225,8 @@ std::optional<api::Request> from_message(const arm_t& message) {
   return api::Arm{.edge = message.edge == arm_t::RISING ? api::Edge::kRising : api::Edge::kFalling,
                   .delay_us = message.delay_us,
                   .motors = amounts_of(message.motors),
-                  .speed = speed_of(message)};
+                  .speed = speed_of(message),
+                  .while_connected = message.while_connected != 0};
 }
 
 arm_line_t to_message(const api::ArmLine& arm) {
@@ -235,6 +237,7 @@ arm_line_t to_message(const api::ArmLine& arm) {
       arm.kind == api::Move::Kind::kAbsolute ? arm_line_t::ABSOLUTE : arm_line_t::RELATIVE;
   put_speed(message, arm.speed);
   message.duration_s = arm.duration_s.value_or(0.0);
+  message.while_connected = arm.while_connected ? 1 : 0;
   put_motors(message, arm.motors);
   return message;
 }
@@ -253,6 +256,7 @@ std::optional<api::Request> from_message(const arm_line_t& message) {
       .motors = amounts_of(message.motors),
       .speed = speed_of(message)};
   if (message.duration_s != 0) arm.duration_s = message.duration_s;
+  arm.while_connected = message.while_connected != 0;
   return arm;
 }
 

@@ -56,6 +56,7 @@ motor_t message_of(const api::MotorState& motor) {
   message.heard_utime_us = motor.heard_utime_us.value_or(0);
   message.paused = motor.paused ? 1 : 0;
   message.held = motor.held ? 1 : 0;
+  message.armed_by = motor.armed_by;
   message.on_line = motor.line ? 1 : 0;
   if (motor.line) {
     message.line_fraction = motor.line->fraction;
@@ -96,6 +97,7 @@ std::optional<api::MotorState> state_of(const motor_t& message) {
                          .heard_utime_us = heard_utime_us,
                          .paused = message.paused != 0,
                          .held = message.held != 0,
+                         .armed_by = message.armed_by,
                          .line = line};
 }
 

@@ -75,8 +75,8 @@ api::Request request_of(Ask ask, const std::vector<std::string>& motors,
 
 class Lab::Client final : public api::Session {
  public:
-  explicit Client(std::string name = "test")
-      : Session(api::Transport::kLcm, std::move(name), true) {}
+  explicit Client(std::string name = "test", api::Transport transport = api::Transport::kLcm)
+      : Session(transport, std::move(name), true) {}
   bool gone() const override { return has_left; }
   void answer(std::int64_t number, const api::Reply& reply) override {
     answers[number].push_back(answer_of(reply));
@@ -366,7 +366,7 @@ std::int64_t Lab::send(const api::Request& request) {
 
 std::int64_t Lab::send_as(const std::string& client, const api::Request& request) {
   std::shared_ptr<Client>& session = others_[client];
-  if (!session) session = std::make_shared<Client>(client);
+  if (!session) session = std::make_shared<Client>(client, api::Transport::kSocket);
   asked_by_[++number_] = session;
   core().request(now_us(), {.session = session, .number = number_}, request);
   return number_;

@@ -92,7 +92,7 @@ class Lab : public daemon::Outputs, private state::Backend {
     return send(request_of(ask, motors, steps));
   }
   std::int64_t send(const api::Request& request);
-  // The same as another client, and that client's end.
+  // The same as another client, of the control socket, and that client's end.
   std::int64_t send_as(const std::string& client, const api::Request& request);
   void leave(const std::string& client);
   // The replies so far to a request.

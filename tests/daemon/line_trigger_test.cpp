@@ -296,6 +296,21 @@ TEST_F(ArmedLine, IsRefusedWhereItCannotWait) {
   EXPECT_THAT(refusal(lab, {"m04"}, {5}), HasSubstr("m04 moves; stop it first"));
 }
 
+TEST_F(ArmedLine, EndsWithItsClientIfThatIsAskedFor) {
+  Lab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_SCRATCH);
+  lab.connect();
+  const auto waits =
+      lab.send_as("panel", api::ArmLine{.delay_us = 100,
+                                        .motors = motor_steps({"m01", "m03"}, {9, 9}),
+                                        .while_connected = true});
+  lab.run_for(0.2);
+  EXPECT_THAT(lab.motor("m03").armed_by, HasSubstr("of panel"));
+  lab.leave("panel");
+  EXPECT_EQ(lab.wait(waits).result, "stopped");
+  EXPECT_THAT(lab.last_reply(waits).reason, HasSubstr("because its client has gone"));
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
 TEST_F(ArmedLine, IsRefusedForAnMcuWithoutLines) {
   Lab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_LINE_RUN);
   lab.connect();

@@ -267,6 +267,57 @@ TEST_P(Triggered, WhatWaitsIsRefusedOtherCommands) {
   EXPECT_EQ(lab.wait(move).result, "reached");
 }
 
+// By default they wait though nobody is there any more: a script arms them and ends.
+TEST_P(Triggered, OutliveWhoHasArmedThemUnlessThatIsAskedFor) {
+  lab.connect();
+  const auto ask = [](const char* motor, bool while_connected) {
+    api::Arm arm = std::get<api::Arm>(armed({motor}, {40}));
+    arm.while_connected = while_connected;
+    return api::Request(arm);
+  };
+  EXPECT_THAT(lab.last_reply(lab.send(ask("m01", true))).reason,
+              HasSubstr("LCM does not tell when it has gone"));
+  const auto stays = lab.send_as("script", ask("m01", false));
+  const auto ends = lab.send_as("panel", ask("m04", true));
+  ASSERT_TRUE(lab.run_until([&] { return lab.bus(0).mcu(1).core().trigger.armed != 0; }, 1));
+  lab.run_for(0.2);
+  EXPECT_THAT(lab.motor("m01").armed_by, HasSubstr("of script"));
+  EXPECT_THAT(lab.motor("m04").armed_by, HasSubstr("of panel"));
+  EXPECT_EQ(lab.motor("m02").armed_by, "");
+  EXPECT_THAT(lab.last_reply(lab.send(armed({"m05"}, {10}))).reason,
+              HasSubstr("m04 waits for the trigger of MCU hall:2 already, asked for by command " +
+                        std::to_string(ends) + " of panel"));
+  lab.leave("script");
+  lab.leave("panel");
+  lab.run_for(0.5);
+  EXPECT_EQ(lab.last_reply(ends).result, "stopped");
+  EXPECT_THAT(lab.last_reply(ends).reason, HasSubstr("disarmed, because its client has gone"));
+  EXPECT_EQ(lab.motor("m04").armed_by, "");
+  EXPECT_EQ(lab.motor("m01").activity, api::Activity::kArmed);
+  EXPECT_THAT(lab.motor("m01").armed_by, HasSubstr("of script"));
+  fire(0);
+  fire(1);
+  EXPECT_EQ(lab.wait(stays).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m04"), 0);
+  EXPECT_EQ(lab.motor("m01").armed_by, "");
+}
+
+// The edge is faster than the daemon: they ramp down.
+TEST_P(Triggered, AnEdgeBeforeTheyAreDisarmedForAClientThatHasGoneIsFollowedByARampDown) {
+  lab.connect();
+  api::Arm arm = std::get<api::Arm>(armed({"m01"}, {3000}));
+  arm.while_connected = true;
+  const auto number = lab.send_as("panel", arm);
+  ASSERT_TRUE(lab.run_until([&] { return lab.bus(0).mcu(0).core().trigger.armed != 0; }, 1));
+  lab.run_for(0.2);
+  fire();
+  lab.leave("panel");
+  const Answer result = lab.wait(number);
+  EXPECT_EQ(result.result, "stopped") << result.reason;
+  EXPECT_THAT(result.reason, HasSubstr("because its client has gone"));
+  EXPECT_LT(lab.shaft_steps("m01"), 3000);
+}
+
 TEST_P(Triggered, ArmingIsRefusedWithAReason) {
   lab.connect();
   const auto refusal = [this](const api::Request& request) {

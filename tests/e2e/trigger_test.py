@@ -53,6 +53,21 @@ class Trigger(EndToEndTest):
         self.assertEqual(len([event for event in self.moves() if event["event"] in ("move", "result")]), 12)
         self.assertTrue(any("late_ns" in event for event in self.moves()))
 
+    def test_a_killed_client_disarms_where_it_has_asked_for_that(self):
+        self.bring_up()
+        stays = self.start_bushctl("arm", "--delay-us", 700, "a0", 600)
+        self.assertEqual(stays.process.wait(GIVE_UP_S), 0)
+        killed = self.start_bushctl("arm", "--while-connected", "--delay-us", 700, "b0", 600)
+        self.wait_until("both to be armed", lambda: [self.motors()[name]["activity"] for name in ("a0", "b0")] == ["armed"] * 2)
+        self.assertRegex(self.motors()["b0"]["armed_by"], rf"^command 1 of bushctl@.*pid {killed.process.pid}")
+        self.assertIn("armed by command 1 of bushctl@", self.command("status").stdout)
+        killed.end(signal.SIGKILL)
+        self.wait_until("it to be disarmed", lambda: self.motors()["b0"]["activity"] == "rest")
+        self.assertEqual(self.motors()["a0"]["activity"], "armed")
+        self.bushsim.send(signal.SIGRTMIN)
+        self.wait_until("the other one to arrive", lambda: self.positions()["a0"] == 600)
+        self.assertEqual(self.positions()["b0"], 0)
+
     def test_starts_moves_exactly_and_once(self):
         self.check_trigger()
 

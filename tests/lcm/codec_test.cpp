@@ -84,8 +84,9 @@ TEST(Codec, OtherRequestsDoToo) {
   EXPECT_EQ(request_over_the_wire(api::UseTable{"group", "own@2"}).table, "own@2");
   request_over_the_wire(api::ReloadTables{});
   EXPECT_EQ(request_over_the_wire(api::Home{{"a"}}).motors, api::MotorNames{"a"});
-  const auto arm = request_over_the_wire(
-      api::Arm{.edge = api::Edge::kFalling, .delay_us = 100, .motors = {{"a", 3}}});
+  const auto arm = request_over_the_wire(api::Arm{
+      .edge = api::Edge::kFalling, .delay_us = 100, .motors = {{"a", 3}}, .while_connected = true});
+  EXPECT_TRUE(arm.while_connected);
   EXPECT_EQ(arm.edge, api::Edge::kFalling);
   EXPECT_EQ(arm.delay_us, 100);
   const auto armed =
@@ -94,7 +95,9 @@ TEST(Codec, OtherRequestsDoToo) {
                                          .kind = api::Move::Kind::kAbsolute,
                                          .motors = {{"a", 3}, {"b", api::UserUnits{-0.5}}},
                                          .speed = api::Speed{.per_s = 4, .in_steps = true},
-                                         .duration_s = 2.5});
+                                         .duration_s = 2.5,
+                                         .while_connected = true});
+  EXPECT_TRUE(armed.while_connected);
   EXPECT_EQ(armed.edge, api::Edge::kFalling);
   EXPECT_EQ(armed.delay_us, 77);
   EXPECT_EQ(armed.kind, api::Move::Kind::kAbsolute);
@@ -456,7 +459,8 @@ TEST(Codec, SnapshotsArriveAsTheyAre) {
                                              .inhibited = {.positive = true},
                                              .trust = api::Trust::kStale,
                                              .uncertain_reason = "lost",
-                                             .heard_utime_us = 4711}}};
+                                             .heard_utime_us = 4711,
+                                             .armed_by = "command 7 of panel"}}};
   const auto packet = encode(part, 11, state);
   const auto message = std::get<StateMessage>(*decode_daemon_message("STATE", packet->payload));
   EXPECT_EQ(message.snapshot, state);

@@ -118,6 +118,7 @@ void add_arm(CommandLine& line) {
     std::string duration;
     bool steps = false;
     bool wait = false;
+    bool while_connected = false;
     std::string speed;
     std::vector<std::string> words;
   };
@@ -127,7 +128,10 @@ void add_arm(CommandLine& line) {
     const auto speed = parse_speed(options->speed, numbers(options->steps));
     if (!speed) return wrong_usage(speed.error());
     arm->speed = *speed;
-    return send(line.connection(), *arm, until(options->wait), Hope::kReached);
+    arm->while_connected = options->while_connected;
+    // Whose end disarms them has to stay.
+    const bool waits = options->wait || options->while_connected;
+    return send(line.connection(), *arm, until(waits), Hope::kReached);
   };
   line.add("arm", "Let moves wait for the trigger of their MCU")
       .footer(
@@ -137,6 +141,10 @@ void add_arm(CommandLine& line) {
           "Motors at rest. Those of one MCU begin in the same slot, three ticks and the delay "
           "after the edge at its trigger input. With --line they move along a straight line, as "
           "with move --line, on MCUs that can make it; each MCU goes by the edge at its own input. "
+          "They wait without an end, also when bushctl has ended: 'bushctl disarm' ends that, and "
+          "'bushctl status' tells who has armed them. With --while-connected they are disarmed "
+          "when "
+          "bushctl ends, however that comes. "
           "With --wait the exit code is 0 only if every motor "
           "reached its target.")
       .number<std::int64_t>("--delay-us", &options->delay_us, 50, 1'650'000,
@@ -148,6 +156,8 @@ void add_arm(CommandLine& line) {
       .option("--speed", &options->speed, kSpeed)
       .flag("--steps", &options->steps, kSteps)
       .flag("--wait", &options->wait, "Wait for the result")
+      .flag("--while-connected", &options->while_connected,
+            "Wait for the result, and disarm them if this program ends before")
       .raw_words(&options->words)
       .run([carry_out, options] {
         const Numbers as = numbers(options->steps);

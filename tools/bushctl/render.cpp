@@ -65,7 +65,13 @@ std::string heard_text(const api::MotorState& motor) {
 std::string notes_text(const api::MotorState& motor) {
   const std::string heard = heard_text(motor);
   const std::string limit = limit_text(motor);
-  return heard + (heard.empty() || limit.empty() ? "" : ", ") + limit;
+  const std::string armed =
+      motor.armed_by.empty() ? "" : "armed by " + bushd::printable(motor.armed_by);
+  std::string all;
+  for (const std::string& note : {heard, limit, armed}) {
+    all += (all.empty() || note.empty() ? "" : ", ") + note;
+  }
+  return all;
 }
 
 // Of the motor at this place in the state; another one's never, whatever the network says.
@@ -156,6 +162,7 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"trust", word(motor.trust)},
           {"paused", motor.paused},
           {"held", motor.held},
+          {"armed_by", motor.armed_by},
           {"line", on_line},
           {"uncertain_reason", motor.uncertain_reason},
           {"heard_utime_us", heard_utime_us}};

@@ -310,11 +310,19 @@ class Client:
         edge: Literal["rising", "falling"] = "rising",
         delay_us: int = 50,
         speed: float | None = None,
+        while_connected: bool = False,
     ) -> Motion:
         if edge not in ("rising", "falling"):
             raise ValueError(f'edge "{edge}": it is "rising" or "falling"')
         in_steps = await self._in_steps(motors, unit)
-        request = requests.arm(motors, in_steps=in_steps, falling=edge == "falling", delay_us=delay_us, speed=speed)
+        request = requests.arm(
+            motors,
+            in_steps=in_steps,
+            falling=edge == "falling",
+            delay_us=delay_us,
+            speed=speed,
+            while_connected=while_connected,
+        )
         return await self._motion(request, list(motors)).accepted()
 
     async def arm_line(
@@ -328,6 +336,7 @@ class Client:
         delay_us: int = 50,
         speed: float | None = None,
         duration_s: float | None = None,
+        while_connected: bool = False,
     ) -> Motion:
         if edge not in ("rising", "falling"):
             raise ValueError(f'edge "{edge}": it is "rising" or "falling"')
@@ -340,6 +349,7 @@ class Client:
             delay_us=delay_us,
             speed=speed,
             duration_s=duration_s,
+            while_connected=while_connected,
         )
         return await self._motion(request, list(wanted.values)).accepted()
 

@@ -355,13 +355,17 @@ class Client:
         edge: Literal["rising", "falling"] = "rising",
         delay_us: int = 50,
         speed: float | None = None,
+        while_connected: bool = False,
     ) -> Motion:
         """Lets these motors, at rest, wait for an edge at the trigger input of their MCU, to move by these distances.
 
         They begin together, three ticks and `delay_us` (50 to 1650000) after the edge. Returns once it is accepted;
-        their activity is ARMED as soon as an edge starts them.
+        their activity is ARMED as soon as an edge starts them. They wait without an end, also when this program has
+        ended; with `while_connected` they are disarmed when this client closes or its program ends (not over LCM).
         """
-        begun = self._client.arm(motors, unit=unit, edge=edge, delay_us=delay_us, speed=speed)
+        begun = self._client.arm(
+            motors, unit=unit, edge=edge, delay_us=delay_us, speed=speed, while_connected=while_connected
+        )
         return Motion(self._loop, self._loop.run(begun))
 
     def arm_line(
@@ -375,13 +379,22 @@ class Client:
         delay_us: int = 50,
         speed: float | None = None,
         duration_s: float | None = None,
+        while_connected: bool = False,
     ) -> Motion:
         """Lets these motors, at rest, wait for an edge at the trigger inputs of their MCUs, to make a line (`move_line()`).
 
         For MCUs that make the line themselves; refused where they cannot. All else as of `arm()`.
         """
         begun = self._client.arm_line(
-            motors, to=to, by=by, unit=unit, edge=edge, delay_us=delay_us, speed=speed, duration_s=duration_s
+            motors,
+            to=to,
+            by=by,
+            unit=unit,
+            edge=edge,
+            delay_us=delay_us,
+            speed=speed,
+            duration_s=duration_s,
+            while_connected=while_connected,
         )
         return Motion(self._loop, self._loop.run(begun))
 

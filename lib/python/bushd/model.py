@@ -174,6 +174,7 @@ class Motor:
     heard_at: datetime.datetime | None  # while `trust` is STALE: when the position was heard
     paused: bool  # it ramps down, or stands, on the way to its target
     held: bool  # no motion begins
+    armed_by: str  # while `activity` is ARMING or ARMED: whose request that is; else ""
     line: LineState | None  # while it moves on a line with others
     mcu: str  # "<bus>:<address>"
     output: int

@@ -63,8 +63,10 @@ def arm_line(
     delay_us: int = 50,
     speed: float | None = None,
     duration_s: float | None = None,
+    while_connected: bool = False,
 ) -> Request:
     message = messages.arm_line_t()
+    message.while_connected = bool(while_connected)
     message.edge = messages.arm_line_t.FALLING if falling else messages.arm_line_t.RISING
     message.delay_us = operator.index(delay_us)
     message.kind = messages.arm_line_t.ABSOLUTE if absolute else messages.arm_line_t.RELATIVE
@@ -147,9 +149,16 @@ def _positions(rows: list[list[float]]) -> list[float]:
 
 
 def arm(
-    amounts: Amounts, *, in_steps: bool, falling: bool = False, delay_us: int = 50, speed: float | None = None
+    amounts: Amounts,
+    *,
+    in_steps: bool,
+    falling: bool = False,
+    delay_us: int = 50,
+    speed: float | None = None,
+    while_connected: bool = False,
 ) -> Request:
     message = messages.arm_t()
+    message.while_connected = bool(while_connected)
     message.edge = messages.arm_t.FALLING if falling else messages.arm_t.RISING
     message.delay_us = operator.index(delay_us)
     _put_speed(message, speed, in_steps)

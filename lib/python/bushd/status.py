@@ -130,6 +130,7 @@ def _motor(state: Any, description: Any, mcu: str) -> model.Motor:
         heard_at=codec.at(state.heard_utime_us) if trust is model.Trust.STALE else None,
         paused=state.paused,
         held=state.held,
+        armed_by=state.armed_by,
         line=model.LineState(state.line_fraction, state.line_left_s) if state.on_line else None,
         mcu=mcu,
         output=description.output,

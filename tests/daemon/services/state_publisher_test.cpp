@@ -13,7 +13,8 @@ using test::Bench;
 TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   Bench bench;
   const PseudoAxes none(bench.installation);
-  StatePublisher publisher(bench.installation, none, bench);
+  const OpenMoves nobody(bench.installation);
+  StatePublisher publisher(bench.installation, none, nobody, bench);
   publisher.step(0);
   EXPECT_EQ(bench.states.size(), 2u) << "one for each MCU";
   EXPECT_EQ(bench.descriptions.size(), 2u);
