@@ -84,7 +84,7 @@ void Supervisor::goes_online(std::int64_t now_us, Mcu& mcu) {
     if (restarted) {
       journal_.position_lost(id, before_steps);
       stood += (stood.empty() ? "" : ", ") + motor.name() + " at " + std::to_string(before_steps);
-    } else if (before && !positions_.being_set(id) && !kept_.being_restored(id)) {
+    } else if (before && !positions_.counter_being_set(id) && !kept_.being_restored(id)) {
       follow_position(id, before_steps);
     }
   }

@@ -215,17 +215,25 @@ std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line,
 void Lines::keep_together(std::int64_t now_us, const std::vector<MotorId>& begun) {
   std::vector<MotorId> go_on;
   bool stops = false;
+  bool by_others = true;  // these stops: nobody has asked for them
   bool paused = false;
   bool resumes = false;
   for (const MotorId id : begun) {
     const motion::Motor& motor = installation_[id];
     if (!motor.axis().stopping()) go_on.push_back(id);
-    stops = stops || (motor.axis().stopping() && !motor.is_paused());
+    const bool stopped = motor.axis().stopping() && !motor.is_paused();
+    stops = stops || stopped;
+    by_others = by_others && (!stopped || motor.moving()->by_others);
     paused = paused || motor.is_paused();
     resumes = resumes || motor.as<motion::OnLine>()->resumes;
   }
   if (go_on.empty() || (!stops && !paused)) return;
-  if (stops) return moves_.stop(now_us, begun);
+  if (stops) {
+    moves_.stop(now_us, begun);
+    if (!by_others) return;
+    for (const MotorId id : begun) installation_[id].is_stopped_by_others();
+    return;
+  }
   moves_.pause(now_us, go_on);
   if (resumes) moves_.resume(now_us, go_on);
 }

@@ -19,7 +19,7 @@ void Moves::plan_again(std::int64_t now_us, const std::vector<MotorId>& motors) 
 // The motors of a line change at the same tick, or not yet: one of them may have taken a change
 // that another one is not known to have taken.
 std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors) {
-  std::set<std::uint64_t> stop;
+  std::map<std::uint64_t, bool> stop;  // whether that is for others alone, and nobody has asked
   std::set<std::uint64_t> wait;
   std::vector<MotorId> all = installation_.with_lines(motors);
   for (const MotorId id : all) {
@@ -27,7 +27,9 @@ std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors)
     const auto* on_line = motor.as<motion::OnLine>();
     if (on_line == nullptr) continue;
     if (motor.axis().open_change()) wait.insert(on_line->line);
-    if (motor.axis().stopping() && !motor.is_paused()) stop.insert(on_line->line);
+    if (!motor.axis().stopping() || motor.is_paused()) continue;
+    bool& by_others = stop.try_emplace(on_line->line, true).first->second;
+    by_others = by_others && on_line->by_others;
   }
   std::erase_if(all, [&](MotorId id) {
     const auto* on_line = installation_[id].as<motion::OnLine>();
@@ -35,7 +37,10 @@ std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors)
   });
   for (const MotorId id : all) {
     const auto* on_line = installation_[id].as<motion::OnLine>();
-    if (on_line != nullptr && stop.contains(on_line->line)) installation_[id].stop();
+    const auto stopped = on_line != nullptr ? stop.find(on_line->line) : stop.end();
+    if (stopped == stop.end()) continue;
+    installation_[id].stop();
+    if (stopped->second) installation_[id].is_stopped_by_others();
   }
   return all;
 }

@@ -338,6 +338,7 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
       axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns, axis_.floor());
     }
     if (armed.stops) axis_.stop();
+    moving_now().by_others = armed.stops && armed.ended_by.has_value();
     events.emplace_back(
         event::Started{.start = start, .late_ns = mcu.start_ns, .steps = armed.steps});
     return true;

@@ -352,6 +352,31 @@ TEST(Lines, OneThatArrivesSettlesThoughAnotherHasEnded) {
   }
 }
 
+// Frames are lost from shortly before its end on.
+TEST(Lines, OneThatArrivesOnABadLineSettlesThoughAnotherHasEnded) {
+  int alone = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    SCOPED_TRACE(seed);
+    NearlyArrived nearly("settle_ms = 400\n");
+    std::mt19937 random(seed);
+    const auto move = nearly.lab.send(line_to(nearly.two, {2000, 2000}));
+    const auto left = static_cast<std::int64_t>(1 + seed % 7);
+    nearly.lab.run_until([&] { return nearly.lab.shaft_steps("m01") >= 1995 - left; });
+    nearly.lab.on_send = [&random](std::size_t, std::vector<std::uint8_t>&) {
+      return random() % 2 != 0;
+    };
+    nearly.lab.run_until([&] { return nearly.lab.shaft_steps("m01") >= 2000 - left; }, 0.5);
+    nearly.lab.bus(0).mcu(1).set_inputs({0b001, 0});
+    nearly.lab.run_until([&] { return nearly.lab.shaft_steps("m01") >= 2000; }, 0.5);
+    const std::int64_t arrived_us = nearly.lab.now_us();
+    const Answer result = nearly.lab.wait(move);
+    if (result.motor_results != std::vector<std::string>{"reached", "limit"}) continue;
+    ++alone;
+    EXPECT_GE(nearly.lab.now_us() - arrived_us, 400'000);
+  }
+  EXPECT_GE(alone, 1);
+}
+
 // A stop ends that, too.
 TEST(Lines, OneThatSettlesThoughAnotherHasEndedIsStopped) {
   NearlyArrived nearly("settle_ms = 5000\n");
