@@ -116,11 +116,13 @@ class Mcu {
   link::Tick earliest_start(std::int64_t now_us, Output output) const {
     return master_.earliest_start(now_us, on_bus_, output.value);
   }
-  link::Tick earliest_replace(std::int64_t now_us) const {
-    return master_.earliest_replace(now_us);
+  link::Tick earliest_replace(std::int64_t now_us,
+                              std::span<const link::ToReplace> together) const {
+    return master_.earliest_replace(now_us, together);
   }
-  link::Tick earliest_retarget(std::int64_t now_us, link::Tick start) const {
-    return master_.earliest_retarget(now_us, start);
+  link::Tick earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
+                               link::Tick start) const {
+    return master_.earliest_retarget(now_us, together, start);
   }
   bool has_time_to_retarget(std::int64_t now_us) const {
     return master_.has_time_to_retarget(now_us, on_bus_);
@@ -148,6 +150,9 @@ class Mcu {
   }
   void follow_line_run(Output output, const motion::Axis& axis) {
     master_.follow_run(on_bus_, output.value, axis.start_tick(), line_run(axis));
+  }
+  link::ToReplace to_replace(std::uint16_t outputs) const {
+    return {.mcu = on_bus_, .motors = outputs};
   }
   void replace(std::uint16_t outputs, link::Tick first) {
     master_.replace(on_bus_, outputs, first);

@@ -100,6 +100,8 @@ class Moves final : public Service {
   Result<std::vector<Part>> parts_of(const api::Move& move) const;
   // moves_plan.cpp
   void plan(std::int64_t now_us, const std::vector<MotorId>& motors);
+  std::map<BusId, std::vector<link::ToReplace>> replacements_of(
+      const std::vector<MotorId>& motors) const;
   std::map<McuId, motion::Tick> ticks_to_change_at(std::int64_t now_us,
                                                    const std::vector<MotorId>& motors) const;
   // Buses that keep pace have ticks of their own, which are counted from the beginning of the line:

@@ -45,16 +45,35 @@ std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors)
   return all;
 }
 
+// Each bus sends one for each of its MCUs.
+std::map<BusId, std::vector<link::ToReplace>> Moves::replacements_of(
+    const std::vector<MotorId>& motors) const {
+  std::map<McuId, std::uint16_t> masks;
+  for (const MotorId id : motors) {
+    masks[installation_.config()[id].mcu] |=
+        static_cast<std::uint16_t>(1u << installation_[id].output().value);
+  }
+  std::map<BusId, std::vector<link::ToReplace>> of_buses;
+  for (const auto& [id, mask] : masks) {
+    const Mcu& mcu = installation_[id];
+    of_buses[mcu.config.bus].push_back(mcu.to_replace(mask));
+  }
+  return of_buses;
+}
+
 std::map<McuId, motion::Tick> Moves::ticks_to_change_at(std::int64_t now_us,
                                                         const std::vector<MotorId>& motors) const {
   // One replacement serves all motors of an MCU. It can bring a motor that has not begun to rest at
   // any tick, but another beginning only at the tick where it was to begin.
+  const auto together = replacements_of(motors);
   std::map<McuId, motion::Tick> at;
   for (const MotorId id : motors) {
     const Mcu& mcu = installation_.mcu_of(id);
     const motion::Axis& axis = installation_[id].axis();
-    const motion::Tick first = axis.stopping() ? mcu.earliest_replace(now_us)
-                                               : mcu.earliest_retarget(now_us, axis.start_tick());
+    const std::vector<link::ToReplace>& of_bus = together.at(mcu.config.bus);
+    const motion::Tick first = axis.stopping()
+                                   ? mcu.earliest_replace(now_us, of_bus)
+                                   : mcu.earliest_retarget(now_us, of_bus, axis.start_tick());
     motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
     common = std::max(common, first);
   }

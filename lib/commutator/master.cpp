@@ -84,14 +84,16 @@ link::Tick Master::earliest_start(std::int64_t now_us, link::McuIndex, std::uint
   return tick_at(now_us) + kStartTicks;
 }
 
-link::Tick Master::earliest_replace(std::int64_t now_us) const {
+link::Tick Master::earliest_replace(std::int64_t now_us, std::span<const link::ToReplace>) const {
   const link::Tick next = tick_at(now_us) + 1;
   return motion_ ? std::max(next, motion_->steps.committed()) : next;
 }
 
-link::Tick Master::earliest_retarget(std::int64_t now_us, link::Tick start) const {
+link::Tick Master::earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
+                                     link::Tick start) const {
   const bool begun = motion_ && motion_->asked;
-  return begun ? earliest_replace(now_us) : std::max(start, earliest_start(now_us, kBoard, 0));
+  return begun ? earliest_replace(now_us, together)
+               : std::max(start, earliest_start(now_us, kBoard, 0));
 }
 
 // --- Bytes and time

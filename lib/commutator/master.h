@@ -56,8 +56,10 @@ class Master final : public link::BusMaster {
 
   link::Tick earliest_start(std::int64_t now_us, link::McuIndex mcu,
                             std::uint8_t motor) const override;
-  link::Tick earliest_replace(std::int64_t now_us) const override;
-  link::Tick earliest_retarget(std::int64_t now_us, link::Tick start) const override;
+  link::Tick earliest_replace(std::int64_t now_us,
+                              std::span<const link::ToReplace> together) const override;
+  link::Tick earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
+                               link::Tick start) const override;
   void begin(link::McuIndex mcu, std::uint8_t motor, link::Tick start) override;
   void replace(link::McuIndex mcu, std::uint16_t motors, link::Tick first) override;
   void drop(link::McuIndex mcu, std::uint8_t motor) override;

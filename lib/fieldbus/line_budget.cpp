@@ -27,7 +27,7 @@ double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
         kPollEntryBytes + kFrameCost + BUSHD_REPORT_SIZE(motors) + kSlotGuardUs * bytes_per_us;
     bytes_per_s += report * polls_per_s;
     if (motors == 0) continue;
-    const double ticks = std::min<unsigned>(bushd_ticks_capacity(motors, fine), kMaxTicksPerFrame);
+    const double ticks = ticks_per_frame(motors, format, tick_ns);
     const double frame =
         kFrameCost + BUSHD_TICKS_HEADER + 2.0 * motors + ticks * motors * (fine ? 2.0 : 1.0);
     bytes_per_s += frame / (ticks * tick_s);

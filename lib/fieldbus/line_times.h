@@ -1,16 +1,29 @@
 // Times of the protocol that a line's budget and its master share (docs/protocol.md, Line).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+
+#include "engine/message.h"
 
 namespace bushd::fieldbus {
 
 inline constexpr std::int64_t kPollPeriodUs = 50'000;  // each MCU is asked this often
 inline constexpr std::int64_t kSyncPeriodUs = 500'000;
-inline constexpr unsigned kMaxTicksPerFrame = 16;  // what one lost frame can cost
+// What one lost frame can cost: so many ticks, and so much time, half of what queues hold.
+inline constexpr unsigned kMaxTicksPerFrame = 16;
+inline constexpr std::int64_t kMaxFrameUs = 150'000;
 // From a poll's end to the first answer, and from one answer to the next: what an MCU may need to
 // begin and to let the line go.
 inline constexpr std::int64_t kFirstSlotUs = 1'000;
 inline constexpr std::int64_t kSlotGuardUs = 600;
+
+// Ticks that a full frame of TICKS holds. Precondition: motors > 0.
+inline unsigned ticks_per_frame(unsigned motors, bushd_format format, std::uint32_t tick_ns) {
+  const auto in_time = static_cast<unsigned>(kMaxFrameUs * 1000 / tick_ns);
+  const unsigned room =
+      bushd_ticks_capacity(static_cast<std::uint8_t>(motors), format == BUSHD_FORMAT_FINE);
+  return std::min({room, kMaxTicksPerFrame, in_time});
+}
 
 }  // namespace bushd::fieldbus

@@ -86,11 +86,13 @@ class BusMaster {
 
   // Earliest tick at which a move of this motor can start.
   virtual Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const = 0;
-  // Earliest tick from which a replacement can take effect.
-  virtual Tick earliest_replace(std::int64_t now_us) const = 0;
+  // Earliest tick from which replacements can take effect that are asked for together, one for each
+  // MCU, in the order of MCUs: a stop of many motors takes the line longer than that of one.
+  virtual Tick earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const = 0;
   // The same for another target of a motor whose run begins at tick `start`: as long as it has not
   // begun, it can begin otherwise only there.
-  virtual Tick earliest_retarget(std::int64_t now_us, Tick start) const = 0;
+  virtual Tick earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
+                                 Tick start) const = 0;
   // The bus has time for a replacement that is not urgent, such as another target.
   virtual bool has_time_to_retarget(std::int64_t, McuIndex) const { return true; }
   // From `start` on, until dropped, the source has ticks for this motor. Preconditions: the MCU is

@@ -31,25 +31,32 @@ class Horizon {
   Tick earliest_start(std::int64_t now_us) const {
     return clock_.tick_at(now_us) + clock_.ticks_in(kStartLeadUs + 4 * held_back_us());
   }
-  // Earliest tick from which a replacement can take effect that may be sent in `wait_us`. This
-  // clock lags by a part of a tick.
-  Tick earliest_replace(std::int64_t now_us, std::int64_t wait_us) const {
-    const std::int64_t lead_us = kReplaceLeadUs + wait_us + 2 * held_back_us();
+  // Earliest tick from which a replacement can take effect that the line will have carried by
+  // `carried_us`. This clock lags by a part of a tick.
+  Tick earliest_replace(std::int64_t now_us, std::int64_t carried_us) const {
+    const std::int64_t lead_us = kReplaceLeadUs + carried_us - now_us + 2 * held_back_us();
     return first_changeable(clock_.tick_at(now_us) + 1) + clock_.ticks_in(lead_us);
   }
 
   // Queues are kept this full.
   std::int64_t queue_target_us() const { return kQueueTargetUs + 4 * held_back_us(); }
-  // Below this, ticks go before everything routine.
-  std::int64_t queue_urgent_us() const { return kQueueUrgentUs + 4 * held_back_us(); }
+  // Below this, ticks go before everything routine. `silence_us`: see queue_enough_us.
+  std::int64_t queue_urgent_us(std::int64_t silence_us) const {
+    return std::max(kQueueUrgentUs + 4 * held_back_us(), queue_enough_us(silence_us));
+  }
+  // With this, none runs empty while nothing is sent for `silence_us` and it is then its turn.
+  std::int64_t queue_enough_us(std::int64_t silence_us) const {
+    return kReplaceLeadUs + silence_us + 2 * held_back_us();
+  }
 
  private:
   static constexpr std::int64_t kQueueTargetUs = 300'000;
   static constexpr std::int64_t kQueueUrgentUs = 120'000;
   // Two polls: one lost first frame can still be repaired.
   static constexpr std::int64_t kStartLeadUs = 100'000;
-  // A frame in flight, an answer awaited; adapter latency comes on top.
-  static constexpr std::int64_t kReplaceLeadUs = 12'000;
+  // What program and driver may take until a frame is on the line; what the line itself takes, and
+  // the adapter's latency, come on top.
+  static constexpr std::int64_t kReplaceLeadUs = 10'000;
   // More than any adapter holds back. An answer that was read later still waited for this program,
   // which had been stopped: moves and stops must not be put off by seconds for that.
   static constexpr std::int64_t kMaxHeldBackUs = 40'000;

@@ -14,6 +14,12 @@ namespace {
 // A queue with less than this would be empty after some frames. However many stops are wanted, the
 // motors that they leave alone go on.
 constexpr std::int64_t kQueueCriticalUs = 40'000;
+// So long after a replacement queues are filled for the case that the program is held up; then it
+// is asked whether it was taken.
+constexpr std::int64_t kFollowFirstUs = 20'000;
+// Less than what replacements are planned ahead beyond the time that the line takes for them: those
+// that have theirs do not keep the others waiting.
+constexpr std::int64_t kCriticalMarginUs = 5'000;
 
 // Codes behind the end of a side are the cruise delay.
 bool makes_the_same_runs(const bushd_table& a, const bushd_table& b) {
@@ -105,12 +111,18 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   if (!port_open_) return {};
   synchroniser_.lines_run(streams_.runs_line());
   transactions_.expire(now_us);
-  if (streams_.fail_late_replacements(now_us)) return {};
+  streams_.fail_late_replacements(now_us);
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
   if (transactions_.open() && now_us >= transactions_.quiet_us()) emergency_.send_due(now_us);
   while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
   }
   return writer_.bytes();
+}
+
+// How long nothing may be sent, and then all others have their turn first: a poll whose last answer
+// is missing.
+std::int64_t Master::silence_us() const {
+  return poller_.cycle_us() + transactions_.patience_us() + streams_.round_us();
 }
 
 // By urgency: an emergency, also one that binds an MCU that has just come; queues that are all but
@@ -121,10 +133,15 @@ bool Master::send_next(std::int64_t now_us) {
   const auto below = [target_us](std::int64_t lead_us) {
     return StreamScheduler::Filling{.lead_us = lead_us, .target_us = target_us};
   };
-  const StreamScheduler::Filling urgent = below(horizon_.queue_urgent_us());
+  const std::int64_t urgent_us = horizon_.queue_urgent_us(silence_us());
+  const StreamScheduler::Filling urgent = below(urgent_us);
+  // On a line that has little room more than enough would put off the poll for long.
+  const StreamScheduler::Filling follows = below(
+      streams_.confirmation_is_due(now_us - kFollowFirstUs) ? horizon_.queue_enough_us(silence_us())
+                                                            : urgent_us);
   return emergency_.send_due(now_us) || connector_.send_stop(now_us) ||
-         streams_.send_stream(now_us, below(kQueueCriticalUs)) ||
-         streams_.send_due_replacement(now_us) || streams_.send_stream(now_us, urgent, true) ||
+         streams_.send_critical(now_us, below(kQueueCriticalUs), kCriticalMarginUs) ||
+         streams_.send_due_replacement(now_us) || streams_.send_stream(now_us, follows) ||
          poller_.send_wanted(now_us) || streams_.send_stream(now_us, urgent) ||
          poller_.send_due(now_us) || synchroniser_.send_due(now_us) ||
          connector_.send_due_identify(now_us) || connector_.send_request(now_us) ||
@@ -160,18 +177,22 @@ Tick Master::earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t moto
   return std::max(horizon_.earliest_start(now_us), streams_.next_tick(mcu, motor));
 }
 
-Tick Master::earliest_replace(std::int64_t now_us) const {
-  const std::int64_t wait_us =
-      transactions_.open() ? std::max<std::int64_t>(transactions_.quiet_us() - now_us, 0) : 0;
-  return horizon_.earliest_replace(now_us, wait_us);
+Tick Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {
+  const StreamScheduler::LineUse use = {
+      .free_us = transactions_.open() ? transactions_.quiet_us() : now_us,
+      .margin_us = kCriticalMarginUs,
+      .confirm_us = kFollowFirstUs + streams_.round_us() + poller_.cycle_us()};
+  return horizon_.earliest_replace(now_us, streams_.carried_us(now_us, use, together));
 }
 
-Tick Master::earliest_retarget(std::int64_t now_us, Tick start) const {
-  return std::max(earliest_replace(now_us), start);
+Tick Master::earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
+                               Tick start) const {
+  return std::max(earliest_replace(now_us, together), start);
 }
 
 bool Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const {
-  return !streams_.replacement_open(mcu) && !streams_.behind(now_us, horizon_.queue_urgent_us());
+  return !streams_.replacement_open(mcu) &&
+         !streams_.behind(now_us, horizon_.queue_urgent_us(silence_us()));
 }
 
 void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
@@ -226,7 +247,7 @@ void Master::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuR
 }
 
 void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
-  streams_.replace(mcu, motors, first, clock().tick_at(stepped_us_));
+  streams_.replace(mcu, motors, first, stepped_us_);
 }
 
 std::optional<BusSnapshot> Master::snapshot(std::int64_t now_us) const {

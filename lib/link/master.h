@@ -68,8 +68,9 @@ class Master final : public BusMaster, private Transactions::Listener, private C
 
   // All first frames of the move still arrive well before.
   Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const override;
-  Tick earliest_replace(std::int64_t now_us) const override;
-  Tick earliest_retarget(std::int64_t now_us, Tick start) const override;
+  Tick earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const override;
+  Tick earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
+                         Tick start) const override;
   // No replacement of this MCU is on its way, and no queue of the bus is about to run empty. Each
   // replacement takes back ticks that have been sent, so too many of them would leave no time for
   // ticks.
@@ -136,6 +137,7 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,
                      const bushd_report& report);
   bool send_next(std::int64_t now_us);
+  std::int64_t silence_us() const;
   std::int64_t wake_us(McuIndex mcu) const;
   const BusClock& clock() const { return synchroniser_.clock(); }
 

@@ -46,6 +46,24 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   return asked;
 }
 
+std::int64_t Poller::reply_us(const McuRecord& mcu) const {
+  return writer_.line_us(BUSHD_REPORT_SIZE(mcu.view.identity.motors) + BUSHD_FRAME_OVERHEAD + 1);
+}
+
+std::int64_t Poller::cycle_us() const {
+  std::int64_t answers_us = 0;
+  std::size_t entries = 0;
+  for (const McuRecord& mcu : mcus_) {
+    if (mcu.view.phase == McuPhase::kOffline) continue;
+    ++entries;
+    const std::int64_t with_us = answers_us + reply_us(mcu) + kSlotGuardUs;
+    if (answers_us == 0 || with_us <= kMaxCycleUs) answers_us = with_us;
+  }
+  constexpr std::size_t kEntryBytes = 3;
+  return writer_.line_us(2 + entries * kEntryBytes + BUSHD_FRAME_OVERHEAD) + kFirstSlotUs +
+         answers_us;
+}
+
 bool Poller::send_wanted(std::int64_t now_us) {
   if (std::none_of(mcus_.begin(), mcus_.end(), [](const McuRecord& m) { return m.poll_wanted; })) {
     return false;
@@ -55,9 +73,7 @@ bool Poller::send_wanted(std::int64_t now_us) {
   std::int64_t begin_us = kFirstSlotUs;
   for (const McuIndex i : choose(now_us)) {
     const McuRecord& mcu = mcus_[i];
-    const std::int64_t end_us =
-        begin_us +
-        writer_.line_us(BUSHD_REPORT_SIZE(mcu.view.identity.motors) + BUSHD_FRAME_OVERHEAD + 1);
+    const std::int64_t end_us = begin_us + reply_us(mcu);
     const bool full = entries.size() == BUSHD_POLL_MAX_ENTRIES || end_us > kMaxCycleUs;
     if (full && !entries.empty()) break;
     const auto units = static_cast<std::uint16_t>((begin_us + kUnitUs - 1) / kUnitUs);

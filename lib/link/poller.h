@@ -21,6 +21,8 @@ class Poller {
   bool send_wanted(std::int64_t now_us);
   // The same, and those whose turn has come.
   bool send_due(std::int64_t now_us);
+  // How long the line is taken by a poll of all MCUs that are not offline, its answers included.
+  std::int64_t cycle_us() const;
   // When the MCU's turn comes. Precondition: it is not offline.
   std::int64_t due_us(McuIndex mcu) const { return polled_[mcu].due_us; }
 
@@ -40,6 +42,7 @@ class Poller {
   };
 
   std::vector<McuIndex> choose(std::int64_t now_us) const;
+  std::int64_t reply_us(const McuRecord& mcu) const;
 
   PerMcu<McuRecord>& mcus_;
   Transactions& transactions_;

@@ -42,9 +42,10 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
       mcu.stream[m].from_before = mcu.stream[m].from;
       mcu.stream[m].from = std::min(mcu.stream[m].from, mcu.replace_at);
     }
-    send_ticks(now_us, i, mask, mcu.replace_at, static_cast<unsigned>(ticks_per_frame(mask)),
-               BUSHD_TICKS_REPLACE);
+    send_ticks(now_us, i, mask, mcu.replace_at,
+               static_cast<unsigned>(ticks_of_replacement(mcu, mask)), BUSHD_TICKS_REPLACE);
     mcu.replaced = mask;
+    mcu.replaced_us = now_us;
     records_[i].poll_wanted = true;
     return true;
   }
@@ -54,7 +55,7 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
 // A replacement leaves an MCU with little more than one frame of ticks, far less than an answer may
 // take. So more goes out before anybody knows whether it was taken: if it was not, its followers
 // are of an epoch that the MCU does not have and change nothing.
-bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, bool only_replaced) {
+bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling) {
   if (!clock_.valid()) return false;
   // The neediest first; one whose queue is full must not keep the others waiting.
   std::vector<std::pair<Tick, McuIndex>> needy;
@@ -62,13 +63,22 @@ bool StreamScheduler::send_stream(std::int64_t now_us, const Filling& filling, b
     finish_ended(i);
     const Mcu& mcu = mcus_[i];
     const bool online = records_[i].view.phase == McuPhase::kOnline;
-    if (!online || (only_replaced && mcu.replaced == 0)) continue;
+    if (!online) continue;
     if (const auto next = mcu.next_tick()) needy.emplace_back(*next, i);
   }
   std::sort(needy.begin(), needy.end());
   return std::any_of(needy.begin(), needy.end(), [&](const auto& entry) {
     return send_ticks_of(now_us, entry.second, filling);
   });
+}
+
+bool StreamScheduler::send_critical(std::int64_t now_us, const Filling& filling,
+                                    std::int64_t margin_us) {
+  Filling critical = filling;
+  if (const std::int64_t waits_us = replacements_us({}); waits_us != 0) {
+    critical.lead_us = std::max(writer_.free_us() - now_us, std::int64_t{0}) + waits_us + margin_us;
+  }
+  return send_stream(now_us, critical);
 }
 
 // A motor that was to have another plan, and did not get it, may have been told all of its own. An
@@ -151,7 +161,7 @@ bool StreamScheduler::send_ticks_of(std::int64_t now_us, McuIndex index, const F
   }
   const Tick count = std::min({ticks_per_frame(mask), choice.join - first, last - first});
   // Only whole frames: a queue filled tick by tick would cost more in headers than in ticks.
-  if (first + count > now + std::min(lead, depth)) return false;
+  if (first + count > now + std::min(clock_.ticks_in(filling.target_us), depth)) return false;
   send_ticks(now_us, index, mask, first, static_cast<unsigned>(count), flags);
   return true;
 }
@@ -233,9 +243,8 @@ bool StreamScheduler::send_table_ticks(std::int64_t now_us, McuIndex index, std:
 }
 
 Tick StreamScheduler::ticks_per_frame(std::uint16_t mask) const {
-  const auto motors = static_cast<std::uint8_t>(std::popcount(mask));
-  const bool fine = setup_.format == BUSHD_FORMAT_FINE;
-  return std::min<Tick>(bushd_ticks_capacity(motors, fine), kMaxTicksPerFrame);
+  return fieldbus::ticks_per_frame(static_cast<unsigned>(std::popcount(mask)), setup_.format,
+                                   setup_.tick_ns);
 }
 
 void StreamScheduler::send_ticks(std::int64_t now_us, McuIndex index, std::uint16_t mask,

@@ -9,6 +9,12 @@
 namespace bushd::link {
 namespace {
 
+// A replacement that was not taken, for whatever reason, is planned again further ahead: in the end
+// beyond any delay that passes, 10, 30, 70, ... ms.
+constexpr std::int64_t kRetryLeadUs = 10'000;
+constexpr unsigned kMostDoublings = 5;
+constexpr unsigned kMostHalvings = 2;
+
 constexpr std::uint16_t bit(unsigned motor) {
   return static_cast<std::uint16_t>(1u << motor);
 }
@@ -60,6 +66,7 @@ void StreamScheduler::drop_all(McuIndex mcu) {
   mcus_[mcu].stream.fill({});
   mcus_[mcu].replacing = 0;
   mcus_[mcu].replaced = 0;
+  mcus_[mcu].failures = 0;
 }
 
 void StreamScheduler::came_online(McuIndex mcu) {
@@ -72,6 +79,11 @@ bool StreamScheduler::runs_line() const {
       return stream.active && stream.run && std::holds_alternative<LineRun>(*stream.run);
     });
   });
+}
+
+bool StreamScheduler::confirmation_is_due(std::int64_t since_us) const {
+  return std::ranges::any_of(
+      mcus_, [&](const Mcu& mcu) { return mcu.replaced != 0 && mcu.replaced_us <= since_us; });
 }
 
 bool StreamScheduler::has_ticks_to_send(McuIndex mcu) const {
@@ -91,8 +103,9 @@ std::optional<Tick> StreamScheduler::Mcu::next_tick() const {
   return next;
 }
 
-void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, Tick now) {
+void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, std::int64_t now_us) {
   Mcu& m = mcus_[mcu];
+  const Tick arrival = clock_.tick_at(arrival_us(now_us, m, motors));
   std::uint16_t sent = 0;  // motors of which ticks from `first` on have been sent already
   Tick earliest = first;
   for (unsigned i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
@@ -101,7 +114,7 @@ void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, Ti
     if (stream.begun() && (stream.sent > first || stream.unsure)) {
       sent |= bit(i);
       // Where it has become too late for that, the MCU refuses the other tick until it runs dry.
-      if (!too_late(stream.sent, now)) earliest = std::min(earliest, stream.sent);
+      if (!too_late(stream.sent, arrival)) earliest = std::min(earliest, stream.sent);
     } else {
       // A table run of which nothing has been sent is another one now; it goes out as a stream.
       stream.run.reset();
@@ -115,26 +128,85 @@ void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, Ti
   m.replacing |= sent;
 }
 
-// Sent in vain it would take line and followers with it, for nothing.
-std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, std::uint16_t mask) const {
+std::int64_t StreamScheduler::frame_us(std::uint16_t mask, Tick ticks) const {
   const std::size_t motors = static_cast<std::size_t>(std::popcount(mask));
   const std::size_t width = setup_.format == BUSHD_FORMAT_FINE ? 2 : 1;
-  const auto ticks = static_cast<std::size_t>(ticks_per_frame(mask));
-  const std::size_t payload = BUSHD_TICKS_HEADER + motors * (2 + width * ticks);
-  return std::max(now_us, writer_.free_us()) + writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
+  const std::size_t payload =
+      BUSHD_TICKS_HEADER + motors * (2 + width * static_cast<std::size_t>(ticks));
+  return writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
 }
 
-bool StreamScheduler::fail_late_replacements(std::int64_t now_us) {
-  bool failed = false;
+Tick StreamScheduler::ticks_of_replacement(const Mcu& mcu, std::uint16_t mask) const {
+  return std::max<Tick>(ticks_per_frame(mask) >> std::min(mcu.failures, kMostHalvings), 1);
+}
+
+std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, const Mcu& mcu,
+                                         std::uint16_t mask) const {
+  return std::max(now_us, writer_.free_us()) + frame_us(mask, ticks_of_replacement(mcu, mask));
+}
+
+std::int64_t StreamScheduler::round_us() const {
+  std::int64_t us = 0;
+  for (const Mcu& mcu : mcus_) {
+    std::uint16_t mask = 0;
+    for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      if (mcu.stream[m].active) mask |= bit(m);
+    }
+    if (mask != 0) us += frame_us(mask, ticks_per_frame(mask));
+  }
+  return us;
+}
+
+std::int64_t StreamScheduler::replacements_us(std::span<const ToReplace> together) const {
+  std::int64_t us = 0;
+  for (const McuIndex i : mcus_.indices()) {
+    std::uint16_t mask = mcus_[i].replacing;
+    for (const ToReplace& asked : together) {
+      if (asked.mcu == i) mask |= asked.motors;
+    }
+    if (mask != 0) us += frame_us(mask, ticks_of_replacement(mcus_[i], mask));
+  }
+  return us;
+}
+
+std::int64_t StreamScheduler::carried_us(std::int64_t now_us, const LineUse& use,
+                                         std::span<const ToReplace> together) const {
+  const std::int64_t own_us = replacements_us(together);
+  std::int64_t at_us = std::max({now_us, use.free_us, writer_.free_us()}) + own_us;
+  unsigned failures = 0;
+  bool confirmed = true;
+  for (const ToReplace& asked : together) {
+    failures = std::max(failures, mcus_[asked.mcu].failures);
+    if (mcus_[asked.mcu].replaced != 0) confirmed &= !records_[asked.mcu].poll_wanted;
+  }
+  // Before one that is sent and not confirmed no other one goes to its MCU.
+  if (!confirmed) at_us += use.confirm_us;
+  // Of motors that go on.
+  const Tick critical = clock_.tick_at(at_us) + clock_.ticks_in(use.margin_us);
+  for (const McuIndex i : mcus_.indices()) {
+    std::uint16_t asked = 0;
+    for (const ToReplace& one : together) asked |= one.mcu == i ? one.motors : std::uint16_t{0};
+    std::uint16_t needy = 0;
+    for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      const bool goes_on = mcus_[i].sendable(m) && (asked >> m & 1) == 0;
+      if (goes_on && mcus_[i].stream[m].next < critical) needy |= bit(m);
+    }
+    if (needy != 0) at_us += frame_us(needy, ticks_per_frame(needy));
+  }
+  return at_us + kRetryLeadUs * ((1 << std::min(failures, kMostDoublings)) - 1);
+}
+
+// Sent in vain it would take line and followers with it, for nothing.
+void StreamScheduler::fail_late_replacements(std::int64_t now_us) {
   for (const McuIndex i : mcus_.indices()) {
     Mcu& mcu = mcus_[i];
+    mcu.unplanned = 0;
     if (mcu.replacing == 0) continue;
-    if (!too_late(mcu.replace_at, clock_.tick_at(arrival_us(now_us, mcu.replacing)))) continue;
-    const std::uint16_t motors = std::exchange(mcu.replacing, std::uint16_t{0});
-    events_.push_back(ReplacementFailed{.mcu = i, .motors = motors});
-    failed = true;
+    if (!too_late(mcu.replace_at, clock_.tick_at(arrival_us(now_us, mcu, mcu.replacing)))) continue;
+    mcu.unplanned = std::exchange(mcu.replacing, std::uint16_t{0});
+    ++mcu.failures;
+    events_.push_back(ReplacementFailed{.mcu = i, .motors = mcu.unplanned});
   }
-  return failed;
 }
 
 void StreamScheduler::follow_report(McuIndex mcu) {
@@ -148,6 +220,7 @@ void StreamScheduler::follow_replacements(McuIndex index) {
   const McuView& view = records_[index].view;
   const bool taken = view.report.epoch == mcu.epoch;
   std::uint16_t failed = taken ? std::uint16_t{0} : mcu.replaced;
+  if (taken && mcu.replaced != 0) mcu.failures = 0;
   for (unsigned m = 0; taken && m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((mcu.replaced >> m & 1) != 0) mcu.stream[m].unsure = false;
   }
@@ -168,7 +241,9 @@ void StreamScheduler::follow_replacements(McuIndex index) {
   if (mcu.replacing != 0 && too_late(mcu.replace_at, view.tick)) {
     failed |= std::exchange(mcu.replacing, std::uint16_t{0});
   }
-  if (failed != 0) events_.push_back(ReplacementFailed{.mcu = index, .motors = failed});
+  if (failed == 0) return;
+  ++mcu.failures;
+  events_.push_back(ReplacementFailed{.mcu = index, .motors = failed});
 }
 
 // All frames sent before the poll were handled before its answer was made: what is not known is

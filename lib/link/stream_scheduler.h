@@ -11,6 +11,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/message.h"
@@ -27,6 +28,12 @@ namespace bushd::link {
 
 // While there is something to send, it is looked for this often.
 inline constexpr std::int64_t kStreamWakeUs = 5'000;
+
+// Motors of an MCU whose plan is to change, all with one frame.
+struct ToReplace {
+  McuIndex mcu;
+  std::uint16_t motors;
+};
 
 class StreamScheduler {
  public:
@@ -45,7 +52,7 @@ class StreamScheduler {
   void begin(McuIndex mcu, std::uint8_t motor, Tick start);
   void begin_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run);
   void follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run);
-  void replace(McuIndex mcu, std::uint16_t motors, Tick first, Tick now);
+  void replace(McuIndex mcu, std::uint16_t motors, Tick first, std::int64_t now_us);
   void drop(McuIndex mcu, std::uint8_t motor);
 
   // Nothing more is sent to this MCU.
@@ -55,18 +62,34 @@ class StreamScheduler {
   // The MCU's record has a new report.
   void follow_report(McuIndex mcu);
 
-  // Until its source has planned anew, a motor whose replacement failed has no ticks that could be
-  // sent: so nothing should be, in the step in which this returns true.
-  bool fail_late_replacements(std::int64_t now_us);
+  // To be called once in a step, before anything is sent. Until its source has planned anew, which
+  // it does between two steps, a motor whose replacement failed has no ticks that could be sent:
+  // none of it are, in this step.
+  void fail_late_replacements(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
+  // When the line will have carried these replacements, one for each MCU, if they are asked for
+  // now.
+  struct LineUse {
+    std::int64_t free_us;     // from when on the line is free for them
+    std::int64_t margin_us;   // as of send_critical
+    std::int64_t confirm_us;  // until the answer to a poll that is still to be sent
+  };
+  std::int64_t carried_us(std::int64_t now_us, const LineUse& use,
+                          std::span<const ToReplace> together) const;
+  // How long the line takes for a frame of ticks to each MCU that has motors to be told of.
+  std::int64_t round_us() const;
   // One frame for the MCU whose queue is emptiest, if it is not filled `lead_us` ahead. States of
   // runs cost the same however many ticks they hold: these fill it as far as `target_us` allows,
-  // whatever made the frame due. `only_replaced`: of those whose replacement is not confirmed.
+  // whatever made the frame due.
   struct Filling {
     std::int64_t lead_us;
     std::int64_t target_us;
   };
-  bool send_stream(std::int64_t now_us, const Filling& filling, bool only_replaced = false);
+  bool send_stream(std::int64_t now_us, const Filling& filling);
+  // The same for one that would be empty before its turn comes again: `filling`, unless
+  // replacements wait. Then these take no longer than that the queue of an MCU that has its own
+  // must last, with `margin_us` to spare.
+  bool send_critical(std::int64_t now_us, const Filling& filling, std::int64_t margin_us);
 
   // The first tick of this motor that has not been sent.
   Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
@@ -76,6 +99,8 @@ class StreamScheduler {
   bool has_replacement_to_send(McuIndex mcu) const { return mcus_[mcu].replacing != 0; }
   // A replacement has been sent to this MCU and is not yet confirmed.
   bool replacement_open(McuIndex mcu) const { return mcus_[mcu].replaced != 0; }
+  // One of them has been open since `since_us`.
+  bool confirmation_is_due(std::int64_t since_us) const;
   // An MCU has a queue filled less than `lead_us` ahead, as far as its queue goes.
   bool behind(std::int64_t now_us, std::int64_t lead_us) const;
 
@@ -111,12 +136,16 @@ class StreamScheduler {
     std::uint8_t newest_epoch = 0;  // of all replacements, whether taken or not
     std::uint16_t replacing = 0;    // motors of a replacement to be sent
     Tick replace_at = 0;
-    std::uint16_t replaced = 0;  // motors of a replacement sent and not yet confirmed
+    std::uint16_t replaced = 0;    // motors of a replacement sent and not yet confirmed
+    std::uint16_t unplanned = 0;   // motors whose replacement has failed in this step
+    std::int64_t replaced_us = 0;  // when that was
+    unsigned failures = 0;         // of replacements, in a row
 
-    // Of a motor whose replacement still waits, the next ticks belong to a plan that the MCU does
-    // not know.
+    // Of a motor whose replacement still waits, or has just failed, the next ticks belong to a plan
+    // that the MCU does not know.
     bool sendable(unsigned motor) const {
-      return stream[motor].active && !stream[motor].finished && (replacing >> motor & 1) == 0;
+      return stream[motor].active && !stream[motor].finished &&
+             ((replacing | unplanned) >> motor & 1) == 0;
     }
     // Of all motors that are sendable; none: there is none.
     std::optional<Tick> next_tick() const;
@@ -133,7 +162,11 @@ class StreamScheduler {
 
   // stream_scheduler.cpp
   // When a replacement for these motors would be at its MCU, sent now.
-  std::int64_t arrival_us(std::int64_t now_us, std::uint16_t mask) const;
+  std::int64_t arrival_us(std::int64_t now_us, const Mcu& mcu, std::uint16_t mask) const;
+  // How long the line takes for a frame of so many ticks of these motors.
+  std::int64_t frame_us(std::uint16_t mask, Tick ticks) const;
+  // For the replacements that wait, and these.
+  std::int64_t replacements_us(std::span<const ToReplace> together) const;
   void follow_replacements(McuIndex mcu);
   void follow_streams(McuIndex mcu);
   void go_back(McuIndex mcu, std::uint8_t motor);
@@ -150,6 +183,8 @@ class StreamScheduler {
                   unsigned flags);
   void note_sent(McuIndex mcu, std::uint8_t motor, Tick first, Tick until);
   Tick ticks_per_frame(std::uint16_t mask) const;
+  // Of a replacement: fewer after failures, as a short frame is sooner there and less often lost.
+  Tick ticks_of_replacement(const Mcu& mcu, std::uint16_t mask) const;
 
   const BusSetup& setup_;
   PerMcu<McuRecord>& records_;

@@ -85,6 +85,9 @@ class Transactions {
   std::int64_t quiet_us() const { return open_->quiet_us; }
   std::int64_t timeout_us() const { return open_->timeout_us; }
 
+  // How long beyond that an answer is waited for at present.
+  std::int64_t patience_us() const { return patience_us_; }
+
   const BusHealth& health() const { return health_; }
 
  private:

@@ -185,7 +185,7 @@ Tick Master::earliest_start(std::int64_t now_us, McuIndex, std::uint8_t) const {
 }
 
 // The first tick at whose beginning the plan has made all that has been written.
-Tick Master::earliest_replace(std::int64_t now_us) const {
+Tick Master::earliest_replace(std::int64_t now_us, std::span<const link::ToReplace>) const {
   if (!run_ || !run_->planned) return clock(now_us) + 2;
   const Run& run = *run_;
   if (run.written == 0) return run.tick;
@@ -198,8 +198,9 @@ Tick Master::earliest_replace(std::int64_t now_us) const {
   }
 }
 
-Tick Master::earliest_retarget(std::int64_t now_us, Tick start) const {
-  return std::max(earliest_replace(now_us), start);
+Tick Master::earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
+                               Tick start) const {
+  return std::max(earliest_replace(now_us, together), start);
 }
 
 // The report is of the last tick at whose beginning the plan had made no more steps than have left.

@@ -77,8 +77,10 @@ class Master final : public link::BusMaster, private link::LinePort {
   bool busy(link::McuIndex) const override { return requests_open_; }
 
   link::Tick earliest_start(std::int64_t now_us, link::McuIndex, std::uint8_t) const override;
-  link::Tick earliest_replace(std::int64_t now_us) const override;
-  link::Tick earliest_retarget(std::int64_t now_us, link::Tick start) const override;
+  link::Tick earliest_replace(std::int64_t now_us,
+                              std::span<const link::ToReplace> together) const override;
+  link::Tick earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
+                               link::Tick start) const override;
   void begin(link::McuIndex, std::uint8_t, link::Tick start) override;
   bool keeps_pace() const override { return true; }
   void begin_in_pace(link::McuIndex, std::uint8_t, link::Tick start,

@@ -198,8 +198,9 @@ void PulseBench::begin(std::int64_t steps, std::uint16_t floor) {
 }
 
 void PulseBench::replan() {
-  const link::Tick at = axis_.stopping() ? master_->earliest_replace(now_us_)
-                                         : master_->earliest_retarget(now_us_, axis_.start_tick());
+  const link::Tick at = axis_.stopping()
+                            ? master_->earliest_replace(now_us_, {})
+                            : master_->earliest_retarget(now_us_, {}, axis_.start_tick());
   if (axis_.change(at)) master_->replace({0}, 1, at);
 }
 

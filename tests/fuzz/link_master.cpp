@@ -454,7 +454,7 @@ void replace(Bus& bus, Input& input) {
   const auto mask = static_cast<std::uint16_t>(input.u8() % (1u << kMotors));
   const std::uint8_t later = input.u8();
   if (!bus.online(mcu) || !bus.master().time_known()) return;
-  link::Tick first = bus.master().earliest_replace(bus.now_us()) + later;
+  link::Tick first = bus.master().earliest_replace(bus.now_us(), {}) + later;
   for (const link::Tick start : bus.source().start[mcu.value]) first = std::max(first, start);
   bus.master().replace(mcu, mask, first);
 }

@@ -5,13 +5,14 @@
 
 namespace bushd::test {
 
-FakeBus::FakeBus(int count, int motors, bushd_format format, std::uint32_t tick_ns) {
+FakeBus::FakeBus(int count, int motors, bushd_format format, std::uint32_t tick_ns,
+                 std::uint32_t baud) {
   for (int i = 0; i < 200; ++i) codes.push_back(static_cast<std::uint16_t>(250 - i));
   table.accel = {codes.data(), 200, nullptr, nullptr, 0};
   table.decel = {codes.data() + 50, 150, nullptr, nullptr, 0};
   table.cruise = 40;
   table.time_unit_ns = 40'000;
-  setup = {.baud = kBaud, .tick_ns = tick_ns, .format = format, .mcus = {}};
+  setup = {.baud = baud, .tick_ns = tick_ns, .format = format, .mcus = {}};
   for (int i = 0; i < count; ++i) {
     link::McuSetup mcu;
     mcu.address = {static_cast<std::uint8_t>(i + 1)};
@@ -63,9 +64,11 @@ bool FakeBus::run_until(const std::function<bool()>& done, std::int64_t limit_us
 }
 
 void FakeBus::advance(std::int64_t limit_us) {
-  std::int64_t at = std::max(line_free_us_, now_us);
+  const std::int64_t from = std::max(line_free_us_, now_us);
+  std::int64_t at = from;
+  std::size_t sent = 0;
   for (const std::uint8_t byte : master->step(now_us)) {
-    at += 10'000'000 / kBaud;
+    at = from + line_us(++sent);
     ++master_bytes;
     bushd_frame frame;
     const bushd_receive received = bushd_receive_byte(&receiver_, byte, &frame);
@@ -94,6 +97,10 @@ void FakeBus::advance(std::int64_t limit_us) {
     master->receive(now_us, bytes);
   }
   for (const link::Event& event : master->take_events()) events.push_back(event);
+}
+
+std::int64_t FakeBus::line_us(std::size_t bytes) const {
+  return static_cast<std::int64_t>(bytes) * 10'000'000 / setup.baud;
 }
 
 void FakeBus::hear(const Heard& frame, std::uint8_t sequence) {
@@ -395,11 +402,10 @@ void FakeBus::answer(const Slave& slave, const Heard& frame, std::uint8_t sequen
                                      sequence, payload.data(), payload.size(), wire.data() + 1));
   slave_bytes += static_cast<std::int64_t>(wire.size());
   const std::int64_t begin = frame.at_us + std::max(turnaround_us, delay_us);
-  const std::int64_t end = begin + static_cast<std::int64_t>(wire.size()) * 10'000'000 / kBaud;
+  const std::int64_t end = begin + line_us(wire.size());
   // Who talks at the same time spoils it for both.
   for (auto& [other_end, other] : arrivals_) {
-    const std::int64_t other_begin =
-        other_end - static_cast<std::int64_t>(other.size()) * 10'000'000 / kBaud;
+    const std::int64_t other_begin = other_end - line_us(other.size());
     if (begin >= other_end || end <= other_begin) continue;
     wire[wire.size() / 2] ^= 0x55;
     other[other.size() / 2] ^= 0x55;

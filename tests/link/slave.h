@@ -112,7 +112,7 @@ class FakeBus {
 
   // Slaves get the addresses 1, 2, ...; all outputs of `motors` have table 0.
   explicit FakeBus(int slaves = 1, int motors = 4, bushd_format format = BUSHD_FORMAT_FINE,
-                   std::uint32_t tick_ns = kTickNs);
+                   std::uint32_t tick_ns = kTickNs, std::uint32_t baud = kBaud);
 
   void run_for(std::int64_t us);
   bool run_until(const std::function<bool()>& done, std::int64_t limit_us = 20'000'000);
@@ -132,6 +132,10 @@ class FakeBus {
       return std::holds_alternative<Event>(event);
     });
     return found == events.rend() ? std::nullopt : std::optional(std::get<Event>(*found));
+  }
+  link::Tick earliest_replace(std::uint16_t motors = 0b1111, std::size_t mcu = 0) const {
+    const link::ToReplace one = {.mcu = McuIndex{mcu}, .motors = motors};
+    return master->earliest_replace(now_us, {&one, 1});
   }
   std::uint32_t tick(std::size_t slave) const { return tick_of(slaves[slave]); }
   std::uint32_t tick_of(const Slave& slave) const;
@@ -153,6 +157,7 @@ class FakeBus {
 
  private:
   void advance(std::int64_t limit_us);
+  std::int64_t line_us(std::size_t bytes) const;
   void hear(const Heard& frame, std::uint8_t sequence);
   void act(Slave& slave, const Heard& frame, std::uint8_t sequence);
   // A frame of ticks, however it was coded: by motor, the displacements and the delay at the end.

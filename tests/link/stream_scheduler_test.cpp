@@ -35,8 +35,8 @@ class Scheduling : public testing::Test {
     bool operator==(const Ticks&) const = default;
   };
   // One frame, decoded; none if nothing is to be sent.
-  std::optional<Ticks> next(bool only_replaced = false) {
-    if (!streams.send_stream(kNowUs, kFilling, only_replaced)) return std::nullopt;
+  std::optional<Ticks> next() {
+    if (!streams.send_stream(kNowUs, kFilling)) return std::nullopt;
     return frame();
   }
   std::optional<Ticks> frame() {
@@ -47,6 +47,12 @@ class Scheduling : public testing::Test {
     EXPECT_EQ(bushd_decode_ticks(sent[0].payload.data(), sent[0].payload.size(), &ticks), BUSHD_OK);
     return Ticks{ticks.mask, ticks.first_tick, ticks.count, ticks.flags & ~BUSHD_TICKS_FINE,
                  ticks.epoch};
+  }
+  // Whether a replacement has failed.
+  bool fail_late(std::int64_t now_us) {
+    const std::size_t before = events.size();
+    streams.fail_late_replacements(now_us);
+    return events.size() > before;
   }
   int fill() {
     int frames = 0;
@@ -153,45 +159,45 @@ class Replacing : public Scheduling {
 };
 
 TEST_F(Replacing, OpensAnEpochAndItsFollowersDoNotWait) {
-  streams.replace(kFirst, 1, 1020, 1000);
+  streams.replace(kFirst, 1, 1020, kNowUs);
   EXPECT_TRUE(streams.has_replacement_to_send(kFirst));
   EXPECT_FALSE(next()) << "the plan in the source is one that the MCU does not know";
   ASSERT_TRUE(streams.send_due_replacement(kNowUs));
   EXPECT_EQ(frame(), (Ticks{1, 1020, 16, BUSHD_TICKS_REPLACE, 1}));
   EXPECT_TRUE(mcus[kFirst].poll_wanted) << "to see whether it was taken";
-  EXPECT_EQ(next(true), (Ticks{1, 1036, 16, 0, 1}));
+  EXPECT_EQ(next(), (Ticks{1, 1036, 16, 0, 1}));
 }
 
 TEST_F(Replacing, TakenOnceTheReportShowsItsEpoch) {
-  streams.replace(kFirst, 1, 1020, 1000);
+  streams.replace(kFirst, 1, 1020, kNowUs);
   streams.send_due_replacement(kNowUs);
   report().epoch = 1;
   known_until(0, 1036);
   streams.follow_report(kFirst);
   EXPECT_TRUE(events.empty());
-  EXPECT_FALSE(streams.send_stream(kNowUs, kFilling, true)) << "nothing is unconfirmed";
+  EXPECT_FALSE(streams.replacement_open(kFirst));
 }
 
 TEST_F(Replacing, NotTakenIsToldAndTheNextTryHasAnEpochOfItsOwn) {
-  streams.replace(kFirst, 1, 1020, 1000);
+  streams.replace(kFirst, 1, 1020, kNowUs);
   streams.send_due_replacement(kNowUs);
   streams.follow_report(kFirst);  // in epoch 0
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(std::get<link::ReplacementFailed>(events[0]).motors, 1);
   take_sent(writer);
-  streams.replace(kFirst, 1, 1024, 1000);
+  streams.replace(kFirst, 1, 1024, kNowUs);
   ASSERT_TRUE(streams.send_due_replacement(kNowUs));
   EXPECT_EQ(frame()->epoch, 2);
 }
 
 // Behind a gap that no report shows the MCU may have ticks of the plan before the one that failed.
 TEST_F(Replacing, AfterOneThatFailedTheNextTakesAwayWhatTheMcuMayHave) {
-  streams.replace(kFirst, 1, 1020, 1000);
+  streams.replace(kFirst, 1, 1020, kNowUs);
   streams.send_due_replacement(kNowUs);
   take_sent(writer);
   known_until(0, 1040);
   streams.follow_report(kFirst);  // in epoch 0
-  streams.replace(kFirst, 1, 1060, 1000);
+  streams.replace(kFirst, 1, 1060, kNowUs);
   ASSERT_TRUE(streams.send_due_replacement(kNowUs)) << "though nothing from 1060 on was sent";
   EXPECT_EQ(frame()->first, 1040);
 }
@@ -199,23 +205,23 @@ TEST_F(Replacing, AfterOneThatFailedTheNextTakesAwayWhatTheMcuMayHave) {
 TEST_F(Replacing, DroppedMotorIsNotReplaced) {
   streams.begin(kFirst, 1, 1010);
   fill();
-  streams.replace(kFirst, 3, 1020, 1000);
+  streams.replace(kFirst, 3, 1020, kNowUs);
   streams.drop(kFirst, 0);
   ASSERT_TRUE(streams.send_due_replacement(kNowUs));
   EXPECT_EQ(frame()->mask, 2);
 }
 
 TEST_F(Replacing, TooLateToSendFailsUnsent) {
-  streams.replace(kFirst, 1, 1002, 1000);
-  EXPECT_FALSE(streams.fail_late_replacements(kNowUs));
-  EXPECT_TRUE(streams.fail_late_replacements(kNowUs + 2'560)) << "a tick later";
+  streams.replace(kFirst, 1, 1002, kNowUs);
+  EXPECT_FALSE(fail_late(kNowUs));
+  EXPECT_TRUE(fail_late(kNowUs + 2'560)) << "a tick later";
   ASSERT_EQ(events.size(), 1u);
   EXPECT_FALSE(streams.send_due_replacement(kNowUs));
 }
 
 TEST_F(Replacing, WhatWasNeverSentNeedsNone) {
   streams.begin(kFirst, 1, 1040);
-  streams.replace(kFirst, 2, 1040, 1000);
+  streams.replace(kFirst, 2, 1040, kNowUs);
   EXPECT_FALSE(streams.has_replacement_to_send(kFirst));
 }
 
@@ -223,7 +229,7 @@ TEST_F(Replacing, WhatWasNeverSentNeedsNone) {
 TEST_F(Replacing, BeforeTheStartIsFollowedByNoStart) {
   streams.begin(kFirst, 1, 1040);
   next();
-  streams.replace(kFirst, 2, 1024, 1000);
+  streams.replace(kFirst, 2, 1024, kNowUs);
   ASSERT_TRUE(streams.send_due_replacement(kNowUs));
   EXPECT_EQ(frame(), (Ticks{2, 1024, 16, BUSHD_TICKS_REPLACE, 1})) << "just up to the start";
   EXPECT_EQ(next(), (Ticks{2, 1040, 16, 0, 1}));
@@ -236,7 +242,7 @@ TEST_F(Replacing, BeforeTheStartIsFollowedByNoStart) {
 TEST_F(Replacing, BeforeTheStartThatFailedLeavesTheStartAsItWas) {
   streams.begin(kFirst, 1, 1040);
   next();
-  streams.replace(kFirst, 2, 1024, 1000);
+  streams.replace(kFirst, 2, 1024, kNowUs);
   ASSERT_TRUE(streams.send_due_replacement(kNowUs));
   frame();
   streams.follow_report(kFirst);  // in epoch 0, and the start was lost too
@@ -248,7 +254,7 @@ TEST_F(Replacing, OfARunCancelledBeforeItsStartHasNoFollowers) {
   streams.begin(kFirst, 1, 1060);
   next();
   source.delay = [](std::uint8_t motor, Tick) { return std::uint16_t(motor == 1 ? 0 : 50); };
-  streams.replace(kFirst, 2, 1024, 1000);
+  streams.replace(kFirst, 2, 1024, kNowUs);
   ASSERT_TRUE(streams.send_due_replacement(kNowUs));
   EXPECT_EQ(frame(), (Ticks{2, 1024, 16, BUSHD_TICKS_REPLACE, 1}));
   while (const auto ticks = next()) EXPECT_EQ(ticks->mask & 2, 0);
@@ -264,7 +270,7 @@ class ReplacingAnEnded : public Scheduling {
     writer.reset(kNowUs);
     known_until(0, 1026);
     plan_until(1200);
-    streams.replace(kFirst, 1, 1020, 1000);
+    streams.replace(kFirst, 1, 1020, kNowUs);
   }
   void plan_until(Tick end) {
     source.end = [end](std::uint8_t) { return end; };
@@ -278,7 +284,9 @@ TEST_F(ReplacingAnEnded, GoesOnIfItIsTaken) {
 }
 
 TEST_F(ReplacingAnEnded, HasNoFollowersIfItWasTooLateAndThePlanStays) {
-  ASSERT_TRUE(streams.fail_late_replacements(kNowUs + 60'000));
+  ASSERT_TRUE(fail_late(kNowUs + 60'000));
+  EXPECT_FALSE(next()) << "its source has not planned anew";
+  EXPECT_FALSE(fail_late(kNowUs + 60'000)) << "the next step";
   plan_until(1026);
   EXPECT_FALSE(next());
   EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
@@ -296,12 +304,12 @@ TEST_F(ReplacingAnEnded, HasNoFollowersIfItWasNotTakenAndThePlanStays) {
 
 // Its frame may take longer than until its tick.
 TEST_F(Replacing, TooLateToArriveFailsUnsent) {
-  streams.replace(kFirst, 1, 1010, 1000);
-  EXPECT_FALSE(streams.fail_late_replacements(kNowUs));
+  streams.replace(kFirst, 1, 1010, kNowUs);
+  EXPECT_FALSE(fail_late(kNowUs));
   std::vector<std::uint8_t> payload(200);
   for (int i = 0; i < 8; ++i) writer.send(kNowUs, McuAddress{9}, BUSHD_MSG_TICKS, payload);
   take_sent(writer);
-  EXPECT_TRUE(streams.fail_late_replacements(kNowUs)) << "behind what waits for the line";
+  EXPECT_TRUE(fail_late(kNowUs)) << "behind what waits for the line";
 }
 
 TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
@@ -388,7 +396,7 @@ TEST_F(LineRuns, ReplacementTakesAllOffTheLine) {
   known_until(2, 1840);
   streams.follow_report(kFirst);
   source.end = [](std::uint8_t motor) { return motor == 0 ? Tick{1330} : Tick{1200}; };
-  streams.replace(kFirst, 0b101, 1300, 1000);
+  streams.replace(kFirst, 0b101, 1300, kNowUs);
   ASSERT_TRUE(streams.send_due_replacement(kNowUs));
   const auto replacement = frame();
   ASSERT_TRUE(replacement);

@@ -111,7 +111,7 @@ TEST_P(Stream, LostFramesAreSentAgain) {
     EXPECT_EQ(bus.count<link::StartMissed>(), 0);
     // Brought to rest for the next round.
     bus.slaves[0].loses = [](const Heard&) { return false; };
-    const Tick stop = bus.master->earliest_replace(bus.now_us);
+    const Tick stop = bus.earliest_replace();
     bus.source.delay = [stop](std::uint8_t, Tick t) { return std::uint16_t(t > stop ? 0 : 50); };
     bus.source.end = [stop](std::uint8_t) { return stop + 1; };
     bus.master->replace(McuIndex{0}, 0b1001, stop);
@@ -155,7 +155,7 @@ TEST_P(Stream, ReplacementSwitchesThePlanAtItsTick) {
   const Tick start = begin(0);
   const Tick other = begin(1);
   bus.run_for(600'000);
-  const Tick at = bus.master->earliest_replace(bus.now_us);
+  const Tick at = bus.earliest_replace();
   EXPECT_LE(at - bus.tick(0), 15) << "well before the end of the queue";
   bus.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, m == 0 && t >= at); };
   bus.master->replace(McuIndex{0}, 1, at);
@@ -182,7 +182,7 @@ TEST_P(Stream, LateReplacementIsToldBeforeAnythingElseIsSent) {
     fresh.run_for(600'000);
     fresh.slaves[0].loses = [](const Heard& frame) { return frame.type == BUSHD_MSG_POLL; };
     fresh.run_for(unanswered_ms * 1000);
-    const Tick at = fresh.master->earliest_replace(fresh.now_us);
+    const Tick at = fresh.earliest_replace();
     fresh.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, t >= at); };
     fresh.master->replace(McuIndex{0}, 1, at);
     fresh.slaves[0].loses = [](const Heard&) { return false; };
@@ -204,7 +204,7 @@ TEST_P(Stream, LostReplacementIsToldAndTheOldPlanStandsUntilThen) {
   const Tick start = begin(0);
   begin(1);
   bus.run_for(600'000);
-  const Tick at = bus.master->earliest_replace(bus.now_us);
+  const Tick at = bus.earliest_replace();
   bus.slaves[0].loses = [](const Heard& heard) {
     return heard.type == BUSHD_MSG_TICKS && (heard.payload[1] & BUSHD_TICKS_REPLACE);
   };
@@ -214,7 +214,7 @@ TEST_P(Stream, LostReplacementIsToldAndTheOldPlanStandsUntilThen) {
   EXPECT_EQ(bus.slaves[0].epoch, 0);
   bus.slaves[0].loses = [](const Heard&) { return false; };
   // Planned again from a later tick.
-  const Tick again = bus.master->earliest_replace(bus.now_us);
+  const Tick again = bus.earliest_replace();
   bus.source.displacement = [again](std::uint8_t m, Tick t) { return value(m, t, t >= again); };
   bus.master->replace(McuIndex{0}, 3, again);
   bus.run_for(1'000'000);
@@ -228,7 +228,7 @@ TEST_P(Stream, LostReplacementIsToldAndTheOldPlanStandsUntilThen) {
 TEST_P(Stream, LostConfirmationOfAReplacementIsAskedForAgain) {
   const Tick start = begin(0);
   bus.run_for(600'000);
-  const Tick at = bus.master->earliest_replace(bus.now_us);
+  const Tick at = bus.earliest_replace();
   bus.source.displacement = [at](std::uint8_t m, Tick t) { return value(m, t, t >= at); };
   bus.master->replace(McuIndex{0}, 1, at);
   int polls = 0;
@@ -244,7 +244,7 @@ TEST_P(Stream, LostConfirmationOfAReplacementIsAskedForAgain) {
 
 TEST_P(Stream, ReplacementOfWhatWasNotYetSentNeedsNone) {
   bus.master->begin(McuIndex{0}, 0, bus.master->earliest_start(bus.now_us, McuIndex{0}, 0));
-  bus.master->replace(McuIndex{0}, 1, bus.master->earliest_replace(bus.now_us));
+  bus.master->replace(McuIndex{0}, 1, bus.earliest_replace());
   bus.run_for(500'000);
   EXPECT_EQ(bus.slaves[0].epoch, 0);
   EXPECT_EQ(bus.slaves[0].faults, 0);

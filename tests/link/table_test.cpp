@@ -129,7 +129,7 @@ TEST_P(Tables, LostStatesAreSentAgain) {
 TEST_P(Tables, StopReplacesStatesFromItsTickOn) {
   start(0, 3000, false);
   bus.run_for(1'500'000);
-  plan_stop(0, bus.master->earliest_replace(bus.now_us));
+  plan_stop(0, bus.earliest_replace());
   bus.master->replace(McuIndex{0}, 1, *plan[0].stop);
   bus.run_for(4'000'000);
   expect_taken(0, plan[0].start, end(0));
@@ -169,7 +169,7 @@ TEST_P(Tables, WholeMoveThatIsTooLateIsTold) {
 TEST_P(Tables, StopOfAWholeMoveGoesOnAsAStream) {
   start(1, 5000, true);
   bus.run_for(1'500'000);
-  plan_stop(1, bus.master->earliest_replace(bus.now_us));
+  plan_stop(1, bus.earliest_replace());
   bus.master->replace(McuIndex{0}, 2, *plan[1].stop);
   bus.run_for(3'000'000);
   EXPECT_EQ(bus.slaves[0].epoch, 1);
@@ -185,11 +185,11 @@ TEST_P(Tables, StopOfAWholeMoveThatIsLostIsToldAndTriedAgain) {
   bus.slaves[0].loses = [&](const Heard& h) {
     return h.type == BUSHD_MSG_TICKS && (h.payload[1] & BUSHD_TICKS_REPLACE) && n++ == 0;
   };
-  plan_stop(1, bus.master->earliest_replace(bus.now_us));
+  plan_stop(1, bus.earliest_replace());
   bus.master->replace(McuIndex{0}, 2, *plan[1].stop);
   ASSERT_TRUE(bus.run_until([&] { return bus.count<link::ReplacementFailed>() > 0; }, 500'000));
   EXPECT_TRUE(bus.slaves[0].run[1].has_value()) << "goes on";
-  plan_stop(1, bus.master->earliest_replace(bus.now_us));
+  plan_stop(1, bus.earliest_replace());
   bus.master->replace(McuIndex{0}, 2, *plan[1].stop);
   bus.run_for(3'000'000);
   expect_taken(1, *plan[1].stop, end(1));
