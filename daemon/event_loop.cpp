@@ -31,7 +31,7 @@ std::string loop_text(int error) {
 
 }  // namespace
 
-EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log,
+EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLogWriter* move_log,
                      TableLibrary library, state::Store* store)
     : config_(config),
       fronts_(fronts),
@@ -56,7 +56,8 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
                   .seed = static_cast<std::uint64_t>(run_)},
                  reception_, publishing_, unix_time_us),
       lcm_watch_(lcm_front_, publishing_, config.lcm.prefix,
-                 [this](LogLevel level, const std::string& text) { log(level, {}, text); }) {
+                 [this](LogLevel level, const std::string& text) { log(level, {}, text); }),
+      alive_us_(alive_period_us()) {
   for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
   for ([[maybe_unused]] const config::Mcu& mcu : config.mcus) {
     mcu_states_.add(api::McuState::kOffline);
@@ -71,6 +72,11 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_
       *fronts.control, run_, reception_, publishing_, unix_time_us,
       [this](const std::string& text) { log(LogLevel::kWarning, {}, text); });
   publishing_.add(*socket_front_);
+  socket_front_->set_look([this](std::function<bool()> look, std::function<void(bool)> told) {
+    worker_.post([look = std::move(look), told = std::move(told)]() -> Worker::Completion {
+      return [told, seen = look()] { told(seen); };
+    });
+  });
 }
 
 EventLoop::~EventLoop() {
@@ -106,9 +112,7 @@ Result<void> EventLoop::set_up_signals() {
 
 Result<void> EventLoop::set_up() {
   if (const int error = sd_event_new(&event_); error < 0) return fail(loop_text(error));
-  if (const int error = sd_event_set_watchdog(event_, 1); error < 0) return fail(loop_text(error));
   if (const auto watched = set_up_signals(); !watched) return watched;
-  if (const auto started = worker_.start(); !started) return started;
   const Handler lcm = [this](std::uint32_t) { lcm_front_.handle(); };
   if (const auto watched = keep_watching(fronts_.lcm.fd(), lcm); !watched) return watched;
   if (fronts_.stops != nullptr) {
@@ -119,14 +123,13 @@ Result<void> EventLoop::set_up() {
         keep_watching(fronts_.control->fd(), [this](std::uint32_t) { socket_front_->handle(); });
     if (!watched) return watched;
   }
-  for (Worker* worker : {&state_worker_, &mark_worker_}) {
-    if (store_ == nullptr) break;
+  std::vector<Worker*> workers = {&worker_, &port_worker_};
+  if (store_ != nullptr) workers.insert(workers.end(), {&state_worker_, &mark_worker_});
+  for (Worker* worker : workers) {
     if (const auto started = worker->start(); !started) return started;
     const auto watched = keep_watching(worker->fd(), [worker](std::uint32_t) { worker->handle(); });
     if (!watched) return watched;
   }
-  const auto watched = keep_watching(worker_.fd(), [this](std::uint32_t) { worker_.handle(); });
-  if (!watched) return watched;
   return lcm_front_.subscribe();
 }
 
@@ -155,7 +158,7 @@ Result<void> EventLoop::run() {
   if (const auto ready = set_up(); !ready) return ready;
   started_us_ = now_us();
   open_due_ports(started_us_);
-  tell_status(status_text(config_, mcu_states_));
+  status_ = status_text(config_, mcu_states_);
   tell_ready();
   while (true) {
     const std::int64_t now = now_us();
@@ -170,6 +173,7 @@ Result<void> EventLoop::run() {
     lcm_watch_.step(now);
     if (socket_front_) socket_front_->step(now);
     tell_left_out(now);
+    tell_systemd(now);
     const bool done = core_.at_rest() && core_.settled();
     if (shut_down_by_us_ && (done || now >= *shut_down_by_us_)) break;
     if (const auto handled = handle_sources(); !handled) return handled;
@@ -181,6 +185,13 @@ Result<void> EventLoop::run() {
   log_cpu_share();
   if (core_.at_rest()) return {};
   return fail("not all motors are known to be at rest; their MCUs run them down by themselves");
+}
+
+void EventLoop::tell_systemd(std::int64_t now) {
+  if (status_ && tell_status(*status_)) status_.reset();
+  if (alive_due_us_ > now) return;
+  alive_due_us_ = alive_us_ > 0 ? now + alive_us_ : std::numeric_limits<std::int64_t>::max();
+  if (alive_us_ > 0) tell_alive();
 }
 
 void EventLoop::keep_up(std::int64_t now) {
@@ -207,27 +218,35 @@ Result<void> EventLoop::handle_sources() {
 
 std::int64_t EventLoop::next_wake_us() const {
   if (!reception_.idle()) return 0;
-  std::int64_t wake = std::min(core_.next_wake_us(), next_keypad_wake_us());
+  std::int64_t wake = std::min({core_.next_wake_us(), next_keypad_wake_us(), alive_due_us_});
   for (const Port& port : ports_) {
     if (port.lost) return 0;
-    if (!port.serial) wake = std::min(wake, port.open_due_us);
+    if (!port.serial && !port.opening) wake = std::min(wake, port.open_due_us);
   }
   if (socket_front_) wake = std::min(wake, socket_front_->next_wake_us());
   if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
   return wake;
 }
 
+// Drivers may take their time to open and to close a port.
 void EventLoop::open_due_ports(std::int64_t now) {
   for (const BusId bus : ports_.ids()) {
-    if (!ports_[bus].serial && ports_[bus].open_due_us <= now) open_port(now, bus);
+    Port& port = ports_[bus];
+    if (port.serial || port.opening || port.open_due_us > now) continue;
+    port.opening = true;
+    port_worker_.post([this, bus]() -> Worker::Completion {
+      const auto opened =
+          std::make_shared<Result<std::unique_ptr<BusPort>>>(open_first_port(config_[bus]));
+      return [this, bus, opened] { port_opened(now_us(), bus, std::move(*opened)); };
+    });
   }
 }
 
-void EventLoop::open_port(std::int64_t now, BusId bus) {
+void EventLoop::port_opened(std::int64_t now, BusId bus, Result<std::unique_ptr<BusPort>> opened) {
   Port& port = ports_[bus];
   const config::Bus& config = config_[bus];
+  port.opening = false;
   port.open_due_us = now + kReopenUs;
-  auto opened = open_first_port(config);
   Result<std::unique_ptr<Source>> watched;
   if (opened) {
     watched = watch((*opened)->fd(),
@@ -235,6 +254,7 @@ void EventLoop::open_port(std::int64_t now, BusId bus) {
   }
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
+    if (opened) close_in_worker(std::shared_ptr<BusPort>(std::move(*opened)));
     if (error != port.last_error) {
       log(LogLevel::kError, {},
           fmt::format("bus {}: {}; trying again twice a second", config.name, error));
@@ -258,7 +278,7 @@ void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause)
   const config::Bus& config = config_[bus];
   const std::string path = port.serial->path();
   port.source.reset();
-  port.serial.reset();
+  close_in_worker(std::shared_ptr<BusPort>(std::move(port.serial)));
   port.status.reset();
   port.open_due_us = now + kReopenUs;
   port.last_error = path + ": " + cause;
@@ -266,6 +286,13 @@ void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause)
       fmt::format("bus {}: port {} lost: {}; trying again twice a second", config.name, path,
                   cause));
   core_.port_lost(now, bus, "port " + port.last_error);
+}
+
+void EventLoop::close_in_worker(std::shared_ptr<void> port) {
+  port_worker_.post([port = std::move(port)]() mutable -> Worker::Completion {
+    port.reset();
+    return [] {};
+  });
 }
 
 // What is lost is given up in the loop: its source cannot go while it is being handled.
@@ -294,7 +321,7 @@ void EventLoop::handle_signal(std::int64_t now, int signal) {
   }
   if (shut_down_by_us_) return;
   if (signal == SIGHUP) {
-    spdlog::info("SIGHUP: all tables are read again");
+    write_log(LogLevel::kInfo, "SIGHUP: all tables are read again");
     return core_.tables().request({}, api::ReloadTables{});
   }
   spdlog::info("{}: ramping all motors down", signal == SIGTERM ? "SIGTERM" : "SIGINT");
@@ -394,7 +421,7 @@ void EventLoop::pulse(BusId bus, const link::PulseOrder& order) {
 void EventLoop::publish(McuId mcu, const api::StateSnapshot& state) {
   const bool computed = mcu.value >= config_.mcus.size();
   if (!computed && std::exchange(mcu_states_[mcu], state.state) != state.state) {
-    tell_status(status_text(config_, mcu_states_));
+    status_ = status_text(config_, mcu_states_);
   }
   publishing_.publish(mcu, state);
 }

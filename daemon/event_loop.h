@@ -20,7 +20,7 @@
 #include "daemon/lcm_front.h"
 #include "daemon/lcm_watch.h"
 #include "daemon/log_limit.h"
-#include "daemon/move_log.h"
+#include "daemon/move_log_writer.h"
 #include "daemon/publishing.h"
 #include "daemon/reception.h"
 #include "daemon/socket_front.h"
@@ -45,8 +45,8 @@ class EventLoop : private Outputs, private state::Backend {
   };
   // Everything outlives the loop. `move_log` may be null; so may `store`: nothing is kept of
   // positions then.
-  EventLoop(const config::Config& config, Fronts fronts, MoveLog* move_log, TableLibrary library,
-            state::Store* store);
+  EventLoop(const config::Config& config, Fronts fronts, MoveLogWriter* move_log,
+            TableLibrary library, state::Store* store);
   ~EventLoop() override;
 
   // Runs until SIGTERM or SIGINT, then ramps all motors down and returns. Precondition: these,
@@ -66,6 +66,7 @@ class EventLoop : private Outputs, private state::Backend {
 
   struct Port {
     std::unique_ptr<BusPort> serial;
+    bool opening = false;                     // a worker opens it
     std::optional<link::PulseStatus> status;  // to be told to the core
     std::unique_ptr<Source> source;           // of its descriptor
     std::int64_t open_due_us = 0;
@@ -80,6 +81,7 @@ class EventLoop : private Outputs, private state::Backend {
     const config::Keypad& config;
     Keypad keypad;
     std::optional<serial::SerialPort> serial{};
+    bool opening = false;
     std::unique_ptr<Source> source{};
     std::int64_t open_due_us = 0;
     std::string last_error{};
@@ -91,11 +93,13 @@ class EventLoop : private Outputs, private state::Backend {
   Result<std::unique_ptr<Source>> watch(int fd, Handler handler);
   Result<void> keep_watching(int fd, Handler handler);
   void open_due_ports(std::int64_t now_us);
-  void open_port(std::int64_t now_us, BusId bus);
+  void port_opened(std::int64_t now_us, BusId bus, Result<std::unique_ptr<BusPort>> opened);
   void lose_port(std::int64_t now_us, BusId bus, const std::string& cause);
   void handle_port(std::int64_t now_us, BusId bus, std::uint32_t events);
+  void close_in_worker(std::shared_ptr<void> port);
   void add_keypads();
-  void open_keypad(std::int64_t now_us, KeypadPort& port);
+  void open_keypad(KeypadPort& port);
+  void keypad_opened(std::int64_t now_us, KeypadPort& port, Result<serial::SerialPort> opened);
   void lose_keypad(std::int64_t now_us, KeypadPort& port);
   void handle_keypad(std::int64_t now_us, KeypadPort& port);
   void step_keypads(std::int64_t now_us);
@@ -116,6 +120,7 @@ class EventLoop : private Outputs, private state::Backend {
   void log_cpu_share() const;
   api::Asker with_log(const api::Asker& asker, const api::Request& request);
   void tell_left_out(std::int64_t now_us);
+  void tell_systemd(std::int64_t now_us);
   // Positions are on the disk, and it is told that the daemon has ended well.
   void close_store();
 
@@ -140,7 +145,7 @@ class EventLoop : private Outputs, private state::Backend {
 
   const config::Config& config_;
   Fronts fronts_;
-  MoveLog* move_log_;
+  MoveLogWriter* move_log_;
   TableLibrary library_;
   state::Store* store_;
   std::int64_t run_;  // tells this run of the daemon from others
@@ -154,15 +159,18 @@ class EventLoop : private Outputs, private state::Backend {
   ById<McuId, api::McuState> mcu_states_;            // as published last
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
   LogLimit log_limit_;
-  LogLimit stop_limit_;                // of stops in the log of moves
-  std::uint64_t lost_move_lines_ = 0;  // since the log of moves could be written last
+  LogLimit stop_limit_;  // of stops in the log of moves
   LcmWatch lcm_watch_;
   sd_event* event_ = nullptr;
   std::vector<std::unique_ptr<Source>> sources_;  // those of ports aside
   std::int64_t started_us_ = 0;
+  std::optional<std::string> status_;  // to be told to systemd
+  const std::int64_t alive_us_;        // of alive_period_us()
+  std::int64_t alive_due_us_ = 0;
   std::optional<std::int64_t> shut_down_by_us_;
   // The last members: their threads use others.
   Worker worker_;
+  Worker port_worker_;   // opens and closes ports
   Worker state_worker_;  // the database of positions
   Worker mark_worker_;   // moving marks, which motions wait for
 };

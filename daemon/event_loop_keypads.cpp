@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include "daemon/event_loop.h"
@@ -27,15 +28,26 @@ void EventLoop::add_keypads() {
   }
 }
 
-void EventLoop::open_keypad(std::int64_t now, KeypadPort& port) {
+void EventLoop::open_keypad(KeypadPort& port) {
+  port.opening = true;
+  port_worker_.post([this, &port, &config = port.config]() -> Worker::Completion {
+    const auto opened = std::make_shared<Result<serial::SerialPort>>(
+        serial::SerialPort::open_any_rate(config.port, config.baud));
+    return [this, &port, opened] { keypad_opened(now_us(), port, std::move(*opened)); };
+  });
+}
+
+void EventLoop::keypad_opened(std::int64_t now, KeypadPort& port,
+                              Result<serial::SerialPort> opened) {
+  port.opening = false;
   port.open_due_us = now + kReopenUs;
-  auto opened = serial::SerialPort::open_any_rate(port.config.port, port.config.baud);
   Result<std::unique_ptr<Source>> watched;
   if (opened) {
     watched = watch(opened->fd(), [this, &port](std::uint32_t) { handle_keypad(now_us(), port); });
   }
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
+    if (opened) close_in_worker(std::make_shared<serial::SerialPort>(std::move(*opened)));
     if (std::exchange(port.last_error, error) == error) return;
     return log(LogLevel::kError, port.config.motor,
                fmt::format("keypad: {}; trying again twice a second", error));
@@ -54,6 +66,7 @@ void EventLoop::lose_keypad(std::int64_t now, KeypadPort& port) {
                   *port.lost));
   port.lost.reset();
   port.source.reset();
+  close_in_worker(std::make_shared<serial::SerialPort>(std::move(*port.serial)));
   port.serial.reset();
   port.open_due_us = now + kReopenUs;
   port.keypad.port_lost();
@@ -71,7 +84,7 @@ void EventLoop::handle_keypad(std::int64_t now, KeypadPort& port) {
 void EventLoop::step_keypads(std::int64_t now) {
   for (const auto& port : keypads_) {
     if (port->lost) lose_keypad(now, *port);
-    if (!port->serial && port->open_due_us <= now) open_keypad(now, *port);
+    if (!port->serial && !port->opening && port->open_due_us <= now) open_keypad(*port);
     if (!port->serial) continue;
     port->keypad.step(now);
     const std::string shown = port->keypad.take_display();
@@ -88,6 +101,7 @@ std::int64_t EventLoop::next_keypad_wake_us() const {
   std::int64_t wake = std::numeric_limits<std::int64_t>::max();
   for (const auto& port : keypads_) {
     if (port->lost) return 0;
+    if (port->opening) continue;
     wake = std::min(wake, port->serial ? port->keypad.next_wake_us() : port->open_due_us);
   }
   return wake;

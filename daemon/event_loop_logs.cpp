@@ -1,7 +1,4 @@
 // What the loop writes down: its log, and that of moves.
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
-
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
@@ -14,28 +11,7 @@
 namespace bushd::daemon {
 
 void EventLoop::move_log(const std::string& json_line) {
-  if (move_log_ == nullptr) return;
-  const auto appended = move_log_->append(json_line);
-  if (!appended) {
-    // Once, and how many when it is over: not a line of this log for each of that one.
-    if (++lost_move_lines_ == 1) {
-      log(LogLevel::kError, {}, "log of moves: " + appended.error().text());
-    }
-    return;
-  }
-  if (*appended == MoveLog::Appended::kAnew) {
-    log(LogLevel::kWarning, {},
-        "log of moves: its file was removed or renamed; a new one is begun");
-  }
-  if (*appended == MoveLog::Appended::kFull) {
-    log(LogLevel::kWarning, {},
-        "log of moves: its file was full and has been renamed to " + move_log_->full_path() +
-            "; a new one is begun. logrotate, daily, keeps more");
-  }
-  if (const std::uint64_t lost = std::exchange(lost_move_lines_, 0); lost > 0) {
-    log(LogLevel::kWarning, {},
-        fmt::format("log of moves: is written again; {} lines were lost", lost));
-  }
+  if (move_log_ != nullptr) move_log_->append(json_line);
 }
 
 // Anybody may stop, as often as he likes and by any name: no session is needed.
@@ -47,7 +23,7 @@ api::Asker EventLoop::with_log(const api::Asker& asker, const api::Request& requ
 
 void EventLoop::tell_left_out(std::int64_t now) {
   for (const LogLimit::LeftOut& left_out : log_limit_.due(now)) {
-    spdlog::warn("{}", left_out.text());
+    write_log(LogLevel::kWarning, left_out.text());
   }
   for (const LogLimit::LeftOut& left_out : stop_limit_.due(now)) {
     const nlohmann::json line = {{"event", "requests"},

@@ -1,13 +1,13 @@
 // bushd: the program. Exit codes: 0 ended on request or the configuration is good, 1 it could not
 // start or go on, 2 wrong usage.
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <optional>
 #include <string>
 
@@ -129,7 +129,6 @@ bushd::Result<std::optional<bushd::state::Store>> open_store(const bushd::config
 
 int run(const bushd::config::Config& config, const std::string& move_log_path,
         const std::string& in_service_path) {
-  block_signals();
   raise_descriptor_limit();
   // Before there is a control socket: who connects to it is to be answered at once.
   const auto claim = bushd::daemon::ChannelClaim::make(config.lcm, bushd::daemon::lock_folders());
@@ -137,14 +136,17 @@ int run(const bushd::config::Config& config, const std::string& move_log_path,
     spdlog::error("{}", bushd::printable(claim.error().text()));
     return 1;
   }
-  std::optional<bushd::daemon::MoveLog> move_log;
+  std::optional<bushd::daemon::MoveLogWriter> move_log;
   if (!move_log_path.empty()) {
     auto opened = bushd::daemon::MoveLog::open(move_log_path);
     if (!opened) {
       spdlog::error("{}", bushd::printable(opened.error().text()));
       return 1;
     }
-    move_log.emplace(std::move(*opened));
+    move_log.emplace(std::move(*opened),
+                     [](bushd::daemon::LogLevel level, const std::string& text) {
+                       bushd::daemon::write_log(level, bushd::printable(text));
+                     });
   }
   const auto control = open_control(config.control);
   if (!control) {
@@ -219,9 +221,6 @@ int main(int argc, char** argv) {
     return bushd::finished_output(0);
   }
 
-  spdlog::set_default_logger(spdlog::stderr_color_mt("bushd"));
-  spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
-  bushd::daemon::use_journal();
   const bool check = !check_path.empty();
   if (!check && config_path.empty()) {
     fmt::print(stderr, "bushd: --config FILE or --check-config FILE is needed; see --help\n");
@@ -236,5 +235,9 @@ int main(int argc, char** argv) {
     fmt::print("{}: good: {}\n", bushd::printable(check_path), extent(*config));
     return bushd::finished_output(0);
   }
-  return run(*config, move_log_path, in_service_path);
+  block_signals();
+  bushd::daemon::Log log;
+  const int code = run(*config, move_log_path, in_service_path);
+  if (!log.end()) std::_Exit(code);
+  return code;
 }

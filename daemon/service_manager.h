@@ -11,9 +11,20 @@
 
 namespace bushd::daemon {
 
-// From here on all lines of the program go to the journal with their priority, if standard error
-// is a stream of it.
-void use_journal();
+// While there is one, lines of the program, those of spdlog included, are written by a thread: to
+// the journal with their priority, if standard error is a stream of it, else to standard error.
+// Neither a terminal that is stopped nor a journal that hangs keeps anybody waiting. At most one.
+class Log {
+ public:
+  Log();
+  ~Log();
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+
+  // All that was said is written. False: it cannot be; then a thread still tries, and the process
+  // has to end without waiting for it (std::_Exit).
+  bool end();
+};
 
 // Fields of a line for the journal, "" for none.
 struct JournalFields {
@@ -22,12 +33,17 @@ struct JournalFields {
 };
 // A line, as spdlog would write it. `MOTOR=` and `MCU=` are its fields in the journal:
 // journalctl -u bushd MOTOR=theta.
-void write_log(LogLevel level, const std::string& text, const JournalFields& fields);
+void write_log(LogLevel level, const std::string& text, const JournalFields& fields = {});
 
+// Before motors move: it waits until systemd has it. All others wait for nothing.
 void tell_ready();
 void tell_stopping();
+// How often it is to be told that the loop lives; 0: nobody asks.
+std::int64_t alive_period_us();
+void tell_alive();
 // A line for `systemctl status`: "2 buses, 32 motors, 1 MCU offline".
 std::string status_text(const config::Config& config, const ById<McuId, api::McuState>& mcus);
-void tell_status(const std::string& text);
+// False: it could not be told, and has to be told again.
+bool tell_status(const std::string& text);
 
 }  // namespace bushd::daemon

@@ -49,7 +49,13 @@ SocketFront::SocketFront(control::Server& server, std::int64_t run, Reception& r
 void SocketFront::step(std::int64_t now_us) {
   if (now_us < look_us_) return;
   look_us_ = now_us + kLookEveryUs;
-  if (server_.in_place()) return trouble_.clear();
+  if (std::exchange(looking_, true)) return;
+  look_([this] { return server_.in_place(); }, [this](bool in_place) { seen(in_place); });
+}
+
+void SocketFront::seen(bool in_place) {
+  looking_ = false;
+  if (in_place) return trouble_.clear();
   const auto restored = server_.restore();
   std::string trouble = restored ? "" : restored.error().text();
   if (restored && log_) {

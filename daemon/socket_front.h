@@ -24,6 +24,11 @@ class SocketFront : public Listener {
               Publishing& publishing, std::function<std::int64_t()> unix_us, Log log = {});
   ~SocketFront() override;
 
+  // Who has a look at a file taken, and what was seen told, later: a disk may take its time.
+  // Without it that is done at once.
+  using Look = std::function<void(std::function<bool()> look, std::function<void(bool)> told)>;
+  void set_look(Look look) { look_ = std::move(look); }
+
   void handle() { server_.handle(); }
   // Looks now and then whether the socket's file is there, and makes it again.
   void step(std::int64_t now_us);
@@ -44,6 +49,7 @@ class SocketFront : public Listener {
 
   void on_packet(Connection connection, control::View packet, const control::Server::Sent& sent);
   void on_closed(Connection connection);
+  void seen(bool in_place);
   void on_hello(Connection connection, const lcm::Hello& hello);
   bool known(Connection connection, Client& client, const std::string& client_id);
   void send(Connection connection, const lcm::Packet& packet);
@@ -57,6 +63,10 @@ class SocketFront : public Listener {
   std::function<std::int64_t()> unix_us_;
   Log log_;
   std::map<Connection, Client> clients_;
+  Look look_ = [](const std::function<bool()>& look, const std::function<void(bool)>& told) {
+    told(look());
+  };
+  bool looking_ = false;
   std::int64_t look_us_ = 0;  // when to look for the socket's file again
   std::string trouble_;       // why it could not be made again
 };

@@ -65,15 +65,30 @@ def delays_before_end_us(table):
 class Running:
     """A program under way; what it says goes to a file. `urgent`: before others, where that is allowed."""
 
-    def __init__(self, command, log, urgent=False):
+    def __init__(self, command, log, urgent=False, env=None, stderr=None):
+        """`stderr`: where that goes in place of the file."""
         self._log = log
         with open(log, "wb") as file:
-            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=file)
+            errors = file if stderr is None else stderr
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=errors, env=env)
         if urgent:
             with contextlib.suppress(PermissionError):
                 os.setpriority(os.PRIO_PROCESS, self.process.pid, -15)
 
+    def wait_until_written(self):
+        """Threads of bushd write lines: when they sleep, all that was told before is in its file."""
+        give_up_s = time.monotonic() + GIVE_UP_S
+        while any(self._threads_at_work()) and time.monotonic() < give_up_s:
+            time.sleep(0.001)
+
+    def _threads_at_work(self):
+        for task in pathlib.Path(f"/proc/{self.process.pid}/task").glob("*/stat"):
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+                name, state = re.fullmatch(r"\d+ \((.*)\) (\S).*", task.read_text().strip()).groups()
+                yield name == "lines" and state not in "SZX"
+
     def said(self):
+        self.wait_until_written()
         return self._log.read_text(encoding="utf-8", errors="replace")
 
     def lives(self):
@@ -216,6 +231,8 @@ class EndToEndTest(unittest.TestCase):
         self.wait_until(f"{names} to be {steps} steps under way", travelled)
 
     def logged(self, log="moves.jsonl"):
+        for running in self.programs:
+            running.wait_until_written()
         return [json.loads(line) for line in self.file(log).read_text().splitlines()]
 
     def moves(self, log="moves.jsonl"):
