@@ -131,16 +131,17 @@ void KeptPositions::answer_when_kept(const api::Asker& asker, api::Completed don
   open_.push_back({asker, std::move(done)});
 }
 
-void KeptPositions::answer_open() {
-  std::erase_if(open_, [this](Open& open) {
+void KeptPositions::answer_open(std::int64_t now_us) {
+  std::erase_if(open_, [&](Open& open) {
     if (!open.number) open.number = keeper_->told();
-    const std::optional<std::string>& trouble = keeper_->trouble();
-    if (keeper_->kept_up_to() < *open.number && !trouble) return false;
-    if (trouble) {
-      if (required_) open.done.outcome = api::Outcome::kFault;
-      open.done.reason +=
-          "; that is not on the disk, and lost if bushd ends before it is: " + *trouble +
-          "; the disk is tried again once a second";
+    if (!open.until_us) open.until_us = now_us + kAnswerUs;
+    const bool kept = keeper_->kept_up_to() >= *open.number;
+    if (!kept && now_us < *open.until_us) return false;
+    if (!kept) {
+      open.done.outcome = api::Outcome::kFault;
+      open.done.reason += "; this counts, but is not on the disk, so it is lost if bushd ends: " +
+                          keeper_->trouble().value_or("the disk does not answer") +
+                          ". It is tried again; 'bushctl doctor' tells of the disk";
     }
     open.asker.answer(open.done);
     return true;
@@ -410,7 +411,7 @@ void KeptPositions::step(std::int64_t now_us) {
   }
   keeper_->step(now_us);
   tell_trouble();
-  answer_open();
+  answer_open(now_us);
 }
 
 void KeptPositions::keep(std::int64_t now_us, const Mcu& mcu, MotorId id) {

@@ -22,6 +22,8 @@ namespace bushd::daemon {
 
 class KeptPositions final : public Service {
  public:
+  static constexpr std::int64_t kAnswerUs = 3'000'000;  // for the disk, until it is said to fail
+
   KeptPositions(Installation& installation, const Positions& positions, Journal& journal,
                 Outputs& outputs);
 
@@ -56,7 +58,7 @@ class KeptPositions final : public Service {
   std::uint64_t kept_up_to() const { return keeper_ ? keeper_->kept_up_to() : 0; }
   std::optional<std::string> trouble() const { return keeper_ ? keeper_->trouble() : std::nullopt; }
   // Tells that it is done when the disk has all that it is about, as far as this has been told by
-  // the end of the next step. If the disk fails, that is said.
+  // the end of the next step. If the disk does not take it in time, that is said.
   void answer_when_kept(const api::Asker& asker, api::Completed done);
   // For the history. Says who asked, and where from; how people see both is added where it is not
   // told.
@@ -109,7 +111,7 @@ class KeptPositions final : public Service {
   void keep_confirmed(MotorId id);
   void tell_counter(MotorId id);
   void keep_heard(const Mcu& mcu);
-  void answer_open();
+  void answer_open(std::int64_t now_us);
   void tell_trouble();
   Result<void> may_be_confirmed(MotorId id) const;
 
@@ -134,7 +136,8 @@ class KeptPositions final : public Service {
   struct Open {
     api::Asker asker;
     api::Completed done;
-    std::optional<std::uint64_t> number{};  // of told()
+    std::optional<std::uint64_t> number{};   // of told()
+    std::optional<std::int64_t> until_us{};  // no longer is the disk waited for
   };
   std::list<Open> open_;
 };

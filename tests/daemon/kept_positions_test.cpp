@@ -315,7 +315,7 @@ TEST(KeptPositions, ConfirmedOnABrokenDiskAreNotSaidToBeDone) {
   lab.disk().set_broken(true);
   const Answer answer = lab.wait(lab.send(api::Confirm{{"m01"}}));
   EXPECT_EQ(answer.result, "fault");
-  EXPECT_THAT(answer.reason, HasSubstr("lost if bushd ends before"));
+  EXPECT_THAT(answer.reason, HasSubstr("it is lost if bushd ends"));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown) << "until then it counts";
   lab.disk().set_broken(false);
   lab.run_for(2.5);

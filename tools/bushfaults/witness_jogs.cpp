@@ -267,7 +267,7 @@ void Witness::configured(TimeNs now_ns, const Asked& asked, const api::Completed
   if (!unknown && told != std::ranges::any_of(asked.outside, outside)) {
     violated(now_ns, "whether it stands beyond its limits: " + completed.reason);
   }
-  if (completed.reason.find("not on the disk yet") != std::string::npos) return;
+  if (completed.outcome != api::Outcome::kDone) return;  // the disk has not taken it
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
     units_.is_on_disk(index_of(*find(request.motors[i])), asked.changes[i]);
   }
