@@ -98,8 +98,8 @@ void Simulator::add_mcus(const Options& options) {
     if (is_virtual_.back()) {
       bushd::sim::McuOptions mcu{.address = address,
                                  .boot_number = options.boot_number,
-                                 .unique_id = setup_.first_unique_id + bus_.mcu_count(),
-                                 .boot_ns = boot_ns};
+                                 .boot_ns = boot_ns,
+                                 .unique_id = setup_.first_unique_id + bus_.mcu_count()};
       if (setup_.measuring.contains(address)) mcu.supply = bushd::sim::SupplyRules{};
       bus_.add_mcu(mcu);
       for (const SwitchAt& one : options.switches) {
