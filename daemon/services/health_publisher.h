@@ -1,4 +1,4 @@
-// Tells clients once a second how well buses and MCUs do.
+// Tells clients how well buses and MCUs do: once a second, and when a port is opened or lost.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,7 @@ class HealthPublisher {
       : installation_(installation), outputs_(outputs) {}
 
   void step(std::int64_t now_us);
+  void port_changed() { due_us_ = 0; }
   std::int64_t next_wake_us() const { return due_us_; }
 
  private:

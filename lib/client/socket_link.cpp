@@ -18,6 +18,7 @@ namespace bushd::client {
 namespace {
 
 constexpr int kSendWithinMs = 3000;
+constexpr int kEndsWithinMs = 200;
 constexpr timeval kConnectWithin{.tv_sec = 3, .tv_usec = 0};
 constexpr int kPacketsAtOnce = 256;
 
@@ -66,12 +67,14 @@ std::string no_daemon(const std::string& path, int error, const std::string& ano
                      start);
 }
 
-// Whether somebody listens there still; nobody is asked.
+// Whether somebody listens there still, and goes on: a process that ends closes its descriptors one
+// after the other, and what waits at the socket with it. Nobody is asked.
 bool is_served(const std::string& path) {
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const sockaddr_un address = address_of(path);
-  const bool served =
-      ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  bool served = ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  pollfd polled{.fd = fd, .events = POLLIN, .revents = 0};
+  if (served && ::poll(&polled, 1, kEndsWithinMs) > 0) served = (polled.revents & POLLHUP) == 0;
   if (fd >= 0) ::close(fd);
   return served;
 }

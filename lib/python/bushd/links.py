@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import grp
 import os
+import select
 import socket
 import struct
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ DEFAULT_PREFIX = "BUSHD"
 MAX_CHANNEL = 63  # on the control socket
 PACKETS_AT_ONCE = 256
 CONNECT_WITHIN_S = 3
+ENDS_WITHIN_MS = 200
 
 
 class LinkEnded(Exception):
@@ -89,10 +91,18 @@ class SocketLink:
 
 
 def why_closed(path: str) -> str:
-    """The connection is over; whether somebody listens there still tells why."""
+    """The connection is over; whether somebody listens there still, and goes on, tells why.
+
+    A process that ends closes its descriptors one after the other, and what waits at the socket with it.
+    """
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as another:
         another.setblocking(False)
-        if another.connect_ex(path) != 0:
+        ended = another.connect_ex(path) != 0
+        if not ended:
+            poll = select.poll()
+            poll.register(another, select.POLLIN)
+            ended = any(event & select.POLLHUP for _, event in poll.poll(ENDS_WITHIN_MS))
+        if ended:
             return f"the daemon has ended; it was at {path}"
     return (
         f"bushd has closed this connection at {path}: too many clients are connected, this one did not read what it "
