@@ -106,6 +106,16 @@ class Motor:
         steps = self.steps_of_dial(user)
         return -steps if self.negative else steps
 
+    def steps_of_distances(self, amount: Amount) -> set:
+        """Of a distance that is no whole number of steps, both: it counts from the target as it was asked for, which may be
+        half a step off on either side (docs/positions.md, "Distances"). tests/daemon/relative_moves_test.cpp has the sums.
+        """
+        if amount.steps is not None or not self.unit:
+            return {self.steps_of_distance(amount)}
+        exact = Fraction(amount.user) * self.steps_per_unit
+        found = {self._within(below(exact)), self._within(above(exact))}
+        return {-steps for steps in found} if self.negative else found
+
     def _whole(self, value: Fraction) -> int:
         if value.denominator != 1:
             raise Refused("no whole number of steps")
@@ -191,7 +201,7 @@ class Motor:
         if absolute:
             found = self.steps_of_position(amount)
         else:
-            found = {base + self.steps_of_distance(amount)}
+            found = {base + steps for steps in self.steps_of_distances(amount)}
         if any(abs(target - (0 if absolute else base)) > 2 * MOST_STEPS for target in found):
             raise Refused("out of range")
         self.must_be_free()
