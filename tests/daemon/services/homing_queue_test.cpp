@@ -84,7 +84,7 @@ TEST(HomingQueue, StopEndsIt) {
   EXPECT_EQ(bench.shaft_steps("m02"), 0);
 }
 
-TEST(HomingQueue, AMotorThatWaitsForTheTriggerIsSaidToDoThat) {
+TEST(HomingQueue, OneThatWaitsForTheTriggerIsToldAsSuch) {
   HomingBench bench;
   bench.installation[bench.motor("m01")].arm(1, 40, 0);
   bench.homing.request(bench.asker(1), api::Home{{"m01"}});
