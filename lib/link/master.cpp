@@ -40,7 +40,6 @@ PerMcu<McuRecord> records_of(const BusSetup& setup) {
   return records;
 }
 
-// The MCU takes the number that it has for the same frame again.
 // The MCU takes the last number that it was given for the same frame again, whether it has reported
 // it or not.
 std::uint8_t next_trigger_number(McuRecord& mcu) {
