@@ -80,6 +80,14 @@ double user_position(const Scale& scale, long double dial) {
   return static_cast<double>(scale.negative ? offset - dial : offset + dial);
 }
 
+Result<mpq_class> exact_steps_of_user(const Scale& scale, double user) {
+  const auto value = number(user);
+  if (!value) return fail(value.error());
+  mpq_class dial = *value - *exact(scale.offset);
+  if (scale.negative) dial = -dial;
+  return mpq_class(dial * as_mpq(scale.steps_per_unit));
+}
+
 }  // namespace
 
 Steps operator+(const Steps& a, const Steps& b) {
@@ -148,19 +156,15 @@ Result<std::int64_t> Coordinates::steps_of_dial(double dial) const {
 }
 
 Result<std::int64_t> Coordinates::steps_of_user(double user) const {
-  const auto value = number(user);
-  if (!value) return fail(value.error());
-  mpq_class dial = *value - *exact(scale_.offset);
-  if (scale_.negative) dial = -dial;
-  return steps_from(dial * as_mpq(scale_.steps_per_unit));
+  const auto steps = exact_steps_of_user(scale_, user);
+  if (!steps) return fail(steps.error());
+  return steps_from(*steps);
 }
 
 Result<Steps> Coordinates::unrounded_of_user(double user) const {
-  const auto value = number(user);
-  if (!value) return fail(value.error());
-  mpq_class dial = *value - *exact(scale_.offset);
-  if (scale_.negative) dial = -dial;
-  return unrounded_from(dial * as_mpq(scale_.steps_per_unit));
+  const auto steps = exact_steps_of_user(scale_, user);
+  if (!steps) return fail(steps.error());
+  return unrounded_from(*steps);
 }
 
 Result<Steps> Coordinates::unrounded_of_distance(double user_units) const {
@@ -170,13 +174,10 @@ Result<Steps> Coordinates::unrounded_of_distance(double user_units) const {
 }
 
 Result<std::int64_t> Coordinates::parts_of_user(double user) const {
-  const auto value = number(user);
-  if (!value) return fail(value.error());
-  mpq_class dial = *value - *exact(scale_.offset);
-  if (scale_.negative) dial = -dial;
-  const mpq_class steps = dial * as_mpq(scale_.steps_per_unit);
-  if (const auto whole = steps_from(steps); !whole) return whole;
-  return nearest(steps * mpq_class(std::int64_t{1} << 32)).get_si();
+  const auto steps = exact_steps_of_user(scale_, user);
+  if (!steps) return fail(steps.error());
+  if (const auto whole = steps_from(*steps); !whole) return whole;
+  return nearest(*steps * mpq_class(std::int64_t{1} << 32)).get_si();
 }
 
 Result<std::int64_t> Coordinates::steps_of_distance(double user_units) const {
