@@ -101,6 +101,21 @@ class ServerTest : public testing::Test {
     server_->send(connection, std::make_shared<const Bytes>(packet));
   }
 
+  // Who does not read.
+  struct Deaf {
+    std::vector<Peer> peers{};
+    std::vector<Server::Connection> connections{};
+  };
+  Deaf connect_deaf(int count) {
+    Deaf deaf;
+    for (int i = 0; i < count; ++i) {
+      deaf.peers.emplace_back(path_);
+      settle();
+      deaf.connections.push_back(last_);
+    }
+    return deaf;
+  }
+
   test::TempDirectory directory_;
   std::string path_ = (directory_.path() / "run" / "control").string();
   std::unique_ptr<Server> server_;
@@ -266,15 +281,9 @@ TEST_F(ServerTest, WhoReadsLateGetsEverything) {
 
 TEST_F(ServerTest, MemoryOfAllIsBounded) {
   open({.unread_bytes_in_all = 500'000});
-  std::vector<Peer> deaf;
-  std::vector<Server::Connection> connections;
-  for (int i = 0; i < 20; ++i) {
-    deaf.emplace_back(path_);
-    settle();
-    connections.push_back(last_);
-  }
+  const Deaf deaf = connect_deaf(20);
   for (int i = 0; i < 100; ++i) {
-    for (const Server::Connection connection : connections) {
+    for (const Server::Connection connection : deaf.connections) {
       send(connection, bytes("STATE", 4000));
       ASSERT_LE(server_->unread_bytes(), 500'000u);
     }
@@ -284,13 +293,8 @@ TEST_F(ServerTest, MemoryOfAllIsBounded) {
 // Who reads what is sent loses nothing, however many others do not.
 TEST_F(ServerTest, OfAllWhoDoNotReadTheOneWithMostUnreadGoes) {
   open({.unread_bytes_in_all = 500'000});
-  std::vector<Peer> deaf;
-  std::vector<Server::Connection> connections;
-  for (int i = 0; i < 20; ++i) {
-    deaf.emplace_back(path_);
-    settle();
-    connections.push_back(last_);
-  }
+  const Deaf deaf = connect_deaf(20);
+  std::vector<Server::Connection> connections = deaf.connections;
   const Peer good(path_);
   settle();
   connections.insert(connections.begin(), last_);
@@ -300,7 +304,7 @@ TEST_F(ServerTest, OfAllWhoDoNotReadTheOneWithMostUnreadGoes) {
     ASSERT_EQ(good.read(), bytes("STATE", 4000)) << i;
   }
   EXPECT_FALSE(good.hung_up());
-  EXPECT_TRUE(std::ranges::any_of(deaf, &Peer::hung_up));
+  EXPECT_TRUE(std::ranges::any_of(deaf.peers, &Peer::hung_up));
   ASSERT_FALSE(noted_.empty());
   EXPECT_EQ(noted_.front().find("control socket: process " + std::to_string(::getpid())), 0u);
 }

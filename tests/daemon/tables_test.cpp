@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/lab.h"
+#include "daemon/lost_frames.h"
 
 namespace bushd::test {
 namespace {
@@ -174,15 +175,7 @@ TEST(UseTable, McuThatIsLostWhileItGetsTheTableLeavesAllWithTheOldOne) {
   Lab lab(hall(2, 1), kGlacier);
   lab.connect();
   // The second MCU hears nothing of the table.
-  lab.on_send = [](std::size_t, std::vector<std::uint8_t>& bytes) {
-    bushd_receiver receiver{};
-    bushd_frame frame;
-    for (const std::uint8_t byte : bytes) {
-      if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
-      if (frame.address == 2 && frame.type == BUSHD_MSG_TABLE_DATA) return false;
-    }
-    return true;
-  };
+  lab.on_send = loses(2, BUSHD_MSG_TABLE_DATA);
   const Answer used = lab.wait(lab.use("axes", "glacier"));
   EXPECT_EQ(used.result, "fault");
   EXPECT_THAT(used.reason, HasSubstr("MCU hall:2 did not confirm it in time"));
@@ -201,15 +194,7 @@ TEST(UseTable, McuThatComesDuringTheChangeWaitsForItsEnd) {
   ASSERT_TRUE(
       lab.run_until([&] { return lab.state_of("hall:2").state == api::McuState::kOffline; }, 3));
   // The first MCU hears nothing of the table.
-  lab.on_send = [](std::size_t, std::vector<std::uint8_t>& bytes) {
-    bushd_receiver receiver{};
-    bushd_frame frame;
-    for (const std::uint8_t byte : bytes) {
-      if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
-      if (frame.address == 1 && frame.type == BUSHD_MSG_TABLE_DATA) return false;
-    }
-    return true;
-  };
+  lab.on_send = loses(1, BUSHD_MSG_TABLE_DATA);
   const auto use = lab.use("axes", "glacier");
   ASSERT_TRUE(
       lab.run_until([&] { return lab.state_of("hall:2").state == api::McuState::kReady; }, 8));

@@ -398,6 +398,7 @@ void Host::keep_tables(std::uint64_t ticket, const std::vector<std::string>&) {
 
 void Host::log(bushd::daemon::LogLevel level, bushd::daemon::LogSubject, const std::string& text) {
   if (level != bushd::daemon::LogLevel::kInfo) recent_.note(now_ns_, "log: " + text);
+  witness_.log(text);
 }
 
 }  // namespace bushfaults

@@ -62,6 +62,7 @@ class Witness {
   void reply(TimeNs now_ns, const Key& key, std::size_t kind, const bushd::api::Reply& reply);
   void state(TimeNs now_ns, std::size_t mcu, const bushd::api::StateSnapshot& state);
   void description(TimeNs now_ns, const bushd::api::Description& said);
+  void log(const std::string& text);
   void lam(TimeNs now_ns, const bushd::api::CamacLam& lam);
   // A run of this motor begins, one of a line or of its own, or has ended as this word says.
   std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, bool on_line)> on_run;

@@ -17,6 +17,19 @@ void Witness::lam(TimeNs now_ns, const bushd::api::CamacLam& lam) {
   if (const auto wrong = shutter_.raised(lam)) violated(now_ns, *wrong);
 }
 
+// "camac-1-5: m07: why": of a motion of BUSHD-2 that did not end as it was asked for. Of one that
+// stood, paused, the log of moves says nothing more.
+void Witness::log(const std::string& text) {
+  const std::string of_module = std::string(Crates::kBushd2Client) + ": ";
+  if (!text.starts_with(of_module)) return;
+  const std::size_t begin = of_module.size();
+  Motor* motor = find(text.substr(begin, text.find(':', begin) - begin));
+  if (motor == nullptr || !is_of_module(*motor) || !motor->over) return;
+  motor->move.reset();
+  motor->pauses = motor->goes_on = false;
+  crates_.motion_ended(false);
+}
+
 void Witness::trigger(TimeNs now_ns, std::size_t mcu, bool rising) {
   starts_.trigger(now_ns, mcu, rising);
   const auto motor = ShutterPlace::motor(config_);

@@ -7,8 +7,8 @@
 
 #include "daemon/lab.h"
 #include "daemon/live_bench.h"
+#include "daemon/lost_frames.h"
 #include "daemon/services/stops.h"
-#include "engine/frame.h"
 
 namespace bushd::daemon {
 namespace {
@@ -75,15 +75,7 @@ TEST(Positions, AreSetAtRestOnlyAndWithinTheirRange) {
 TEST(Positions, SetByHalvesAreSaidAndOffsetsStayThen) {
   test::Lab lab(with_unit(test::hall(2, 2)));
   lab.connect();
-  lab.on_send = [](std::size_t, std::vector<std::uint8_t>& bytes) {
-    bushd_receiver receiver{};
-    bushd_frame frame;
-    for (const std::uint8_t byte : bytes) {
-      if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
-      if (frame.address == 2 && frame.type == BUSHD_MSG_SET_POSITION) return false;
-    }
-    return true;
-  };
+  lab.on_send = test::loses(2, BUSHD_MSG_SET_POSITION);
   const auto number = lab.send(api::SetPosition{
       {{"m01", api::UserUnits{5}}, {"m02", std::int64_t{77}}, {"m03", std::int64_t{-3}}}});
   lab.run_for(1);
