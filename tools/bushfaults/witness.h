@@ -227,7 +227,7 @@ class Witness {
                 const bushd::api::Completed& result);
   void over_at_once(TimeNs now_ns, const Key& key, Asked& asked,
                     const bushd::api::Completed& result);
-  void position_set(const Request& request);
+  void position_set(const Request& request, const bushd::api::Completed& completed);
   void moved(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result,
              const Motors& motors);
   void homed(TimeNs now_ns, const Asked& asked, const Motors& motors);

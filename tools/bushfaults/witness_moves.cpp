@@ -174,8 +174,16 @@ void Witness::keep_within(TimeNs now_ns, Motor& motor) {
   motor.range->high = std::max(motor.range->high, before->high);
 }
 
-void Witness::position_set(const Request& request) {
+// Of a fault with "; set: m01, m02; not set: m03" in its reason only those that are set.
+void Witness::position_set(const Request& request, const api::Completed& completed) {
+  std::string names = completed.reason;
+  names.erase(0, std::min(names.find("; set: "), names.size()));
+  names.erase(std::min(names.find("; not set: "), names.size()));
+  const auto is_set = [&](const std::string& motor) {
+    return completed.outcome == api::Outcome::kDone || names.find(motor) != std::string::npos;
+  };
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
+    if (!is_set(request.motors[i])) continue;
     const std::size_t motor = index_of(*find(request.motors[i]));
     if (sets_offset(units_, motor, request)) continue;
     if (const auto set = position_asked(request, i)) positions_.was_set(motor, *set);
@@ -186,7 +194,7 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
                        const api::Completed& completed) {
   const Request& request = asked.request;
   const bool done = completed.outcome == api::Outcome::kDone;
-  if (request.ask == Ask::kSetPosition && done) position_set(request);
+  if (request.ask == Ask::kSetPosition) position_set(request, completed);
   if (request.ask == Ask::kConfigure) configured(now_ns, asked, completed);
   if (request.ask == Ask::kPause) paused(now_ns, key, completed.reason);
   if (request.is_stop() && done) stop_is_done(asked, completed.reason);
