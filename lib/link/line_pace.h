@@ -52,7 +52,7 @@ class LinePace {
   explicit LinePace(unsigned ports, std::int64_t most_ahead_ns = 0)
       : unready_(ports), most_ahead_ns_(most_ahead_ns) {}
 
-  // The most that a port was ahead of another one, in time of the run.
+  // The most that a port may have been ahead of another one, in time of the run, also between looks.
   std::int64_t most_ahead_ns() const { return most_ahead_ns_; }
 
   // A port's place on the line. It leaves with this: then nobody waits for it.
@@ -88,7 +88,8 @@ class LinePace {
     void cannot_be_before(std::int64_t earliest_ns, std::int64_t run_ns) {
       pace_->begun_ns_ = std::max(*pace_->begun_ns_, earliest_ns - run_ns - kLateNs);
     }
-    // How far the port is ahead of the slowest one now.
+    // How far the port is ahead of the slowest one now. What they were apart since the look before
+    // counts as well: the slowest has not gone back since.
     std::int64_t measure(std::int64_t now_ns) {
       std::int64_t slowest_ns = INT64_MAX;
       std::int64_t fastest_ns = 0;
@@ -97,7 +98,8 @@ class LinePace {
         slowest_ns = std::min(slowest_ns, progress.to_ns);
         fastest_ns = std::max(fastest_ns, progress.from_ns);
       }
-      pace_->most_ahead_ns_ = std::max(pace_->most_ahead_ns_, fastest_ns - slowest_ns);
+      pace_->most_ahead_ns_ = std::max(pace_->most_ahead_ns_, fastest_ns - pace_->slowest_ns_);
+      pace_->slowest_ns_ = slowest_ns;
       return std::max<std::int64_t>(port_->progress_at(now_ns).from_ns - slowest_ns, 0);
     }
     std::int64_t most_ahead_ns() const { return pace_->most_ahead_ns_; }
@@ -112,6 +114,7 @@ class LinePace {
   unsigned unready_;
   std::vector<const LinePort*> ports_;
   std::optional<std::int64_t> begun_ns_;
+  std::int64_t slowest_ns_ = 0;  // at the last look
   std::int64_t most_ahead_ns_;
 };
 

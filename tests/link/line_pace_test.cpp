@@ -65,15 +65,20 @@ TEST(LinePace, MeasuresWhatOneIsAheadOfTheSlowest) {
   {
     LinePace::Place b(pace);
     b.give_to(&at_b);
-    at_a.progress = {40 * kMs, 50 * kMs};
-    at_b.progress = {30 * kMs, 45 * kMs};
+    at_a.progress = {0, 3 * kMs};
+    at_b.progress = {0, 33 * kMs};
+    EXPECT_EQ(a.measure(0), 0);
+    EXPECT_EQ(pace->most_ahead_ns(), kMs);
+    at_a.progress = {8 * kMs, 10 * kMs};
     EXPECT_EQ(a.measure(0), 0) << "b may be as far";
-    at_b.progress = {30 * kMs, 33 * kMs};
+    EXPECT_EQ(pace->most_ahead_ns(), 5 * kMs) << "before b went on";
+    at_a.progress = {40 * kMs, 50 * kMs};
     EXPECT_EQ(a.measure(0), 7 * kMs);
     EXPECT_EQ(b.measure(0), 0);
-    at_b.progress = {30 * kMs, INT64_MAX};
+    EXPECT_EQ(pace->most_ahead_ns(), 30 * kMs);
+    at_b.progress = {33 * kMs, INT64_MAX};
     EXPECT_EQ(a.measure(0), 0) << "b has made its last step";
-    EXPECT_EQ(pace->most_ahead_ns(), 7 * kMs);
+    EXPECT_EQ(pace->most_ahead_ns(), 30 * kMs);
   }
   EXPECT_EQ(a.measure(0), 0) << "b has left";
 }
