@@ -134,9 +134,10 @@ void Core::pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus&
   supervisor_.handle_events(now_us, installation_[bus]);
 }
 
-void Core::request(std::int64_t now, const api::Asker& as_counted, const api::Request& as_asked) {
+void Core::request(std::int64_t now, const api::Asker& who, const api::Request& as_asked) {
   // Where a computed axis would go is asked where its motors stand: after a stop, elsewhere.
   const auto* move = std::get_if<api::Move>(&as_asked);
+  const api::Asker as_counted = move != nullptr ? pseudo_axes_.told_of_axes(who, *move) : who;
   if (move != nullptr && !move->dry_run) {
     const auto by =
         open_moves_.precedence().overtaken(as_counted.after_stops, pseudo_axes_.motors_of(*move));

@@ -76,6 +76,21 @@ api::Amount amount_of(const motion::Motor& motor, double user, const units::Step
   return steps.whole;
 }
 
+// All that a request names which may be a computed axis.
+api::MotorNames names_in(const auto& request) {
+  api::MotorNames names;
+  if constexpr (requires { api::MotorNames(request.motors); }) names = request.motors;
+  if constexpr (requires { request.motors.front().motor; }) {
+    for (const auto& one : request.motors) names.push_back(one.motor);
+  }
+  if constexpr (requires { request.changes; }) {
+    for (const auto& change : request.changes) names.push_back(change.motor);
+  }
+  if constexpr (requires { request.motor; }) names.push_back(request.motor);
+  if constexpr (requires { request.group; }) names.push_back(request.group);
+  return names;
+}
+
 // Of all motors together, but for the position.
 void take_worst(api::MotorState& all, const api::MotorState& motor) {
   if (motor.activity != api::Activity::kResting) all.activity = api::Activity::kMoving;
@@ -120,6 +135,72 @@ std::vector<MotorId> PseudoAxes::motors_of(const api::Move& move) const {
     }
   }
   return motors;
+}
+
+// Stands for the session of one request until that is answered.
+class PseudoAxes::Told : public api::Session {
+ public:
+  Told(std::shared_ptr<api::Session> session, const PseudoAxes& axes, std::vector<Place> places)
+      : Session(session->transport(), session->client_id(), session->may_command(),
+                session->credentials()),
+        session_(std::move(session)),
+        axes_(axes),
+        places_(std::move(places)) {}
+
+  void answer(std::int64_t number, const api::Reply& reply) override {
+    const auto* completed = std::get_if<api::Completed>(&reply);
+    const auto* motors = completed == nullptr
+                             ? nullptr
+                             : std::get_if<std::vector<api::MotorResult>>(&completed->detail);
+    if (motors == nullptr) return session_->answer(number, reply);
+    std::vector<api::MotorResult> all;
+    for (const Place& place : places_) all.push_back(axes_.result_of(place, *completed));
+    all.insert(all.end(), motors->begin(), motors->end());
+    session_->answer(number, api::Completed{.outcome = completed->outcome,
+                                            .reason = completed->reason,
+                                            .detail = std::move(all)});
+  }
+  bool gone() const override { return session_->gone(); }
+
+ private:
+  std::shared_ptr<api::Session> session_;
+  const PseudoAxes& axes_;
+  std::vector<Place> places_;
+};
+
+api::Asker PseudoAxes::told_of_axes(const api::Asker& asker, const api::Move& move) const {
+  std::vector<Place> places;
+  for (const api::MotorAmount& amount : move.motors) {
+    if (const auto place = find(amount.motor)) places.push_back(*place);
+  }
+  if (places.empty() || !asker.session) return asker;
+  return {.session = std::make_shared<Told>(asker.session, *this, std::move(places)),
+          .number = asker.number,
+          .after_stops = asker.after_stops};
+}
+
+// Where it stands is what its motors make of it, those too that had no way to go.
+api::MotorResult PseudoAxes::result_of(const Place& place, const api::Completed& of_motors) const {
+  const config::Pseudo& pseudo = installation_.config().pseudos[place.pseudo];
+  const config::PseudoAxis& axis = pseudo.axes[place.axis];
+  std::vector<double> at;
+  for (const MotorId id : pseudo.motors) {
+    const motion::Motor& motor = installation_[id];
+    at.push_back(motor.coordinates().user_of(motor.position_steps()));
+  }
+  const double position = positions_of(pseudo.law, at)[place.axis];
+  api::MotorResult result{.motor = axis.name,
+                          .outcome = of_motors.outcome,
+                          .position_steps = counts_of(axis, position),
+                          .user = position,
+                          .dial = position,
+                          .unit = axis.unit,
+                          .precision = axis.decimals};
+  for (const auto& motor : std::get<std::vector<api::MotorResult>>(of_motors.detail)) {
+    result.who = motor.who;
+    result.legs = std::max(result.legs, motor.legs);
+  }
+  return result;
 }
 
 Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& request) const {
@@ -168,16 +249,9 @@ Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& re
                                [&](const api::Resume& r) { return named(r); },
                                [&](const api::Hold& r) { return named(r); },
                                [&](const api::Release& r) { return named(r); },
-                               [&](const api::Jog& r) { return refuse(r.motor); },
                                [&](const auto& r) -> Answer {
-                                 if constexpr (requires { r.motors.front().motor; }) {
-                                   for (const auto& one : r.motors) {
-                                     if (auto refused = refuse(one.motor); !refused) return refused;
-                                   }
-                                 } else if constexpr (requires { api::MotorNames(r.motors); }) {
-                                   for (const auto& name : r.motors) {
-                                     if (auto refused = refuse(name); !refused) return refused;
-                                   }
+                                 for (const std::string& name : names_in(r)) {
+                                   if (auto refused = refuse(name); !refused) return refused;
                                  }
                                  return std::nullopt;
                                }},

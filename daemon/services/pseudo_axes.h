@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "api/request.h"
+#include "api/session.h"
 #include "api/snapshot.h"
 #include "daemon/installation.h"
 
@@ -31,6 +32,10 @@ class PseudoAxes {
   // From which the axes are computed that it names.
   std::vector<MotorId> motors_of(const api::Move& move) const;
 
+  // The same asker; the result that it gets has one for each computed axis of the move, in the
+  // order in which they were asked, before those of the motors. Not of a move that names none.
+  api::Asker told_of_axes(const api::Asker& asker, const api::Move& move) const;
+
   // As parts 0 .. size()-1. `motor`: what is published of each motor.
   using StateOf = std::function<api::MotorState(MotorId)>;
   api::StateSnapshot state(std::size_t index, const StateOf& motor) const;
@@ -41,7 +46,10 @@ class PseudoAxes {
     std::size_t pseudo;
     std::size_t axis;
   };
+  class Told;
+
   std::optional<Place> find(const std::string& name) const;
+  api::MotorResult result_of(const Place& place, const api::Completed& of_motors) const;
   std::string motors_text(const config::Pseudo& pseudo) const;
   Result<api::Request> of_motors(const api::Move& move) const;
   Result<std::vector<double>> positions_asked(const api::Move& move, const config::Pseudo& pseudo,

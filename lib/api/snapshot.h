@@ -80,6 +80,8 @@ struct Description {
   std::int64_t tick_ns = 0;
   StopMode emergency_stop = StopMode::kRamp;
   std::vector<MotorDescription> motors{};  // by output
+  // Else axes that are computed from motors.
+  bool is_mcu() const { return address != 0; }
   friend bool operator==(const Description&, const Description&) = default;
 };
 

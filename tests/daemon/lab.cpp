@@ -23,6 +23,8 @@ Answer answer_of(const api::Reply& reply) {
                 .reason = completed->reason};
   if (const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail)) {
     for (const api::MotorResult& motor : *motors) {
+      answer.motors.push_back(motor.motor);
+      answer.users.push_back(motor.user);
       answer.motor_results.emplace_back(word(motor.outcome));
       answer.position_steps.push_back(motor.position_steps);
       answer.tables.push_back(motor.table);

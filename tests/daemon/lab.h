@@ -63,6 +63,8 @@ struct Answer {
   std::string result{};  // the word of its outcome, "refused", or ""
   std::string reason{};
   // By motor, in the request's order.
+  std::vector<std::string> motors{};
+  std::vector<double> users{};
   std::vector<int> legs{};
   std::vector<double> most_steps_per_s{};
   std::vector<std::string> motor_results{};

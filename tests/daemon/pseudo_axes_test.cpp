@@ -170,6 +170,28 @@ TEST(PseudoAxes, AreShownAsTheirMotorsAre) {
   EXPECT_FALSE(lab.motor("gap").moving);
 }
 
+TEST(PseudoAxes, ResultsNameTheAxesBeforeTheMotors) {
+  Lab lab(motors({"left", "right", "beam"}) + kSlit);
+  lab.connect();
+  const Answer opened = lab.wait(lab.send(to({{"gap", 4.002}})));
+  EXPECT_THAT(opened.motors, testing::ElementsAre("gap", "left", "right"));
+  EXPECT_THAT(opened.motor_results, testing::Each("reached"));
+  // 800.4 steps of each blade are 800.
+  EXPECT_THAT(opened.users, testing::ElementsAre(4, -2, 2));
+  EXPECT_EQ(opened.position_steps.front(), 4000) << "counts of the last decimal";
+  const Answer both = lab.wait(lab.send(to({{"centre", 0.5}, {"gap", 3}})));
+  EXPECT_THAT(both.motors, testing::ElementsAre("centre", "gap", "left", "right"));
+  EXPECT_THAT(both.users, testing::ElementsAre(0.5, 3, -1, 2));
+  EXPECT_THAT(lab.wait(lab.send(to({{"beam", 1}}))).motors, testing::ElementsAre("beam"));
+  // What has been stopped on its way stands somewhere too.
+  const auto move = lab.send(to({{"gap", 20}}));
+  lab.run_for(0.3);
+  lab.wait(lab.send(api::Stop{{"gap"}}));
+  EXPECT_THAT(lab.last_reply(move).motors, testing::ElementsAre("gap", "left", "right"));
+  EXPECT_EQ(lab.last_reply(move).motor_results.front(), "stopped");
+  EXPECT_EQ(lab.last_reply(move).users.front(), lab.motor("gap").user);
+}
+
 TEST(PseudoAxes, AreAsTrustedAsTheLeastTrustedMotor) {
   std::string toml = hall(2, 1, "fine");
   for (const std::string number : {"1", "2"}) {
@@ -248,7 +270,12 @@ TEST(PseudoAxes, WhatCannotBeAskedSaysWhatCan) {
   EXPECT_THAT(refusal(to({{"gap", 1e300}})), HasSubstr("beyond the soft limit"));
   for (const api::Request& request : std::initializer_list<api::Request>{
            api::Home{{"gap"}}, api::Jog{.motor = "centre", .per_s = 1},
-           api::SetPosition{.motors = {{"gap", api::UserUnits{0}}}}}) {
+           api::SetPosition{.motors = {{"gap", api::UserUnits{0}}}},
+           api::GetHistory{.motor = "gap"}, api::Confirm{{"gap"}}, api::Enable{{"gap"}},
+           api::PositionCompare{.motor = "gap", .position = api::UserUnits{1}},
+           api::Configure{.motors = {"gap"}}, api::UseTable{.group = "gap", .table = "slow"},
+           api::Configure{.kind = api::Configure::Kind::kChange,
+                          .changes = {{"gap", "offset", "1"}}}}) {
     EXPECT_EQ(refusal(request).substr(refusal(request).find(" is computed")),
               " is computed from motors left, right; name these");
   }

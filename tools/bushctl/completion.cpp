@@ -36,7 +36,8 @@ std::set<std::string> known_names(const Connection& connection, const std::strin
   if (!status) return names;
   for (const auto& mcu : status->descriptions) {
     for (const api::MotorDescription& motor : mcu.snapshot.motors) {
-      names.insert(value == "NAME" ? motor.name : motor.group);
+      if (value == "NAME") names.insert(motor.name);
+      if (value == "GROUP" && mcu.snapshot.is_mcu()) names.insert(motor.group);
     }
   }
   return names;

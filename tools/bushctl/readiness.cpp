@@ -27,8 +27,9 @@ constexpr std::chrono::milliseconds kStateWithin{1000};
 // Of the first MCU that takes no moves; "": all do.
 std::string what_is_not_ready(const Status& status) {
   if (status.states.empty()) return "the state of its MCUs has not come";
-  for (const auto& part : status.states) {
-    const bushd::api::StateSnapshot& mcu = part.snapshot;
+  for (std::size_t i = 0; i < status.states.size(); ++i) {
+    if (!status.descriptions.at(i).snapshot.is_mcu()) continue;
+    const bushd::api::StateSnapshot& mcu = status.states[i].snapshot;
     if (mcu.state == McuState::kReady || mcu.state == McuState::kRunning) continue;
     return fmt::format("MCU {} is {}{}{}", mcu.mcu, word(mcu.state), mcu.detail.empty() ? "" : ": ",
                        mcu.detail);

@@ -3,6 +3,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -168,10 +169,13 @@ nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
           {"heard_utime_us", heard_utime_us}};
 }
 
+std::string user_position_text(const api::MotorResult& motor) {
+  return position_text(motor.position_steps, motor.user,
+                       {.unit = motor.unit, .steps_per_unit = {}, .decimals = motor.precision});
+}
+
 std::string position_text(const api::MotorResult& motor) {
-  const std::string user =
-      position_text(motor.position_steps, motor.user,
-                    {.unit = motor.unit, .steps_per_unit = {}, .decimals = motor.precision});
+  const std::string user = user_position_text(motor);
   if (motor.unit == units::Coordinates::kSteps) return user;
   return fmt::format("{} ({} steps)", user, motor.position_steps);
 }
@@ -201,7 +205,7 @@ std::vector<std::string> table(const Status& status) {
   mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
   for (std::size_t i = 0; i < status.states.size(); ++i) {
     const api::StateSnapshot& mcu = status.states[i].snapshot;
-    const bool is_mcu = status.descriptions.at(i).snapshot.address != 0;
+    const bool is_mcu = status.descriptions.at(i).snapshot.is_mcu();
     for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
       const api::MotorState& motor = mcu.motors[m];
       const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
@@ -303,7 +307,7 @@ std::string json(const Status& status) {
       out["motors"].push_back(
           motor_json(mcu.motors[m], mcu.mcu, description_of(description, m, mcu.motors[m].name)));
     }
-    if (description.address != 0) out["mcus"].push_back(mcu_json(mcu, description));
+    if (description.is_mcu()) out["mcus"].push_back(mcu_json(mcu, description));
   }
   return bushd::json_text(out);
 }
@@ -356,9 +360,14 @@ std::vector<std::string> lines(const api::Reply& reply) {
   std::vector<std::string> out;
   if (const auto* motors = std::get_if<std::vector<api::MotorResult>>(&completed->detail)) {
     for (const api::MotorResult& motor : *motors) {
-      out.push_back(fmt::format("{}: {}, stands at {} by {} ({}){}", bushd::printable(motor.motor),
-                                word(motor.outcome), position_text(motor), text_of(motor.table),
-                                bushd::printable(motor.table.hash),
+      // A computed axis has no table, and its counts are no steps.
+      const bool computed = motor.table.name.empty();
+      const std::string by = computed ? ""
+                                      : fmt::format(" by {} ({})", text_of(motor.table),
+                                                    bushd::printable(motor.table.hash));
+      out.push_back(fmt::format("{}: {}, stands at {}{}{}", bushd::printable(motor.motor),
+                                word(motor.outcome),
+                                computed ? user_position_text(motor) : position_text(motor), by,
                                 motor.legs > 1 ? fmt::format(", in {} legs", motor.legs) : ""));
     }
     return out;
@@ -381,10 +390,11 @@ std::vector<std::string> rounding_lines(const api::Request& request, const api::
   if ((move == nullptr && line == nullptr) || results == nullptr) return out;
   if ((move != nullptr ? move->kind : line->kind) != api::Move::Kind::kAbsolute) return out;
   const std::vector<api::MotorAmount>& motors = move != nullptr ? move->motors : line->motors;
-  for (std::size_t i = 0; i < results->size() && i < motors.size(); ++i) {
-    const api::MotorResult& result = (*results)[i];
-    const auto* asked = std::get_if<api::UserUnits>(&motors[i].amount);
-    if (asked == nullptr || result.outcome != api::Outcome::kReached) continue;
+  for (const api::MotorResult& result : *results) {
+    const auto motor = std::ranges::find(motors, result.motor, &api::MotorAmount::motor);
+    if (motor == motors.end() || result.outcome != api::Outcome::kReached) continue;
+    const auto* asked = std::get_if<api::UserUnits>(&motor->amount);
+    if (asked == nullptr) continue;
     const std::string at = fmt::format("{:.{}f}", result.user, result.precision);
     if (std::stod(at) == asked->value) continue;
     out.push_back(fmt::format("{}: at {} {}, asked {}", bushd::printable(result.motor), at,

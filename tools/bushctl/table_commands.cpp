@@ -22,6 +22,7 @@ using nlohmann::ordered_json;
 std::map<std::string, api::TableRef> by_group(const bushd::client::Status& status) {
   std::map<std::string, api::TableRef> groups;
   for (const bushd::lcm::DescriptionMessage& mcu : status.descriptions) {
+    if (!mcu.snapshot.is_mcu()) continue;
     for (const api::MotorDescription& motor : mcu.snapshot.motors) {
       groups.emplace(motor.group, motor.table);
     }

@@ -34,9 +34,11 @@ class ChangesView : public View {
   void show(const Status& status) override {
     for (std::size_t i = 0; i < status.states.size(); ++i) {
       const bushd::api::StateSnapshot& mcu = status.states[i].snapshot;
-      line(mcu.mcu,
-           fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu), word(mcu.state), mcu.boot,
-                       mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
+      if (status.descriptions.at(i).snapshot.is_mcu()) {
+        line(mcu.mcu,
+             fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu), word(mcu.state), mcu.boot,
+                         mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
+      }
       for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
         line(mcu.motors[m].name, motor_line(status, i, m));
       }

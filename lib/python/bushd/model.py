@@ -108,7 +108,7 @@ class MotorResult:
 class MoveResult(Result):
     """How a move, a homing, a jog or armed moves have ended: `result["theta"].position`."""
 
-    motors: tuple[MotorResult, ...] = ()  # in the request's order
+    motors: tuple[MotorResult, ...] = ()  # in the request's order; of pseudo-axes before their motors
 
     def __getitem__(self, motor: str) -> MotorResult:
         for result in self.motors:

@@ -71,6 +71,8 @@ Observations good() {
                       .state = api::McuState::kReady,
                       .motors = {{.name = std::string("of ") + name}}};
     seen.daemon.status.states.push_back(state);
+    seen.daemon.status.descriptions.push_back(
+        {.part = {}, .snapshot = {.mcu = name, .address = 1}});
   }
   seen.daemon.status.healths = {{.part = {}, .snapshot = good_health()}};
   return seen;
@@ -102,6 +104,19 @@ TEST(Doctor, FindsNothingInAGoodLab) {
   EXPECT_THAT(complaints(good()), IsEmpty());
   EXPECT_FALSE(any_error(diagnose(good())));
   EXPECT_THAT(lines(diagnose(good())).back(), "0 errors, 0 warnings");
+}
+
+TEST(Doctor, ComputedAxesAreNoMcus) {
+  EXPECT_THAT(with([](Observations& seen) {
+                bushd::lcm::StateMessage axis;
+                axis.part.utime_us = kNow;
+                axis.snapshot = {.mcu = "hall:gap",
+                                 .state = api::McuState::kOffline,
+                                 .motors = {{.name = "gap", .trust = api::Trust::kUncertain}}};
+                seen.daemon.status.states.push_back(axis);
+                seen.daemon.status.descriptions.push_back({});
+              }),
+              IsEmpty());
 }
 
 TEST(Doctor, WithoutAConfigurationSetupIsTheRemedy) {

@@ -117,7 +117,12 @@ TEST(Render, TellsOfPositionsThatWereRoundedToAStep) {
     return rounding_lines(request, api::Completed{.reason = "r", .detail = results});
   };
   EXPECT_THAT(lines_of(move), testing::ElementsAre("x: at 12.3448 mm, asked 12.345"));
-  results[0].outcome = api::Outcome::kStopped;
+  // Results come in an order of their own, and of motors that nobody has named: an axis is computed
+  // from them.
+  std::ranges::reverse(results);
+  results.insert(results.begin(), reached("left", -2.001));
+  EXPECT_THAT(lines_of(move), testing::ElementsAre("x: at 12.3448 mm, asked 12.345"));
+  results.back().outcome = api::Outcome::kStopped;
   EXPECT_THAT(lines_of(move), testing::IsEmpty());
   EXPECT_THAT(lines_of(api::Stop{}), testing::IsEmpty());
 }

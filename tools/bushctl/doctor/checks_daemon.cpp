@@ -17,10 +17,14 @@ constexpr const char* kStart =
     "'systemctl status bushd' says why; 'sudo systemctl start bushd' starts it";
 constexpr std::int64_t kClocksDifferUs = 2'000'000;
 
-// An MCU and what the daemon says of it.
+// An MCU and what the daemon says of it. Computed axes are no MCUs: what there is to say is said of
+// their motors.
 template <class Visit>
 void for_each_mcu(const Observations& seen, Visit visit) {
-  for (const auto& state : seen.daemon.status.states) visit(state.snapshot);
+  const auto& status = seen.daemon.status;
+  for (std::size_t i = 0; i < status.states.size(); ++i) {
+    if (status.descriptions.at(i).snapshot.is_mcu()) visit(status.states[i].snapshot);
+  }
 }
 
 bool answers(const Observations& seen) {
