@@ -52,7 +52,7 @@ class LinePace {
   explicit LinePace(unsigned ports, std::int64_t most_ahead_ns = 0)
       : unready_(ports), most_ahead_ns_(most_ahead_ns) {}
 
-  // The most that a port may have been ahead of another one, in time of the run, also between looks.
+  // The most that a port may have been ahead of another one, in time of the run, between looks too.
   std::int64_t most_ahead_ns() const { return most_ahead_ns_; }
 
   // A port's place on the line. It leaves with this: then nobody waits for it.
