@@ -137,7 +137,7 @@ Promise::Numbers& Promise::book_of(const Request& request) {
   const auto [book, first] = books_.try_emplace(key);
   if (!first) books_used_.remove(key);
   books_used_.push_back(key);
-  if (books_used_.size() > kUsedSessions) {
+  if (books_used_.size() > kBooks) {
     books_.erase(books_used_.front());
     books_used_.pop_front();
   }

@@ -51,6 +51,7 @@ class Promise {
  private:
   static constexpr std::size_t kUsedSessions = 768;
   static constexpr std::size_t kIdleSessions = 256;
+  static constexpr std::size_t kBooks = 256;
   static constexpr std::uint64_t kNumbers = 1024;
 
   static constexpr std::size_t kStops = 64;
