@@ -1,5 +1,6 @@
 #include "daemon/interlocks.h"
 
+#include "api/remedy.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -40,7 +41,8 @@ Result<void> Interlocks::may_move_by(const Mcu& mcu) const {
     return fail("MCU " + mcu.name() + " has a fault: " + motion::fault_text(mcu.report()));
   }
   if ((mcu.report().flags & BUSHD_FLAG_ENABLED) == 0 && !mcu.asleep) {
-    return fail("the drivers of MCU " + mcu.name() + " are disabled; enable them first");
+    return fail("the drivers of MCU " + mcu.name() + " are disabled; run " +
+                api::remedy("enable", installation_[mcu.motors().front()].name()));
   }
   const Bus& bus = installation_.bus_of(mcu);
   if (bus.two_masters) {

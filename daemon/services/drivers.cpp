@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "api/remedy.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -32,7 +33,8 @@ Drivers::Drivers(Installation& installation, Interlocks& interlocks,
   interlocks.add([this](MotorId motor) -> Result<void> {
     const Mcu& mcu = installation_.mcu_of(motor);
     if (!being_disabled(mcu.id)) return {};
-    return fail("the drivers of MCU " + mcu.name() + " are being disabled; enable them first");
+    return fail("the drivers of MCU " + mcu.name() + " are being disabled; run " +
+                api::remedy("enable", installation_[motor].name()));
   });
 }
 
@@ -55,8 +57,9 @@ void Drivers::request(std::int64_t now_us, const api::Asker& asker,
 
 void Drivers::begin(std::int64_t now_us, const api::Asker& asker, const api::MotorNames& names,
                     std::uint8_t action) {
-  const auto targets = targets_of(names);
+  auto targets = targets_of(names);
   if (!targets) return asker.answer(api::Refused{targets.error().text()});
+  if (action == BUSHD_CONTROL_CLEAR_FAULTS && names.empty()) leave_out_what_is_well(*targets);
   if (const auto may_do = may(action, targets->mcus); !may_do) {
     return asker.answer(api::Refused{may_do.error().text()});
   }
@@ -90,14 +93,25 @@ Result<Drivers::Targets> Drivers::targets_of(const api::MotorNames& names) const
   return targets;
 }
 
+// Who clears what has stopped some motors does not mean the others, which go on. Where nothing is
+// to be cleared, all are meant.
+void Drivers::leave_out_what_is_well(Targets& targets) const {
+  const auto is_ill = [this](McuId id) {
+    const Mcu& mcu = installation_[id];
+    return mcu.report().faults != 0 || mcu.view().bound_by_stop;
+  };
+  if (std::ranges::none_of(targets.mcus, is_ill)) return;
+  std::erase_if(targets.mcus, [&](McuId id) { return !is_ill(id); });
+}
+
 Result<void> Drivers::may(std::uint8_t action, const std::vector<McuId>& mcus) const {
   if (action == BUSHD_CONTROL_ENABLE) return {};
   for (const McuId id : mcus) {
     for (const MotorId motor : installation_[id].motors()) {
       if (installation_[motor].is<motion::Resting>()) continue;
       const bool armed = installation_[motor].is<motion::Armed>();
-      return fail(installation_[motor].busy_text() +
-                  (armed ? "; disarm it first" : "; stop it first"));
+      return fail(installation_[motor].busy_text() + "; run " +
+                  api::remedy(armed ? "disarm" : "stop", installation_[motor].name()) + " first");
     }
   }
   return {};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "api/remedy.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -133,10 +134,12 @@ Result<void> HomingQueue::may_home(MotorId id) const {
                 installation_[id].name() + "\"");
   }
   if (auto may = interlocks_.may_move(id); !may) return may;
-  if (installation_[id].has_plan()) return fail("it moves; stop it first");
+  if (installation_[id].has_plan()) {
+    return fail("it moves; run " + api::remedy("stop", installation_[id].name()) + " first");
+  }
   if (!mcu.can_home()) {
-    return fail("MCU " + mcu.name() +
-                " cannot home; find out where it stands and run 'bushctl set NAME STEPS'");
+    return fail("MCU " + mcu.name() + " cannot home; find out where it stands and run " +
+                api::set_remedy(installation_[id].name()));
   }
   const bushd_home message = message_for({.motor = id, .floor = 0});
   return installation_[id].may_be_moved_within(std::int64_t{message.most_steps} +

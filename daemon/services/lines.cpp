@@ -8,6 +8,8 @@
 #include <iterator>
 #include <utility>
 
+#include "api/remedy.h"
+
 namespace bushd::daemon {
 
 void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request) {
@@ -17,8 +19,9 @@ void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
       *motors, [this](MotorId motor) { return installation_[motor].has_plan(); });
   for (const MotorId motor : *motors) {
     if (!installation_[motor].is<motion::Armed>()) continue;
-    return asker.answer(
-        api::Refused{installation_[motor].busy_text() + "; disarm it first, or wait for it"});
+    return asker.answer(api::Refused{installation_[motor].busy_text() + "; run " +
+                                     api::remedy("disarm", installation_[motor].name()) +
+                                     " first, or wait for it"});
   }
   if (moves) return redirect(now_us, asker, *motors, request);
   auto line = line_of(request);
@@ -192,8 +195,9 @@ Result<std::uint64_t> Lines::number_of(const std::vector<MotorId>& motors) const
   if (motors.size() != whole->second.motors.size()) {
     return fail(
         fmt::format("{} motors move on this line and {} are named; name all of them, or "
-                    "stop it first",
-                    whole->second.motors.size(), motors.size()));
+                    "run {} first",
+                    whole->second.motors.size(), motors.size(),
+                    api::remedy("stop", installation_[motors.front()].name())));
   }
   return whole->first;
 }
@@ -229,18 +233,19 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
     const motion::Motor& motor = installation_[line.motors[i]];
     if (*step < 0 || *step > end) {
       return fail(
-          fmt::format("{}: {} is beyond the ends of the line that is under way; stop it first, "
+          fmt::format("{}: {} is beyond the ends of the line that is under way; run {} first, "
                       "or wait for its result",
-                      motor.name(), motor.coordinates().text(targets[i].whole)));
+                      motor.name(), motor.coordinates().text(targets[i].whole),
+                      api::remedy("stop", motor.name())));
     }
     const auto s = static_cast<std::uint32_t>(*step);
     const std::int64_t on_way = line.way.position_at(i, s);
     if (targets[i].whole == on_way) continue;
     return fail(
         fmt::format("{}: {} is not on the line that is under way, which leads through {} "
-                    "there; stop it first, or wait for its result",
+                    "there; run {} first, or wait for its result",
                     motor.name(), motor.coordinates().text(targets[i].whole),
-                    motor.coordinates().text(on_way)));
+                    motor.coordinates().text(on_way), api::remedy("stop", motor.name())));
   }
   return static_cast<std::uint32_t>(*step);
 }
@@ -256,9 +261,10 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   const auto number = number_of(motors);
   if (!number) return refuse(number.error().text());
   Line& line = lines_.at(*number);
-  if (line.path) return refuse(name + " moves on a path; stop it first, or wait for its result");
+  const std::string stop = "run " + api::remedy("stop", name) + " first";
+  if (line.path) return refuse(name + " moves on a path; " + stop + ", or wait for its result");
   if (line.points.size() > 1) {
-    return refuse("the line ends in a last approach for backlash; stop it first");
+    return refuse("the line ends in a last approach for backlash; " + stop);
   }
   std::vector<std::uint16_t> floors;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
@@ -275,7 +281,7 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   const auto step = step_of(line, motors, request, targets);
   if (!step) return refuse(step.error().text());
   if (!line.way.set_floors(floors)) {
-    return refuse("that is slower than this line can be told; stop it first");
+    return refuse("that is slower than this line can be told; " + stop);
   }
   asker.answer(api::Accepted{});
   moves_.take_over(line.motors, asker);

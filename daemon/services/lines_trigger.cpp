@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "api/remedy.h"
 #include "daemon/services/lines.h"
 #include "daemon/services/trigger.h"
 
@@ -38,7 +39,8 @@ Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
   for (const MotorId id : *motors) {
     const motion::Motor& motor = installation_[id];
     if (!motor.has_plan()) continue;
-    return fail(motor.busy_text() + (motor.moves() ? "; stop it first" : "; disarm it first"));
+    return fail(motor.busy_text() + "; run " +
+                api::remedy(motor.moves() ? "stop" : "disarm", motor.name()) + " first");
   }
   if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
   auto line = line_of(as_move(request));
@@ -64,8 +66,9 @@ Result<void> Lines::may_wait(const Line& line) const {
     for (const MotorId other : mcu.motors()) {
       const motion::Motor& motor = installation_[other];
       if (motor.is<motion::Armed>()) {
-        return fail(fmt::format("{} waits for the trigger of MCU {} already{}; disarm it first",
-                                motor.name(), mcu.name(), open_.asked_for_by(other)));
+        return fail(fmt::format("{} waits for the trigger of MCU {} already{}; run {} first",
+                                motor.name(), mcu.name(), open_.asked_for_by(other),
+                                api::remedy("disarm", motor.name())));
       }
       if (motor.is<motion::OnLine>() && motor.axis().line() && motor.axis().line()->in_mcus) {
         return fail(fmt::format(

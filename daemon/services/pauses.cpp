@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "api/remedy.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -21,7 +23,7 @@ Pauses::Pauses(Installation& installation, Interlocks& interlocks, Moves& moves,
       local_inputs_(local_inputs) {
   interlocks_.add([this](MotorId motor) -> Result<void> {
     if (!installation_[motor].is_held()) return {};
-    return fail("it is held; run 'bushctl release NAME'");
+    return fail("it is held; run " + api::remedy("release", installation_[motor].name()));
   });
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "api/remedy.h"
 #include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
@@ -82,8 +83,9 @@ Result<void> Positions::add(MotorId id, const api::Amount& position, bool dial, 
   const auto* user = std::get_if<api::UserUnits>(&position);
   if (user != nullptr && !dial && coordinates.has_unit()) {
     if (motor.uncertain_reason()) {
-      return fail("its position is uncertain, because " + *motor.uncertain_reason() +
-                  "; home it, or say where it stands on the dial ('bushctl set NAME --dial')");
+      return fail(
+          "its position is uncertain, because " + *motor.uncertain_reason() +
+          "; home it, or say where it stands on the dial: " + api::set_remedy(motor.name()));
     }
     auto moved = coordinates.with_user(user->value, motor.position_steps());
     if (!moved) return fail(moved.error());

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "api/remedy.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -66,7 +67,9 @@ Result<void> Travels::may_travel(MotorId id, const bushd_travel& message) const 
   const Mcu& mcu = installation_.mcu_of(id);
   if (auto may = interlocks_.may_move(id); !may) return may;
   if (motor.has_plan()) return fail("moves, by another's request");
-  if (motor.is_held()) return fail("it is held; release it first");
+  if (motor.is_held()) {
+    return fail("it is held; run " + api::remedy("release", motor.name()) + " first");
+  }
   if (!mcu.can_travel() || (message.edge != BUSHD_EDGE_NONE && !mcu.can_trigger())) {
     return fail("the firmware of MCU " + mcu.name() + " cannot do that by itself");
   }

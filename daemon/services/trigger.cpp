@@ -4,6 +4,8 @@
 #include <map>
 #include <utility>
 
+#include "api/remedy.h"
+
 namespace bushd::daemon {
 
 Result<void> check_trigger_delay(std::int64_t delay_us) {
@@ -85,7 +87,9 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
   if (steps == 0) return fail(motor.name() + ": a move of no steps");
-  if (motor.has_plan()) return fail(motor.name() + " moves; stop it first");
+  if (motor.has_plan()) {
+    return fail(motor.name() + " moves; run " + api::remedy("stop", motor.name()) + " first");
+  }
   if (!mcu.can_trigger() || !mcu.can_run_tables()) {
     return fail(motor.name() + ": MCU " + mcu.name() +
                 " has no trigger input; move it without one, or by an MCU that has");
@@ -93,7 +97,8 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
   for (const MotorId other : mcu.motors()) {
     if (!installation_[other].is<motion::Armed>()) continue;
     return fail(installation_[other].name() + " waits for the trigger of MCU " + mcu.name() +
-                " already" + open_moves_.asked_for_by(other) + "; disarm it first");
+                " already" + open_moves_.asked_for_by(other) + "; run " +
+                api::remedy("disarm", installation_[other].name()) + " first");
   }
   return {};
 }

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "api/remedy.h"
 #include "motion/report_words.h"
 
 namespace bushd::motion {
@@ -410,7 +411,8 @@ event::Ended Motor::end_at_limit() {
       "stopped by " + switch_at(moving()->limit) + ", stands at " + std::to_string(position_);
   if (setup_.limit_immediate && position_ != axis_.from_steps()) {
     uncertain_reason_ = "it was stopped immediately at its limit switch and may have overrun";
-    reason += "; stopped immediately, it may have overrun, so check the position and set it";
+    reason += "; stopped immediately, it may have overrun, so check the position, and run " +
+              api::set_remedy(name());
   }
   return ended(Outcome::kLimit, std::move(reason));
 }
@@ -421,15 +423,17 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   const bool stepped = position_ != axis_.from_steps() && !rests_in_pause();
   const std::string mcu = "MCU " + setup_.mcu;
   if (moves() && moving()->position_mismatch) {
-    return ended(Outcome::kFault, *uncertain_reason_ + "; check the position and set it");
+    return ended(Outcome::kFault,
+                 *uncertain_reason_ + "; check the position, and run " + api::set_remedy(name()));
   }
   if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
     const std::string why = mcu + " disabled its drivers because " + stop_cause(report);
     if (stepped) uncertain_reason_ = kUnpowered;
-    return ended(Outcome::kFault, stepped
-                                      ? why + "; check the position and set it"
-                                      : "it did not move: " + why +
-                                            "; find the cause, then 'bushctl clear' and 'enable'");
+    return ended(Outcome::kFault,
+                 stepped
+                     ? why + "; check the position, and run " + api::set_remedy(name())
+                     : "it did not move: " + why + "; find the cause, run 'bushctl clear', then " +
+                           api::remedy("enable", name()));
   }
   if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
     const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
@@ -438,7 +442,8 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
     if (overran) uncertain_reason_ = kStoppedImmediately;
     return ended(Outcome::kStopped,
                  overran ? "stopped immediately by " + by +
-                               "; it may have overrun, so check the position and set it"
+                               "; it may have overrun, so check the position, and run " +
+                               api::set_remedy(name())
                          : "stopped by " + by);
   }
   if (is<Armed>()) {

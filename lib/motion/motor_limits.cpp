@@ -5,15 +5,21 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "api/remedy.h"
 #include "motion/motor.h"
 #include "motion/report_words.h"
 
 namespace bushd::motion {
 
 Result<void> Motor::may_be_used() const {
-  if (is<Armed>()) return fail("waits for the trigger; disarm it first");
+  if (is<Armed>()) {
+    return fail("waits for the trigger; run " + api::remedy("disarm", name()) + " first");
+  }
   if (is<Homing>()) return fail("it is being homed; wait for that result");
-  if (is<Travelling>()) return fail("it travels by itself, for a CAMAC module; stop it first");
+  if (is<Travelling>()) {
+    return fail("it travels by itself, for a CAMAC module; run " + api::remedy("stop", name()) +
+                " first");
+  }
   if (is<Local>() && !autonomous_) {
     return fail("MCU " + setup_.mcu +
                 " moves it for another master; end that, and wait until it rests");
@@ -27,19 +33,24 @@ Result<void> Motor::may_be_used() const {
 Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
-                (setup_.has_home ? "run 'bushctl home NAME', or find out where it stands and run "
-                                   "'bushctl set NAME STEPS'"
-                                 : "find out where it stands and run 'bushctl set NAME STEPS'") +
-                ", or 'bushctl confirm NAME' if it stands where it is shown");
+                (setup_.has_home ? "run " + api::remedy("home", name()) + ", or " : "") +
+                "find out where it stands and run " + api::set_remedy(name()) + ", or " +
+                api::remedy("confirm", name()) + " if it stands where it is shown");
   }
   if (is<OnLine>()) {
-    return fail("it moves on a line, or by a CAMAC program; stop it first, then move it by itself");
+    return fail("it moves on a line, or by a CAMAC program; run " + api::remedy("stop", name()) +
+                " first, then move it by itself");
   }
-  if (follows()) return fail("it follows an array; stop it first, then move it by itself");
+  if (follows()) {
+    return fail("it follows an array; run " + api::remedy("stop", name()) +
+                " first, then move it by itself");
+  }
   if (restored_reason_ && setup_.restored_refused) {
     return fail("its position is only restored, because " + *restored_reason_ +
-                ", and restored = \"refuse\" keeps it there; home it, set its position, or run "
-                "'bushctl confirm NAME' if it is right");
+                ", and restored = \"refuse\" keeps it there; run " +
+                (setup_.has_home ? api::remedy("home", name()) + " or " : "") +
+                api::set_remedy(name()) + ", or " + api::remedy("confirm", name()) +
+                " if it is right");
   }
   const std::int64_t steps = target - position_;
   if (target > kMaxPosition || target < -kMaxPosition || std::abs(steps) > kMaxPosition) {
@@ -71,8 +82,8 @@ Result<void> Motor::may_be_moved_within(std::int64_t steps) const {
   if (std::abs(position_) + steps <= kMaxPosition) return {};
   return fail(fmt::format(
       "it stands at {}, and may make up to {} steps to either side, which would lead beyond +-{}, "
-      "where no more are counted; run 'bushctl set NAME 0', then home it",
-      position_, steps, kMaxPosition));
+      "where no more are counted; run {}, then home it",
+      position_, steps, kMaxPosition, api::remedy("set", name(), "--dial 0")));
 }
 
 Result<units::Steps> Motor::distance_from() const {
@@ -89,8 +100,8 @@ Result<std::int64_t> Motor::rounded_distance_from() const {
   }
   if (is_paused()) {
     return fail("it is paused on its way to " + coordinates().text(target_steps()) +
-                ", so a distance could count from there or from where it is; stop it first, or "
-                "move it to a position");
+                ", so a distance could count from there or from where it is; run " +
+                api::remedy("stop", name()) + " first, or move it to a position");
   }
   if (axis_.stopping()) {
     if (axis_.is_planned()) return axis_.end_steps();

@@ -134,7 +134,7 @@ TEST_P(IdleDrivers, ThatPeopleDisableStayDisabled) {
     EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {"m01"})).result, "done");
     const Answer answer = lab.move("m01", 5);
     EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, HasSubstr("are disabled; enable them first"));
+    EXPECT_THAT(answer.reason, HasSubstr("are disabled; run 'bushctl enable m0"));
     EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {"m01"})).result, "done");
     EXPECT_TRUE(lab.pins.enabled);
     EXPECT_EQ(lab.move("m01", 5).result, "reached");
@@ -158,7 +158,7 @@ TEST_P(IdleDrivers, AreDisabledWhileBeingEnabledAndStoppedMeanwhile) {
   move = lab.send(Ask::kMoveBy, {"m01"}, {50});
   lab.run_for(0.1);
   EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {"m01"})).result, "done");
-  EXPECT_THAT(lab.wait(move).reason, HasSubstr("disabled; enable them first"));
+  EXPECT_THAT(lab.wait(move).reason, HasSubstr("disabled; run 'bushctl enable m0"));
   EXPECT_EQ(lab.replies(move).size(), 1u);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }

@@ -272,7 +272,7 @@ TEST(KeptPositions, AreKnownOnceTheyAreConfirmed) {
   lab.run_for(0.7);
   lab.bus(0).reboot(0);
   lab.reconnect();
-  lab.expect_refused("m01", "or 'bushctl confirm NAME' if it stands where it is shown");
+  lab.expect_refused("m01", "or 'bushctl confirm m01' if it stands where it is shown");
   const std::int64_t shown = lab.motor("m01").position_steps;
   EXPECT_EQ(lab.wait(lab.send(api::Confirm{{"m01", "m02"}})).result, "done");
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);

@@ -289,11 +289,12 @@ TEST_F(ArmedLine, IsRefusedWhereItCannotWait) {
   EXPECT_THAT(refusal(lab, {"m02"}, {5}),
               HasSubstr("m01 waits for the trigger of MCU hall:1 already"));
   const auto line = lab.send(line_to({"m01", "m03"}, {5, 5}));
-  EXPECT_THAT(lab.wait(line).reason, HasSubstr("m01 waits for the trigger; disarm it first"));
+  EXPECT_THAT(lab.wait(line).reason,
+              HasSubstr("m01 waits for the trigger; run 'bushctl disarm m01' first"));
   EXPECT_FALSE(lab.has_result(waits));
   lab.send(Ask::kMoveTo, {"m04"}, {900});
   lab.run_for(0.2);
-  EXPECT_THAT(refusal(lab, {"m04"}, {5}), HasSubstr("m04 moves; stop it first"));
+  EXPECT_THAT(refusal(lab, {"m04"}, {5}), HasSubstr("m04 moves; run 'bushctl stop m04' first"));
 }
 
 TEST_F(ArmedLine, EndsWithItsClientIfThatIsAskedFor) {

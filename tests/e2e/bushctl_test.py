@@ -138,7 +138,7 @@ class Bushctl(EndToEndTest):
             (("move", "b0", "5", "b0", "6"), "b0 is named twice"),
             (("move", "b0", "3000000000"), "b0: "),
             (("set", "a0", "5"), "a0 moves"),
-            (("disable", "a1"), "a0 moves; stop it first"),
+            (("disable", "a1"), "a0 moves; run 'bushctl stop a0' first"),
             (("stop", "nobody"), 'no motor "nobody"'),
         ):
             with self.subTest(arguments):

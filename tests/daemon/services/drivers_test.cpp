@@ -68,7 +68,7 @@ TEST(Drivers, StayEnabledWhileAMotorMoves) {
   DriversBench bench;
   bench.move(1, "m02", 500);
   bench.drivers.request(bench.now_us(), bench.asker(2), api::Disable{{"m01"}});
-  EXPECT_THAT(bench.refusal(2), HasSubstr("m02 moves; stop it first"));
+  EXPECT_THAT(bench.refusal(2), HasSubstr("m02 moves; run 'bushctl stop m02' first"));
   bench.drivers.request(bench.now_us(), bench.asker(3), api::Disable{{"m03"}});
   EXPECT_EQ(bench.result(3).outcome, api::Outcome::kDone) << "nothing moves there";
   EXPECT_EQ(bench.result(1).outcome, api::Outcome::kReached);
@@ -99,6 +99,23 @@ TEST(Drivers, OfAllAreThoseOfTheMcusThatAreOnline) {
   EXPECT_THAT(bench.result(3).reason, HasSubstr("not done there: hall:2"));
   bench.drivers.request(bench.now_us(), bench.asker(4), api::Enable{{"m01", "m03"}});
   EXPECT_THAT(bench.refusal(4), HasSubstr("MCU hall:2 is offline")) << "it was meant";
+}
+
+TEST(Drivers, ClearOfAllIsOfThoseThatHaveAFault) {
+  DriversBench bench(test::hall_with_emergency_input());
+  bench.move(1, "m03", 500);
+  bench.line.mcu(0).set_inputs({0, BUSHD_INPUT_EMERGENCY});
+  ASSERT_TRUE(bench.run_until([&] { return bench.report_of("m01").faults != 0; }));
+  bench.line.mcu(0).set_inputs({0, 0});
+  bench.run_for(0.05);
+  ASSERT_TRUE(bench.installation[bench.motor("m03")].has_plan()) << "it goes on";
+  bench.drivers.request(bench.now_us(), bench.asker(2), api::ClearFaults{});
+  EXPECT_EQ(bench.result(2).outcome, api::Outcome::kDone)
+      << "no motor of the MCU with the fault moves";
+  EXPECT_EQ(bench.report_of("m01").faults, 0);
+  bench.drivers.request(bench.now_us(), bench.asker(3), api::ClearFaults{{"m03"}});
+  EXPECT_THAT(bench.refusal(3), HasSubstr("m03 moves; run 'bushctl stop m03' first"));
+  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kReached);
 }
 
 TEST(Drivers, OfAllAreRefusedWhereNoMcuIsOnline) {

@@ -88,7 +88,8 @@ TEST(HomingQueue, OneThatWaitsForTheTriggerIsToldAsSuch) {
   HomingBench bench;
   bench.installation[bench.motor("m01")].arm(1, 40, 0);
   bench.homing.request(bench.asker(1), api::Home{{"m01"}});
-  EXPECT_THAT(bench.refusal(1), HasSubstr("m01: waits for the trigger; disarm it first"));
+  EXPECT_THAT(bench.refusal(1),
+              HasSubstr("m01: waits for the trigger; run 'bushctl disarm m01' first"));
 }
 
 TEST(HomingQueue, AMotorWithoutAHomeIsRefusedWithTheRemedy) {

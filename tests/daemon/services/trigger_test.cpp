@@ -62,7 +62,7 @@ TEST(Trigger, RefusalsSayWhy) {
   EXPECT_THAT(bench.refusal(4), HasSubstr("m02 waits for the trigger of MCU hall:1 already"));
   bench.move(5, "m03", 400);
   bench.arm(6, {{"m03", 5}});
-  EXPECT_THAT(bench.refusal(6), HasSubstr("m03 moves; stop it first"));
+  EXPECT_THAT(bench.refusal(6), HasSubstr("m03 moves; run 'bushctl stop m03' first"));
   EXPECT_EQ(bench.result(5).outcome, api::Outcome::kReached);
 }
 
