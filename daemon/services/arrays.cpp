@@ -232,8 +232,8 @@ void Arrays::take_rows(std::int64_t now_us, const api::Asker& asker, const api::
     auto begun = begin(asker, request);
     if (!begun) return asker.answer(api::Refused{begun.error().text()});
     array = *begun;
-    array->after_stops = asker.after_stops;
   }
+  array->after_stops = std::min(array->after_stops, asker.after_stops);
   if (const auto by = overtaken(*array)) {
     array->dropped = request.part == api::Follow::Part::kLastRows;
     return open_.not_begun(asker, *by);
@@ -427,6 +427,7 @@ void Arrays::run(std::int64_t now_us, const api::Asker& asker, const api::Follow
     return asker.answer(api::Refused{"no such array is loaded; tell its rows first"});
   }
   Array& array = *found;
+  array.after_stops = std::min(array.after_stops, asker.after_stops);
   if (const auto by = overtaken(array)) {
     arrays_.erase(found);
     return open_.not_begun(asker, *by);

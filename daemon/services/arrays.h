@@ -60,7 +60,8 @@ class Arrays final : public Service {
     std::unique_ptr<motion::TrajectoryCheck> check;
     bool waits = false;  // for a check
     bool spoilt = false;
-    std::uint64_t after_stops = 0;  // as Asker::after_stops, of its first rows
+    // As Asker::after_stops, of the part that was asked for first.
+    std::uint64_t after_stops = api::Asker::kNotCounted;
     bool dropped = false;           // a stop has ended it, and its last rows were told that
     // From when it runs: the rows that have been checked.
     std::shared_ptr<motion::Trajectory> followed;

@@ -112,7 +112,7 @@ class Lines final : public Service {
     std::vector<End> low;
     std::vector<End> high;
     std::vector<units::Scale> scales;  // of each motor at the first point; the same for all
-    std::uint64_t after_stops = 0;     // as Asker::after_stops, of the first part
+    std::uint64_t after_stops = 0;     // as Asker::after_stops, of the part asked for first
     std::int32_t rows = 0;
     int direction = 0;  // of a motor with speeds
   };

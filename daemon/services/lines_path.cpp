@@ -74,13 +74,17 @@ void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& 
   };
   std::erase_if(incoming_, is_dropped);
   std::erase_if(ended_, is_dropped);
+  auto incoming = incoming_.find(client);
+  if (incoming != incoming_.end()) {
+    Incoming& path = incoming->second;
+    path.after_stops = std::min(path.after_stops, asker.after_stops);
+  }
   if (const auto by = overtaken(client, asker, request)) {
     incoming_.erase(client);
     ended_.erase(client);
     if (!*last) ended_.emplace(client, *by);
     return open_.not_begun(asker, *by);
   }
-  auto incoming = incoming_.find(client);
   Result<void> good;
   if (incoming == incoming_.end()) {
     auto begun = begin_points(asker, request);

@@ -92,6 +92,26 @@ api::Follow part_of_array(Part part, std::vector<double> time_s = {},
           .positions = std::move(positions)};
 }
 
+// By its number, a later part was asked for before a stop that had ended by then.
+TEST(StopParts, APartThatWasAskedForBeforeAStopEndsTheWhole) {
+  Lab lab(hall(1, 2));
+  lab.connect();
+  const auto late = std::make_shared<Late>(lab);
+  const std::uint64_t before = late->stops();
+  lab.wait(lab.send(Ask::kStop, {}));
+  EXPECT_THAT(late->result(late->ask(part_of_path(0, false))), HasSubstr("done: "));
+  EXPECT_THAT(late->result(late->ask(part_of_path(1, false), before)),
+              HasSubstr("stopped: m01: stopped by command"));
+  const std::vector<double> times{0, 2};
+  const std::vector<double> positions{0, 0, 100, 0};
+  EXPECT_THAT(late->result(late->ask(part_of_array(Part::kRows, times, positions))),
+              HasSubstr("done: "));
+  EXPECT_THAT(late->result(late->ask(part_of_array(Part::kRun), before)),
+              HasSubstr("stopped: m01: stopped by command"));
+  lab.run_for(1);
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+}
+
 // It runs; these rows of it were sent before the stop, and are taken before it or after it.
 struct RunningArray {
   RunningArray() : lab(hall(1, 2)) {
