@@ -63,7 +63,8 @@ class PulsePort final : public BusPort {
 Result<std::unique_ptr<BusPort>> open_port(const std::string& path, const config::Bus& bus) {
   switch (bus.kind) {
     case config::BusKind::kSerialPulse: {
-      auto opened = serial::PulsePort::open(path, bus.serial_pulse.rts);
+      auto opened = serial::PulsePort::open(
+          path, {.rts = bus.serial_pulse.rts, .positive_off = bus.serial_pulse.positive_off});
       if (!opened) return fail(opened.error());
       return std::make_unique<PulsePort>(std::move(*opened));
     }

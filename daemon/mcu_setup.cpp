@@ -69,6 +69,8 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
   const config::Mcu& mcu = config[id];
   link::McuSetup setup{.address = mcu.address, .tables = {}};
   setup.emission = mcu.emission;
+  setup.outputs = mcu.outputs;
+  setup.outputs_at = mcu.outputs_at;
   setup.inputs = inputs_of(mcu);
   setup.off_after_watchdog = mcu.enable_after_reset == config::EnableAfterReset::kNo;
   std::vector<const config::Motor*> motors;

@@ -53,6 +53,32 @@ void Journal::tell_table(MotorId motor, const tables::Table& table) {
   outputs_.move_log(json_text(line));
 }
 
+// What edges mean. Where no key says so, all is active high.
+void Journal::tell_levels(const Mcu& mcu) {
+  const bushd_set_outputs& outputs = mcu.config.outputs;
+  const bool enable_low = outputs.enabled == BUSHD_ENABLED_LOW;
+  if (!enable_low && (outputs.step_low | outputs.direction_low) == 0) return;
+  const auto numbers = [](std::uint16_t mask) {
+    std::vector<int> low;
+    for (int output = 0; mask >> output != 0; ++output) {
+      if (mask >> output & 1) low.push_back(output);
+    }
+    return low;
+  };
+  const nlohmann::json line = {{"event", "levels"},
+                               {"bus", installation_.bus_of(mcu).config.name},
+                               {"address", mcu.config.address.value},
+                               {"enable_low", enable_low},
+                               {"step_low", numbers(outputs.step_low)},
+                               {"direction_low", numbers(outputs.direction_low)}};
+  outputs_.move_log(json_text(line));
+}
+
+void Journal::goes_online(Mcu& mcu) {
+  told_[mcu.id].reset();
+  tell_levels(mcu);
+}
+
 void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::uint32_t late_ns,
                       bool by_table) {
   const motion::Motor& motor = installation_[id];

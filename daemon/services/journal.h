@@ -54,7 +54,7 @@ class Journal final : public Service {
   void before_report(MotorId motor, bool being_set);
   void after_report(const Mcu& mcu);
 
-  void goes_online(Mcu& mcu) override { told_[mcu.id].reset(); }
+  void goes_online(Mcu& mcu) override;
   // Its MCU has restarted.
   void position_lost(MotorId motor, std::int64_t from_steps);
 
@@ -68,6 +68,7 @@ class Journal final : public Service {
   };
   void end_autonomous(MotorId motor, const Mcu& mcu);
   void tell_table(MotorId motor, const tables::Table& table);
+  void tell_levels(const Mcu& mcu);
 
   const Installation& installation_;
   Outputs& outputs_;

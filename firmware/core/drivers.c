@@ -1,16 +1,42 @@
-// EN, common to all drivers of the MCU.
+// EN, common to all drivers of the MCU, and the levels at which drivers do what they are to do.
 #include "firmware/core/drivers.h"
 
 #include "firmware/core/access.h"
+#include "firmware/core/state.h"
 
 void bushd_mcu_keep_enable(bushd_mcu* mcu) {
   const bool on = (mcu->flags & BUSHD_FLAG_ENABLED) != 0;
   mcu->port.keep_enable(mcu->port.context, on && mcu->inputs.enable_after_watchdog);
 }
 
+void bushd_mcu_drive_enable(bushd_mcu* mcu) {
+  const bool on = (mcu->flags & BUSHD_FLAG_ENABLED) != 0;
+  // A master that knows nothing of levels wants these.
+  if (on && mcu->config.outputs.enabled == 0) mcu->config.outputs.enabled = BUSHD_ENABLED_HIGH;
+  mcu->port.set_enable(mcu->port.context, on, &mcu->config.outputs);
+}
+
 void bushd_mcu_set_enable(bushd_mcu* mcu, bool on) {
   mcu->flags &= (uint8_t)~BUSHD_FLAG_ENABLED;
   if (on) mcu->flags |= BUSHD_FLAG_ENABLED;
-  mcu->port.set_enable(mcu->port.context, on);
+  bushd_mcu_drive_enable(mcu);
   bushd_mcu_keep_enable(mcu);
+}
+
+// A level of STEP that changes may look like a step to a driver: it is off meanwhile.
+bushd_status bushd_mcu_set_outputs(bushd_mcu* mcu, const bushd_set_outputs* message) {
+  if ((mcu->flags & BUSHD_FLAG_CONFIGURED) == 0) return BUSHD_E_STATE;
+  bushd_set_outputs* const outputs = &mcu->config.outputs;
+  if (outputs->step_low == message->step_low && outputs->direction_low == message->direction_low &&
+      outputs->enabled == message->enabled) {
+    return BUSHD_OK;
+  }
+  if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
+  if (message->step_low != 0 && mcu->emission.grid.mode == BUSHD_EMISSION_PHASES) {
+    return BUSHD_E_FORMAT;
+  }
+  if (outputs->enabled != 0) bushd_mcu_set_enable(mcu, false);
+  *outputs = *message;
+  bushd_mcu_set_enable(mcu, false);
+  return BUSHD_OK;
 }

@@ -60,6 +60,9 @@ bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* messa
   if (memcmp(message, &mcu->emission.settings, sizeof *message) == 0) return BUSHD_OK;
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (is_disabled(mcu, message->mode)) return BUSHD_E_FORMAT;
+  // Levels of windings are what their transistors want.
+  const bool phases = message->mode == BUSHD_EMISSION_PHASES;
+  if (phases && mcu->config.outputs.step_low != 0) return BUSHD_E_FORMAT;
   if (!keeps_pulses(mcu, message)) return BUSHD_E_PULSE_WIDTH;
   const bushd_status status = use(mcu, message);
   if (status != BUSHD_OK) return status;
@@ -116,7 +119,7 @@ static void shape_phases(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
     for (uint8_t m = 0; steps != 0; ++m, steps = (uint16_t)(steps >> 1)) {
       if ((steps & 1u) == 0) continue;
       uint8_t* const phase = &mcu->emission.of.windings.phase[m];
-      *phase = next_phase(*phase, count, (slot_buffer->direction & motor_bit(m)) != 0);
+      *phase = next_phase(*phase, count, (mcu->direction & motor_bit(m)) != 0);
       if ((on & motor_bit(m)) == 0) continue;
       levels &= (uint16_t)~(0xFu << (BUSHD_PHASE_OUTPUTS * m));
       levels |= levels_of(mcu, m);
@@ -140,7 +143,7 @@ static bool make_settle_step(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   } else {
     mcu->direction &= (uint16_t)~motor_bit(m);
   }
-  slot_buffer->direction = mcu->direction;
+  slot_buffer->direction = mcu->direction ^ mcu->config.outputs.direction_low;
   slot_buffer->steps[m] = step;
   slot_buffer->active = motor_bit(m);
   memset(slot_buffer->step, 0, sizeof slot_buffer->step);

@@ -5,6 +5,7 @@
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
 #include "firmware/core/currents.h"
+#include "firmware/core/drivers.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/homing.h"
 #include "firmware/core/inputs.h"
@@ -63,7 +64,7 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   if (config->scratch != NULL) memset(config->scratch, 0, sizeof *config->scratch);
   mcu->tick_ns = BUSHD_BOOT_TICK_NS;
   mcu->low_water_ticks = UINT16_MAX;
-  port->set_enable(port->context, false);
+  bushd_mcu_drive_enable(mcu);
   port->set_tick(port->context, mcu->tick_ns);
   for (uint8_t m = 0; m < config->motors; ++m) mcu->motor[m].table = -1;
   bushd_mcu_clear_streams(mcu);
@@ -75,7 +76,7 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   if (mcu->failed_tests & (uint8_t)~BUSHD_TEST_EEPROM) mcu->faults |= BUSHD_FAULT_SELF_TEST;
   if (config->enable_at_boot && (mcu->faults & BUSHD_FAULT_SELF_TEST) == 0) {
     mcu->flags |= BUSHD_FLAG_ENABLED;
-    port->set_enable(port->context, true);
+    bushd_mcu_drive_enable(mcu);
     // Until settings say otherwise: there may be another reset before a master tells them.
     port->keep_enable(port->context, true);
   }

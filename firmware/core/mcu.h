@@ -87,6 +87,9 @@ typedef struct bushd_mcu_config {
   // keeps the receiver out of it from the making of an answer until it is sent.
   uint8_t* reply;
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
+  // Kept from before (bushd_mcu_nvm_region_at); all 0: there are none. The core's after boot. Last:
+  // an AVR reaches what lies before it faster.
+  bushd_set_outputs outputs;
 } bushd_mcu_config;
 
 // Read-only for ports and tests; everything in here is the core's, and each part its module's.
@@ -104,7 +107,7 @@ typedef struct bushd_mcu {
   uint8_t front;  // slot_buffer[front] is being emitted
   uint16_t ramp_downs;
   uint16_t low_water_ticks;
-  uint16_t direction;   // DIR levels of the slot_buffer prepared last
+  uint16_t direction;   // of the slot_buffer prepared last; 1: positive
   uint16_t autonomous;  // motors that move by homing, travel or local inputs
   uint16_t homed;
   bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];         // in the terms of each table
@@ -147,7 +150,8 @@ static inline bushd_mcu_buffer_owner bushd_mcu_owner_of_buffer(const bushd_mcu* 
 void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_config* config);
 
 // What a port may keep over resets: pieces of memory, from index 0 on until one is empty. Later
-// ones may be as long as earlier ones say. They hold addresses: only the same program may get them
+// ones may be as long as earlier ones say. The first one is bushd_mcu_config.outputs, which a port
+// reads before bushd_mcu_boot too. They hold addresses: only the same program may get them
 // back, between bushd_mcu_boot and the first tick, the earlier ones first, and then
 // bushd_mcu_nvm_restored.
 typedef struct bushd_mcu_nvm_region {
@@ -157,11 +161,11 @@ typedef struct bushd_mcu_nvm_region {
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
 // Bytes of all pieces together, with this much table memory and all motors.
 #define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                     \
-  (sizeof(uint32_t) + sizeof(bushd_format) + sizeof(bushd_set_inputs) +                         \
-   BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) + sizeof(bushd_emission) +                 \
-   sizeof(bushd_local) + BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + sizeof(uint8_t) +        \
-   sizeof(uint16_t) + (code_count) * sizeof(uint16_t) + BUSHD_MOTORS_PER_MCU * sizeof(int8_t) + \
-   BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +                                          \
+  (sizeof(bushd_set_outputs) + sizeof(uint32_t) + sizeof(bushd_format) +                        \
+   sizeof(bushd_set_inputs) + BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) +               \
+   sizeof(bushd_emission) + sizeof(bushd_local) + BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + \
+   sizeof(uint8_t) + sizeof(uint16_t) + (code_count) * sizeof(uint16_t) +                       \
+   BUSHD_MOTORS_PER_MCU * sizeof(int8_t) + BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +  \
    BUSHD_MAX_VELOCITY_MOTORS * sizeof(bushd_mcu_velocity_settings))
 void bushd_mcu_nvm_restored(bushd_mcu* mcu);
 

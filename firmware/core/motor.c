@@ -354,7 +354,7 @@ void bushd_mcu_emit(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   const uint16_t on_line = exact & mcu->line.motors;
   if (exact != on_line) emit_runs(mcu, slot_buffer, exact & (uint16_t)~on_line);
   if (on_line != 0) bushd_mcu_emit_line(mcu, slot_buffer, on_line);
-  slot_buffer->direction = mcu->direction;
+  slot_buffer->direction = mcu->direction ^ mcu->config.outputs.direction_low;
   slot_buffer->outputs = BUSHD_OUTPUTS_PULSES;
   slot_buffer->compare_rise = slot_buffer->compare_fall = 0;
   const bushd_emission_grid* grid = &mcu->emission.grid;

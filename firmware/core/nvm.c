@@ -1,6 +1,7 @@
 // What outlives a reset, if the port keeps it: tables, who runs which, and settings.
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
+#include "firmware/core/drivers.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/inputs.h"
 
@@ -25,6 +26,7 @@ static bushd_mcu_nvm_region setting_of_motor(bushd_mcu* mcu, uint8_t index) {
 
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
   enum {
+    OUTPUTS,
     TICK,
     FORMAT,
     INPUTS,
@@ -38,6 +40,8 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
     MOTORS
   };
   switch (index) {
+    case OUTPUTS:
+      return piece_of(&mcu->config.outputs, sizeof mcu->config.outputs);
     case TICK:
       return piece_of(&mcu->tick_ns, sizeof mcu->tick_ns);
     case FORMAT:
@@ -69,6 +73,7 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
 }
 
 void bushd_mcu_nvm_restored(bushd_mcu* mcu) {
+  bushd_mcu_drive_enable(mcu);
   bushd_mcu_begin_inputs(mcu);
   bushd_mcu_restore_emission(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);

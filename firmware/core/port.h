@@ -32,8 +32,11 @@ typedef struct bushd_port {
   // Keeps the address for the next boots; false if it cannot.
   bool (*store_address)(void* context, uint8_t address);
 
-  // EN, common to all drivers of the MCU; true = drivers powered.
-  void (*set_enable)(void* context, bool on);
+  // EN, common to all drivers of the MCU; true = drivers powered. `levels` says which level of it
+  // that is, and where STEP and the common DIR rest; while levels->enabled is 0 nobody has told,
+  // and EN and STEP are left to the resistors of the board: not driven. `levels` stay where they
+  // are, and change while the drivers are disabled and no motor moves, with another call.
+  void (*set_enable)(void* context, bool on, const bushd_set_outputs* levels);
 
   // Length of all later ticks, in ns, from the next tick boundary on.
   void (*set_tick)(void* context, uint32_t tick_ns);
@@ -55,8 +58,8 @@ typedef struct bushd_port {
   // Tests of the hardware at boot: BUSHD_TEST_* of all that failed.
   uint8_t (*self_test)(void* context);
 
-  // Remembers over a watchdog reset whether EN is to be raised at once after it: then
-  // bushd_mcu_config.enable_at_boot says so.
+  // Remembers over a watchdog reset whether the drivers are to be enabled at once after it, and by
+  // which level of EN: then bushd_mcu_config.enable_at_boot and .outputs say so.
   void (*keep_enable)(void* context, bool on);
 
   // From now on this edge at the trigger input is captured, once, and handed over by

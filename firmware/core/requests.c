@@ -95,7 +95,7 @@ static uint32_t capabilities_of(const bushd_mcu* mcu) {
                  BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
                  BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL |
-                 BUSHD_CAN_CLEAR_NAMED;
+                 BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   if (mcu->port.set_current != NULL) all |= BUSHD_CAN_CURRENTS;
   if (mcu->config.velocity_motors != 0) all |= BUSHD_CAN_VELOCITY;
@@ -327,6 +327,8 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(set_position, set_position);
     case BUSHD_MSG_INPUTS:
       HANDLE(set_inputs, bushd_mcu_set_inputs);
+    case BUSHD_MSG_OUTPUTS:
+      HANDLE(set_outputs, bushd_mcu_set_outputs);
     case BUSHD_MSG_MOTOR_INPUTS:
       HANDLE(motor_inputs, bushd_mcu_set_motor_inputs);
     case BUSHD_MSG_EMISSION:

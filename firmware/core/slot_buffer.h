@@ -10,8 +10,9 @@
 // What the masks of a slot_buffer are.
 typedef enum bushd_outputs {
   BUSHD_OUTPUTS_PULSES = 0,
-  // Pulses, and the common DIR is low in even slots and high in odd ones. It changes when the
-  // pulses of a slot are over; after the last one, and in slot_buffers without steps, it is low.
+  // Pulses, and the common DIR is at rest in even slots and at its other level in odd ones. It
+  // changes when the pulses of a slot are over; after the last one, and in slot_buffers without
+  // steps, it is at rest: low, unless bushd_set_outputs.direction_low says otherwise.
   BUSHD_OUTPUTS_COMMON_DIR = 1,
   // Levels, from the slot's beginning until others follow; also in slot_buffers without steps.
   BUSHD_OUTPUTS_LEVELS = 2
@@ -20,7 +21,7 @@ typedef enum bushd_outputs {
 // What is emitted during one tick.
 typedef struct bushd_slot_buffer {
   uint16_t direction;                   // DIR levels, bit per motor, constant within the tick
-  uint16_t step[BUSHD_MAX_SLOTS];       // STEP pulses of each slot, bit per motor
+  uint16_t step[BUSHD_MAX_SLOTS];       // STEP pulses of each slot, bit per motor; 1: active
   uint8_t outputs;                      // bushd_outputs
   int16_t steps[BUSHD_MOTORS_PER_MCU];  // signed steps of the tick, for the position counters
   uint16_t active;                      // motors with a step in this tick

@@ -21,6 +21,7 @@ static inline void name_parts_of_core(void) {
   NAME_PART("answer", answer);
   NAME_PART("rows", stream.rows);
   NAME_PART("config", config);
+  NAME_PART("config.outputs", config.outputs);
   NAME_PART("slot_buffers", slot_buffer);
   NAME_PART("motors", motor);
   NAME_PART("tables", tables);

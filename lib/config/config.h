@@ -67,8 +67,9 @@ enum class BusKind { kRs485, kSerialPulse, kCommutator };  // docs/decisions/004
 
 // Of a bus of that kind.
 struct SerialPulse {
-  bool rts = false;         // the direction is on RTS, else on DTR
-  MotorInputs inputs = {};  // inputs 0..3 are the modem lines CD, DSR, CTS, RI
+  bool rts = false;           // the direction is on RTS, else on DTR
+  bool positive_off = false;  // that line is off in the positive direction
+  MotorInputs inputs = {};    // inputs 0..3 are the modem lines CD, DSR, CTS, RI
 };
 
 struct Bus {
@@ -100,6 +101,8 @@ struct Mcu {
   McuAddress address;
   std::string id;  // "hall:1"
   fieldbus::EmissionSetup emission{};
+  bushd_set_outputs outputs{.step_low = 0, .direction_low = 0, .enabled = BUSHD_ENABLED_HIGH};
+  Error outputs_at{};  // the last key that says that one of them is active low; without a message
   std::uint8_t emergency_input = BUSHD_EMERGENCY_INPUT_IGNORED;
   bool emergency_active_open = false;
   std::uint8_t debounce_ticks = 1;

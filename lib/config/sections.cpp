@@ -18,6 +18,7 @@
 #include "config/home.h"
 #include "config/inputs.h"
 #include "config/keypad_section.h"
+#include "config/output_levels.h"
 #include "config/port_check.h"
 #include "config/pseudo_section.h"
 #include "config/serial_pulse_section.h"
@@ -209,11 +210,26 @@ constexpr std::int64_t kMostKeypadMs = 10'000;  // some 50000 of the shortest ti
 Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
   Taken ids;
   for (const TomlReader& reader : readers) {
-    if (auto known =
-            reader.only({"bus", "address", "emission", "step_us", "settle_us", "dir_setup_us",
-                         "pulse_us", "phase_sequence", "hold_current", "emergency_input",
-                         "emergency_active", "debounce_ticks", "overcurrent", "enable_after_reset",
-                         "idle_disable_s", "enable_settle_ms", "keypad_ms"});
+    if (auto known = reader.only({"bus",
+                                  "address",
+                                  "emission",
+                                  "step_us",
+                                  "settle_us",
+                                  "dir_setup_us",
+                                  "pulse_us",
+                                  "phase_sequence",
+                                  "hold_current",
+                                  "emergency_input",
+                                  "emergency_active",
+                                  "debounce_ticks",
+                                  "overcurrent",
+                                  "enable_after_reset",
+                                  "idle_disable_s",
+                                  "enable_settle_ms",
+                                  "keypad_ms",
+                                  "enable_active",
+                                  "step_active",
+                                  "direction_active"});
         !known) {
       return known;
     }
@@ -234,6 +250,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     auto emission = read_emission(reader);
     if (!emission) return fail(emission.error());
     mcu.emission = std::move(*emission);
+    if (auto read = read_output_levels(reader, &mcu); !read) return read;
     const std::string what =
         fmt::format("address {} of bus \"{}\"", *address, config->buses[bus->value].name);
     if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
@@ -347,7 +364,8 @@ Result<void> read_motors(Loading* loading) {
                                   "max_speed",    "never_disable",
                                   "backlash",     "backlash_speed",
                                   "settle_ms",    "currents",
-                                  "velocity",     "keypad"});
+                                  "velocity",     "keypad",
+                                  "step_active",  "direction_active"});
         !known) {
       return known;
     }
@@ -383,6 +401,9 @@ Result<void> read_motors(Loading* loading) {
                 .mcu = *mcu,
                 .output = {static_cast<std::uint8_t>(*output)},
                 .group = *group};
+    if (auto read = read_output_levels(reader, motor.output, &config.mcus[mcu->value]); !read) {
+      return read;
+    }
     if (auto read = read_motion_of_its_own(reader, &motor); !read) return read;
     const bool has_limits = bus.kind == BusKind::kCommutator;
     if (auto read = one_motor ? take_serial_pulse(reader, bus, &motor)

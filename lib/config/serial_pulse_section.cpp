@@ -68,6 +68,31 @@ Result<void> read_lines(const TomlReader& bus, MotorInputs* lines) {
   return {};
 }
 
+Result<void> read_direction_line(const TomlReader& bus, SerialPulse* pulse) {
+  constexpr std::string_view kRule =
+      "\"dtr\", \"rts\", or { line = \"dtr\", active = \"on\" or \"off\" }";
+  if (bus.table("direction_line") == nullptr) {
+    if (bus.has("direction_line") && !bus.is_string("direction_line")) {
+      return fail(bus.error("direction_line", fmt::format("allowed: {}", kRule)));
+    }
+    const auto line = read_word(bus, "direction_line", {"dtr", "rts"});
+    if (!line) return fail(line.error());
+    pulse->rts = *line == 1;
+    return {};
+  }
+  const auto reader = bus.section("direction_line", kRule);
+  if (!reader) return fail(reader.error());
+  if (auto known = reader->only({"line", "active"}); !known) return known;
+  const auto line = read_word(*reader, "line", {"dtr", "rts"});
+  if (!line) return fail(line.error());
+  pulse->rts = *line == 1;
+  if (!reader->has("active")) return {};
+  const auto active = read_word(*reader, "active", {"on", "off"});
+  if (!active) return fail(active.error());
+  pulse->positive_off = *active == 1;
+  return {};
+}
+
 }  // namespace
 
 Result<void> read_serial_pulse(const TomlReader& reader, Bus* bus) {
@@ -76,9 +101,7 @@ Result<void> read_serial_pulse(const TomlReader& reader, Bus* bus) {
       !known) {
     return known;
   }
-  const auto line = read_word(reader, "direction_line", {"dtr", "rts"});
-  if (!line) return fail(line.error());
-  bus->serial_pulse.rts = *line == 1;
+  if (auto read = read_direction_line(reader, &bus->serial_pulse); !read) return read;
   if (reader.has("inputs")) {
     if (auto read = read_lines(reader, &bus->serial_pulse.inputs); !read) return read;
   }

@@ -45,7 +45,8 @@ typedef enum bushd_type {
   BUSHD_MSG_TRAVEL = 0x19,        // bushd_travel -> acknowledgement; how it goes is told by reports
   BUSHD_MSG_CURRENTS = 0x1A,      // bushd_currents -> acknowledgement
   BUSHD_MSG_LINE_TRIGGER = 0x1B,  // bushd_line_trigger -> acknowledgement
-  BUSHD_MSG_VELOCITY = 0x1C       // bushd_set_velocity -> acknowledgement
+  BUSHD_MSG_VELOCITY = 0x1C,      // bushd_set_velocity -> acknowledgement
+  BUSHD_MSG_OUTPUTS = 0x1D        // bushd_set_outputs -> acknowledgement
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.
 

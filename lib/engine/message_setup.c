@@ -285,6 +285,24 @@ size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload
   return (size_t)(w.at - payload);
 }
 
+size_t bushd_encode_set_outputs(const bushd_set_outputs* message, uint8_t* payload) {
+  writer w = {payload};
+  put16(&w, message->step_low);
+  put16(&w, message->direction_low);
+  put8(&w, message->enabled);
+  return (size_t)(w.at - payload);
+}
+
+bushd_status bushd_decode_set_outputs(const uint8_t* payload, size_t size,
+                                      bushd_set_outputs* message) {
+  reader r = read_from(payload, size);
+  message->step_low = get16(&r);
+  message->direction_low = get16(&r);
+  message->enabled = get8(&r);
+  return finish(&r,
+                message->enabled == BUSHD_ENABLED_HIGH || message->enabled == BUSHD_ENABLED_LOW);
+}
+
 bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
                                      bushd_set_inputs* message) {
   reader r = read_from(payload, size);

@@ -49,6 +49,7 @@ enum {
 #define BUSHD_CAN_KEYPAD UINT32_C(0x20000)
 #define BUSHD_CAN_SCRATCH UINT32_C(0x40000)      // has BUSHD_SCRATCH_SLOT
 #define BUSHD_CAN_CLEAR_NAMED UINT32_C(0x80000)  // bushd_control.faults
+#define BUSHD_CAN_OUTPUTS UINT32_C(0x100000)     // levels of its outputs may be chosen
 
 // Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
 // which one it is.
@@ -146,8 +147,8 @@ typedef struct bushd_assign {
 } bushd_assign;
 
 enum {
-  BUSHD_CONTROL_ENABLE = 1 << 0,        // EN high
-  BUSHD_CONTROL_DISABLE = 1 << 1,       // EN low; refused while a motor moves
+  BUSHD_CONTROL_ENABLE = 1 << 0,        // drivers on, by EN
+  BUSHD_CONTROL_DISABLE = 1 << 1,       // drivers off; refused while a motor moves
   BUSHD_CONTROL_CLEAR_FAULTS = 1 << 2,  // refused while a motor moves
   BUSHD_CONTROL_FORGET_TABLES = 1 << 3  // all of them; refused while a motor moves
 };
@@ -205,6 +206,18 @@ typedef struct bushd_currents {
   uint16_t hold_ma;    // at rest, if windings stay on there (bushd_emission.hold_current)
 } bushd_currents;
 
+// At which levels the drivers of an MCU do what they are to do.
+enum {
+  BUSHD_ENABLED_HIGH = 1,  // EN is high while the drivers are enabled
+  BUSHD_ENABLED_LOW = 2
+};
+typedef struct bushd_set_outputs {
+  uint16_t step_low;  // outputs whose STEP rests high and whose pulses are low
+  uint16_t
+      direction_low;  // outputs whose DIR is low in the positive direction; all: the common DIR
+  uint8_t enabled;    // BUSHD_ENABLED_*
+} bushd_set_outputs;
+
 // Local motion of a motor by the velocity loop of engine/velocity.h, in its unit of 1/64 step/s:
 // BUSHD_VELOCITY_LEAST <= least <= most <= BUSHD_VELOCITY_MOST, acceleration
 // 1..BUSHD_VELOCITY_MOST. All three are 0: by its table.
@@ -236,6 +249,7 @@ size_t bushd_encode_control(const bushd_control* message, uint8_t* payload);
 size_t bushd_encode_set_position(const bushd_set_position* message, uint8_t* payload);
 size_t bushd_encode_set_address(const bushd_set_address* message, uint8_t* payload);
 size_t bushd_encode_set_inputs(const bushd_set_inputs* message, uint8_t* payload);
+size_t bushd_encode_set_outputs(const bushd_set_outputs* message, uint8_t* payload);
 size_t bushd_encode_motor_inputs(const bushd_motor_inputs* message, uint8_t* payload);
 size_t bushd_encode_currents(const bushd_currents* message, uint8_t* payload);
 size_t bushd_encode_set_velocity(const bushd_set_velocity* message, uint8_t* payload);
@@ -260,6 +274,8 @@ bushd_status bushd_decode_set_address(const uint8_t* payload, size_t size,
                                       bushd_set_address* message);
 bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
                                      bushd_set_inputs* message);
+bushd_status bushd_decode_set_outputs(const uint8_t* payload, size_t size,
+                                      bushd_set_outputs* message);
 bushd_status bushd_decode_motor_inputs(const uint8_t* payload, size_t size,
                                        bushd_motor_inputs* message);
 bushd_status bushd_decode_currents(const uint8_t* payload, size_t size, bushd_currents* message);

@@ -26,6 +26,8 @@ struct McuSetup {
   // Slot of its motor's table, by output; none: no motor there.
   std::array<std::optional<std::uint8_t>, BUSHD_MOTORS_PER_MCU> table_of_motor{};
   fieldbus::EmissionSetup emission{};
+  bushd_set_outputs outputs{.step_low = 0, .direction_low = 0, .enabled = BUSHD_ENABLED_HIGH};
+  Error outputs_at{};  // where one of them is said to be active low; without a message
   bushd_set_inputs inputs{};
   // Of motors whose switches are not all at the input with the number of their output.
   std::vector<bushd_motor_inputs> motor_inputs{};

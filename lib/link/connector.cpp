@@ -262,7 +262,13 @@ void Connector::write_setup(McuIndex mcu) {
                    .format = setup_.format,
                    .comm_timeout_ticks = static_cast<std::uint16_t>(
                        std::min<std::int64_t>(comm_timeout_ticks, UINT16_MAX))});
-  queue.emission(record.setup.emission.settings);
+  // Neither is taken where STEP would rest high and windings be driven.
+  const bool phases = record.setup.emission.settings.mode == BUSHD_EMISSION_PHASES;
+  if (!phases) queue.emission(record.setup.emission.settings);
+  if ((record.view.identity.capabilities & BUSHD_CAN_OUTPUTS) != 0) {
+    queue.outputs(record.setup.outputs);
+  }
+  if (phases) queue.emission(record.setup.emission.settings);
   queue.inputs(record.setup.inputs);
   for (const bushd_motor_inputs& one : record.setup.motor_inputs) queue.motor_inputs(one);
   // An MCU may have kept others.

@@ -67,6 +67,18 @@ Result<void> check_velocities(const McuSetup& setup, const bushd_identity& ident
   return {};
 }
 
+Result<void> check_outputs(const McuSetup& setup, const bushd_identity& identity) {
+  const bushd_set_outputs& outputs = setup.outputs;
+  const bool all_high =
+      outputs.enabled == BUSHD_ENABLED_HIGH && (outputs.step_low | outputs.direction_low) == 0;
+  if (all_high || (identity.capabilities & BUSHD_CAN_OUTPUTS) != 0) return {};
+  Error error = setup.outputs_at;
+  error.message =
+      "is \"low\", but outputs of this MCU are active high: update its firmware, or put inverters "
+      "before the drivers and remove the key";
+  return fail(error.text());
+}
+
 Result<void> check_keypad(const McuSetup& setup, const bushd_identity& identity) {
   if (setup.local.keypad == 0 || (identity.capabilities & BUSHD_CAN_KEYPAD) != 0) return {};
   return fail("has no line for a keypad, but motor " +
@@ -98,6 +110,7 @@ std::size_t codes_of(const bushd_table& table) {
 
 Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
                         std::uint32_t tick_ns) {
+  if (auto outputs = check_outputs(setup, identity); !outputs) return outputs;
   if (auto currents = check_currents(setup, identity); !currents) return currents;
   if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
   if (auto keypad = check_keypad(setup, identity); !keypad) return keypad;
@@ -154,12 +167,13 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
     const char* if_too_much;  // remedy
   };
   constexpr const char* kTables = "use shorter or slower tables, or fewer on this MCU";
-  static constexpr std::array<Request, 10> kRequests = {{
+  static constexpr std::array<Request, 11> kRequests = {{
       {BUSHD_MSG_CONFIGURE, "CONFIGURE", "use a longer tick_us on its bus"},
       {BUSHD_MSG_TABLE_BEGIN, "TABLE_BEGIN", kTables},
       {BUSHD_MSG_TABLE_DATA, "TABLE_DATA", kTables},
       {BUSHD_MSG_TABLE_END, "TABLE_END", kTables},
       {BUSHD_MSG_ASSIGN, "ASSIGN", kTables},
+      {BUSHD_MSG_OUTPUTS, "OUTPUTS", nullptr},
       {BUSHD_MSG_INPUTS, "INPUTS", nullptr},
       {BUSHD_MSG_MOTOR_INPUTS, "MOTOR_INPUTS", nullptr},
       {BUSHD_MSG_LOCAL, "LOCAL", nullptr},

@@ -46,6 +46,10 @@ void SetupQueue::emission(const bushd_emission& message) {
   add(BUSHD_MSG_EMISSION, [&](std::uint8_t* p) { return bushd_encode_emission(&message, p); });
 }
 
+void SetupQueue::outputs(const bushd_set_outputs& message) {
+  add(BUSHD_MSG_OUTPUTS, [&](std::uint8_t* p) { return bushd_encode_set_outputs(&message, p); });
+}
+
 void SetupQueue::inputs(const bushd_set_inputs& message) {
   add(BUSHD_MSG_INPUTS, [&](std::uint8_t* p) { return bushd_encode_set_inputs(&message, p); });
 }

@@ -34,6 +34,7 @@ class SetupQueue {
 
   void configure(const bushd_configure& message);
   void emission(const bushd_emission& message);
+  void outputs(const bushd_set_outputs& message);
   void inputs(const bushd_set_inputs& message);
   void motor_inputs(const bushd_motor_inputs& message);
   void currents(const bushd_currents& message);

@@ -19,13 +19,13 @@
 namespace bushd::serial {
 
 struct LineOrder {
-  std::uint8_t sets = 0;  // 1: `positive` is an order, 0: only asks
-  std::uint8_t positive = 0;
+  std::uint8_t sets = 0;  // 1: `direction_on` is an order, 0: only asks
+  std::uint8_t direction_on = 0;
 };
 
 struct LineState {
   std::uint8_t lines = 0;  // bit 0 CD, 1 DSR, 2 CTS, 3 RI
-  std::uint8_t positive = 0;
+  std::uint8_t direction_on = 0;
   std::uint8_t unused[6] = {};
   std::uint64_t left = 0;  // bytes that have left completely since this socket was connected
 };

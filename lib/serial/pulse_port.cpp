@@ -30,10 +30,10 @@ tl::unexpected<Error> gone() {
 
 }  // namespace
 
-Result<PulsePort> PulsePort::open(const std::string& path, bool rts) {
+Result<PulsePort> PulsePort::open(const std::string& path, DirectionLine direction) {
   auto opened = SerialPort::open(path, kFirstRate);
   if (!opened) return fail(opened.error());
-  PulsePort port(std::move(*opened), rts);
+  PulsePort port(std::move(*opened), direction);
   int lines = 0;
   if (::ioctl(port.fd(), TIOCMGET, &lines) != 0) {
     auto simulated = LineSocket::connect(path);
@@ -62,10 +62,12 @@ Result<void> PulsePort::set_baud(std::uint32_t baud) {
 }
 
 Result<void> PulsePort::set_positive(bool positive) {
-  if (simulated_)
-    return simulated_->order({.sets = 1, .positive = positive ? std::uint8_t{1} : std::uint8_t{0}});
-  const int line = rts_ ? TIOCM_RTS : TIOCM_DTR;
-  return ::ioctl(fd(), positive ? TIOCMBIS : TIOCMBIC, &line) == 0 ? Result<void>() : gone();
+  const bool on = positive != direction_.positive_off;
+  if (simulated_) {
+    return simulated_->order({.sets = 1, .direction_on = on ? std::uint8_t{1} : std::uint8_t{0}});
+  }
+  const int line = direction_.rts ? TIOCM_RTS : TIOCM_DTR;
+  return ::ioctl(fd(), on ? TIOCMBIS : TIOCMBIC, &line) == 0 ? Result<void>() : gone();
 }
 
 Result<void> PulsePort::write(std::span<const std::uint8_t> bytes) {
@@ -94,7 +96,7 @@ Result<PulsePort::Status> PulsePort::status() {
     status.queued = written_ - (*state)->left;
     status.empty = status.queued == 0;
     status.lines = (*state)->lines;
-    status.positive = (*state)->positive != 0;
+    status.positive = ((*state)->direction_on != 0) != direction_.positive_off;
     return status;
   }
   int lines = 0;
@@ -106,7 +108,8 @@ Result<PulsePort::Status> PulsePort::status() {
   const auto on = [lines](int line, unsigned bit) { return (lines & line) != 0 ? 1u << bit : 0u; };
   status.lines = static_cast<std::uint8_t>(on(TIOCM_CD, 0) | on(TIOCM_DSR, 1) | on(TIOCM_CTS, 2) |
                                            on(TIOCM_RI, 3));
-  status.positive = (lines & (rts_ ? TIOCM_RTS : TIOCM_DTR)) != 0;
+  const bool direction_on = (lines & (direction_.rts ? TIOCM_RTS : TIOCM_DTR)) != 0;
+  status.positive = direction_on != direction_.positive_off;
   return status;
 }
 

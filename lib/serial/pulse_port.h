@@ -19,10 +19,15 @@
 
 namespace bushd::serial {
 
+struct DirectionLine {
+  bool rts = false;           // else DTR
+  bool positive_off = false;  // it is off in the positive direction
+};
+
 class PulsePort {
  public:
-  // As SerialPort::open; `rts`: the direction is on RTS, else on DTR. Error also: no modem lines.
-  static Result<PulsePort> open(const std::string& path, bool rts);
+  // As SerialPort::open. Error also: no modem lines.
+  static Result<PulsePort> open(const std::string& path, DirectionLine direction);
 
   int fd() const { return port_.fd(); }
   const std::string& path() const { return port_.path(); }
@@ -43,15 +48,16 @@ class PulsePort {
     std::size_t queued = 0;          // bytes that the driver has not sent
     std::optional<bool> empty{};     // nothing is left behind it either; none: it cannot tell
     std::uint8_t lines = 0;          // bit 0 CD, 1 DSR, 2 CTS, 3 RI: on
-    std::optional<bool> positive{};  // the direction line, as it is
+    std::optional<bool> positive{};  // by the direction line, as it is
   };
   Result<Status> status();
 
  private:
-  PulsePort(SerialPort port, bool rts) : port_(std::move(port)), rts_(rts) {}
+  PulsePort(SerialPort port, DirectionLine direction)
+      : port_(std::move(port)), direction_(direction) {}
 
   SerialPort port_;
-  bool rts_;
+  DirectionLine direction_;
   bool any_rate_ = false;
   std::uint32_t base_ = 0;
   std::uint32_t baud_ = 0;

@@ -40,6 +40,17 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   bushd_virtual_init(&port_, &config);
 }
 
+// Active is true.
+Edge VirtualMcu::as_drivers_see(const bushd_set_outputs& levels, Edge edge) {
+  const bool low = edge.signal == Signal::kStep  ? (levels.step_low >> edge.index & 1) != 0
+                   : edge.signal == Signal::kDir ? (levels.direction_low >> edge.index & 1) != 0
+                   : edge.signal == Signal::kCommonDir
+                       ? (levels.direction_low & 1) != 0
+                       : edge.signal == Signal::kEnable && levels.enabled == BUSHD_ENABLED_LOW;
+  edge.level = edge.level != low;
+  return edge;
+}
+
 void VirtualMcu::on_edge(void* context, std::int64_t time_ns, bushd_virtual_signal signal,
                          std::uint8_t index, bool level) {
   auto& self = *static_cast<VirtualMcu*>(context);
@@ -49,7 +60,7 @@ void VirtualMcu::on_edge(void* context, std::int64_t time_ns, bushd_virtual_sign
   static_assert(static_cast<int>(Signal::kCommonDir) == BUSHD_VIRTUAL_COMMON_DIR);
   static_assert(static_cast<int>(Signal::kPositionCompare) == BUSHD_VIRTUAL_COMPARE);
   const Edge edge = {time_ns, self.index_, static_cast<Signal>(signal), index, level};
-  if (self.supply_) self.supply_->edge(edge);
+  if (self.supply_) self.supply_->edge(as_drivers_see(self.port_.rest, edge));
   if (self.sink_ != nullptr) self.sink_->edge(edge);
 }
 

@@ -80,6 +80,7 @@ class VirtualMcu final : public Mcu {
   }
 
  private:
+  static Edge as_drivers_see(const bushd_set_outputs& levels, Edge edge);
   static void on_edge(void* context, std::int64_t time_ns, bushd_virtual_signal signal,
                       std::uint8_t index, bool level);
   static bushd_inputs on_read_inputs(void* context, std::int64_t time_ns);

@@ -79,6 +79,10 @@ void mend_atmega1284p(avr_t* avr) {
   }
 }
 
+avr_irq_t* irq_of(avr_t* avr, AvrPin pin) {
+  return avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(pin.port)), pin.bit);
+}
+
 }  // namespace
 
 struct AvrMcu::ResetHook {
@@ -142,7 +146,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   watch_pin(chip_.driver_enable, on_driver_enable, this);
   if (chip_.spi_data != 0) {
     first_dir_ = pin_count_;
-    for (std::uint8_t i = 0; i < 8; ++i) pins_[pin_count_++] = {this, Signal::kDir, i, false};
+    for (std::uint8_t i = 0; i < 8; ++i) pins_[pin_count_++] = {this, Signal::kDir, i, false, {}};
     avr_register_io_write(avr_, chip_.spi_data, on_spi, this);
     watch_pin(chip_.dir_latch, on_dir_latch, this);
   }
@@ -182,20 +186,19 @@ void AvrMcu::watch_port(char port, Signal signal, std::uint8_t first_index) {
   if (port == 0) return;
   for (int pin = 0; pin < 8; ++pin) {
     Pin& watched = pins_[pin_count_++];
-    watched = {this, signal, static_cast<std::uint8_t>(first_index + pin), false};
-    watch_pin({port, pin}, on_pin, &watched);
+    watched = {this, signal, static_cast<std::uint8_t>(first_index + pin), false, {port, pin}};
+    watch_pin(watched.at, on_pin, &watched);
   }
 }
 
 void AvrMcu::watch_signal(AvrPin pin, Signal signal) {
   if (pin.port == 0) return;
-  pins_[pin_count_] = {this, signal, 0, false};
+  pins_[pin_count_] = {this, signal, 0, false, pin};
   watch_pin(pin, on_pin, &pins_[pin_count_++]);
 }
 
 void AvrMcu::watch_pin(AvrPin pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param) {
-  avr_irq_t* irq =
-      avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(pin.port)), pin.bit);
+  avr_irq_t* irq = irq_of(avr_, pin);
   if (irq == nullptr) throw std::runtime_error("simavr: a pin is missing");
   avr_irq_register_notify(irq, notify, param);
 }
@@ -311,6 +314,8 @@ void AvrMcu::drop_outputs() {
   for (std::size_t i = 0; i < pin_count_; ++i) {
     Pin& pin = pins_[i];
     set_pin(pin, false);
+    // simavr would not tell of a pin that has after the reset the level that it had before.
+    if (pin.at.port != 0) irq_of(avr_, pin.at)->value = 0;
   }
 }
 

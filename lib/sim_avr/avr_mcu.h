@@ -108,6 +108,7 @@ class AvrMcu final : public Mcu {
     Signal signal;
     std::uint8_t index;
     bool level;
+    AvrPin at;  // without a port: behind a shift register
   };
 
   void watch_port(char port, Signal signal, std::uint8_t first_index);

@@ -71,5 +71,24 @@ TEST(SerialPulse, IsRefusedWithCauseAndRemedy) {
       HasSubstr("needs a home switch; add inputs = { home = \"cd\" } to bus \"com1\""));
 }
 
+TEST(SerialPulse, DirectionLineMayBeOffInThePositiveDirection) {
+  const auto with = [](const std::string& line) {
+    return test::replaced(kPort, "direction_line = \"rts\"", "direction_line = " + line);
+  };
+  for (const bool off : {false, true}) {
+    const test::ConfigFile file(
+        with(std::string("{ line = \"dtr\", active = \"") + (off ? "off" : "on") + "\" }"));
+    const auto config = file.load();
+    ASSERT_TRUE(config) << config.error().text();
+    EXPECT_FALSE(config->buses[0].serial_pulse.rts);
+    EXPECT_EQ(config->buses[0].serial_pulse.positive_off, off);
+  }
+  EXPECT_THAT(
+      refusal("direction_line = \"rts\"", "direction_line = { line = \"dtr\", active = \"low\" }"),
+      HasSubstr("direction_line.active: is \"low\"; allowed: \"on\" or \"off\""));
+  EXPECT_THAT(refusal("group = \"slits\"\n", "group = \"slits\"\ndirection_active = \"low\"\n"),
+              HasSubstr("direction_line = { line = \"dtr\", active = \"off\" }"));
+}
+
 }  // namespace
 }  // namespace bushd::config

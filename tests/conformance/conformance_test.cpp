@@ -160,6 +160,18 @@ class ConformanceOfStreams : public Script,
  protected:
   ConformanceOfStreams() : Script(std::get<Target>(GetParam())) {}
   bushd_format format() const { return std::get<bushd_format>(GetParam()); }
+
+  // At any speeds. Precondition: brought up.
+  void move_all_motors();
+
+  // As far as it was seen to change.
+  bool level_of(std::size_t mcu, Signal signal, std::uint8_t index) const {
+    bool level = false;
+    for (const Edge& edge : recorder_.edges) {
+      if (edge.mcu == mcu && edge.signal == signal && edge.index == index) level = edge.level;
+    }
+    return level;
+  }
 };
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ConformanceOfStreams);
 INSTANTIATE_TEST_SUITE_P(Of, ConformanceOfStreams,
@@ -181,14 +193,12 @@ TEST_P(ConformanceOfStreams, MakesTheStepsOfTheVirtualOne) {
   expect_the_same_reports();
 }
 
-// All motors at any speeds, to and fro, up to the fastest: in the very slots.
-TEST_P(ConformanceOfStreams, StepsOfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
+void ConformanceOfStreams::move_all_motors() {
   const bool fine = format() == BUSHD_FORMAT_FINE;
-  tick_ns_ = real_->full_tick_ns(format());
   std::vector<std::uint8_t> motors;
   for (std::uint8_t m = 0; m < real_->twin().motors; ++m) motors.push_back(m);
   const auto mask = static_cast<std::uint16_t>((1u << motors.size()) - 1);
-  ASSERT_NO_FATAL_FAILURE(make_ready(format(), motors));
+  ASSERT_NO_FATAL_FAILURE(give_tables(motors));
   Random random(7, 0);
   const std::uint32_t start = master_.poll(kReal).tick + 24;
   const TimeNs begin_ns = bus_.now_ns();
@@ -230,6 +240,31 @@ TEST_P(ConformanceOfStreams, StepsOfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
   expect_the_same_reports();
 }
 
+// All motors at any speeds, to and fro, up to the fastest: in the very slots.
+TEST_P(ConformanceOfStreams, StepsOfAllMotorsFallIntoTheSlotsOfTheVirtualOne) {
+  tick_ns_ = real_->full_tick_ns(format());
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, format()));
+  move_all_motors();
+}
+
+// The same with drivers whose inputs are inverted, of every second motor; EN of all.
+TEST_P(ConformanceOfStreams, StepsOfInvertedOutputsFallIntoTheSameSlots) {
+  tick_ns_ = real_->full_tick_ns(format());
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, format()));
+  levels_ = {.step_low = 0x5555, .direction_low = 0x3333, .enabled = BUSHD_ENABLED_LOW};
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs, levels_));
+  pass_ticks(4);
+  for (const std::size_t mcu : {0, 1}) {
+    EXPECT_TRUE(level_of(mcu, Signal::kEnable, 0)) << "disabled while they change";
+    EXPECT_TRUE(level_of(mcu, Signal::kStep, 0));
+    EXPECT_FALSE(level_of(mcu, Signal::kStep, 1));
+  }
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_ENABLE}));
+  for (const std::size_t mcu : {0, 1}) EXPECT_FALSE(level_of(mcu, Signal::kEnable, 0));
+  recorder_.edges.clear();
+  move_all_motors();
+}
+
 struct Mode {
   std::string name;
   std::uint16_t needs;
@@ -250,6 +285,9 @@ class ConformanceOfEmission : public Script, public testing::WithParamInterface<
           status);
     }
   }
+
+  // As the virtual one; both have this emission.
+  void change_outputs_alike();
 
   const Mode mode_;
 };
@@ -302,8 +340,33 @@ TEST_P(DeniedEmission, IsRefused) {
 // Four motors, or all that have phases, to and fro, in streams, where every output changes at the
 // same slots.
 TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
+  ASSERT_NO_FATAL_FAILURE(expect_both_answer(BUSHD_OK));
+  ASSERT_NO_FATAL_FAILURE(change_outputs_alike());
+}
+
+// The common DIR and STEP rest high; phases know no such thing.
+TEST_P(ConformanceOfEmission, ChangesInvertedOutputsInTheSlotsOfTheVirtualOne) {
   const bool phases = mode_.settings.mode == BUSHD_EMISSION_PHASES;
   ASSERT_NO_FATAL_FAILURE(expect_both_answer(BUSHD_OK));
+  const bool common_dir = mode_.settings.mode == BUSHD_EMISSION_COMMON_DIR;
+  bushd_set_outputs levels{.step_low = 0xFFFF,
+                           .direction_low = common_dir ? std::uint16_t{0xFFFF} : std::uint16_t{0},
+                           .enabled = BUSHD_ENABLED_LOW};
+  if (phases) {
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs, levels),
+                BUSHD_E_FORMAT);
+    }
+    levels.step_low = 0;
+  }
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs, levels));
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_ENABLE}));
+  levels_ = levels;
+  ASSERT_NO_FATAL_FAILURE(change_outputs_alike());
+}
+
+void ConformanceOfEmission::change_outputs_alike() {
+  const bool phases = mode_.settings.mode == BUSHD_EMISSION_PHASES;
   const auto outputs = real_->twin().motors;
   std::vector<std::uint8_t> motors = {0, 1, 2, 3};
   if (phases) motors.resize(outputs / BUSHD_PHASE_OUTPUTS);

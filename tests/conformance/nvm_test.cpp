@@ -97,6 +97,34 @@ TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
   EXPECT_EQ(steps_made(4), 0u);
 }
 
+// EN of drivers that are enabled by a low level, and STEP that rests high: before anybody speaks.
+TEST_P(Nvm, LevelsOfOutputsOutliveAReset) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  ASSERT_EQ(ask(BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs,
+                bushd_set_outputs{0x0008, 0, BUSHD_ENABLED_LOW}),
+            BUSHD_OK);
+  pass(real_->keeps_within_ns(kCodes));
+  recorder_.edges.clear();
+  reboot();
+  const auto level_of = [this](Signal signal, std::uint8_t index) {
+    bool level = false;
+    for (const Edge& edge : recorder_.edges) {
+      if (edge.signal == signal && edge.index == index) level = edge.level;
+    }
+    return level;
+  };
+  EXPECT_TRUE(level_of(Signal::kEnable, 0));
+  EXPECT_TRUE(level_of(Signal::kStep, 3));
+  EXPECT_FALSE(level_of(Signal::kStep, 4));
+  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+  EXPECT_FALSE(level_of(Signal::kEnable, 0));
+  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
+  const std::size_t before = steps_made(3);  // rising edges: here, ends of pulses
+  run(3, 50);
+  pass(200 * TimeNs{kTickNs});
+  EXPECT_EQ(steps_made(3) - before, 50u);
+}
+
 class NvmVelocity : public Nvm {};
 BUSHD_FOR_TARGETS(NvmVelocity, targets_with(BUSHD_CAN_VELOCITY));
 

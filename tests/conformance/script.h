@@ -171,7 +171,7 @@ class Script : public testing::Test {
       if (edge.signal == Signal::kCommonDir) common_dir = edge.level;
       if (edge.signal != Signal::kStep || edge.index != output) continue;
       if (edge.time_ns < from_ns) continue;
-      if (edge.level || !rises_only) out.push_back({edge.time_ns, edge.level, common_dir});
+      if (is_active(edge) || !rises_only) out.push_back({edge.time_ns, edge.level, common_dir});
     }
     return out;
   }
@@ -196,7 +196,14 @@ class Script : public testing::Test {
     EXPECT_LE(std::max(std::abs(most_ns), std::abs(least_ns)), slot_ns);
   }
 
-  // Its pulses, each with the level of DIR.
+  // What drivers are to see; of MCUs that were told so.
+  bool is_active(const Edge& edge) const {
+    const std::uint16_t low =
+        edge.signal == Signal::kStep ? levels_.step_low : levels_.direction_low;
+    return edge.level != ((low >> edge.index & 1) != 0);
+  }
+
+  // Its pulses, each with the direction.
   struct Step {
     TimeNs time_ns;
     bool positive;
@@ -206,8 +213,8 @@ class Script : public testing::Test {
     bool direction = false;
     for (const Edge& edge : recorder_.edges) {
       if (edge.mcu != mcu || edge.index != motor) continue;
-      if (edge.signal == Signal::kDir) direction = edge.level;
-      if (edge.signal == Signal::kStep && edge.level) out.push_back({edge.time_ns, direction});
+      if (edge.signal == Signal::kDir) direction = is_active(edge);
+      if (edge.signal == Signal::kStep && is_active(edge)) out.push_back({edge.time_ns, direction});
     }
     return out;
   }
@@ -272,6 +279,7 @@ class Script : public testing::Test {
   Recorder recorder_;
   Bus bus_;
   Master master_;
+  bushd_set_outputs levels_{};                // of the outputs of both
   std::map<std::uint8_t, std::size_t> seen_;  // steps of a motor, at the last look
 };
 

@@ -206,6 +206,15 @@ INSTANTIATE_TEST_SUITE_P(
         Manner{"staggered", "emission = \"staggered\"\nstep_us = 320\nsettle_us = 60\n",
                "{\"settle_us\": 80}"},
         Manner{"measured", "emission = \"staggered\"\nstep_us = 320\n", "{\"step_us\": 240}"},
+        Manner{"inverted",
+               "enable_active = \"low\"\nstep_active = \"low\"\ndirection_active = \"low\"\n"},
+        Manner{"common_inverted",
+               "emission = \"common-dir\"\nstep_us = 320\nenable_active = \"low\"\n"
+               "step_active = \"low\"\ndirection_active = \"low\"\n",
+               "{\"emission\": \"burst\"}"},
+        Manner{"measured_inverted",
+               "emission = \"staggered\"\nstep_us = 320\nstep_active = \"low\"\n",
+               "{\"step_us\": 240}"},
         Manner{"phases", "emission = \"phases\"\nphase_sequence = \"half\"\n",
                "{\"phase_sequence\": \"full\"}"}),
     [](const auto& manner) { return std::string(manner.param.name); });
@@ -234,6 +243,9 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   lab.run_for(0.1);
   write(lab);
   EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();
+  if (std::string_view(GetParam().keys).find("\"low\"") != std::string_view::npos) {
+    EXPECT_EQ(check(lab, [](auto& event) { return event["event"] != "levels"; }), 1);
+  }
   // It would say so if something else had happened.
   if (GetParam().otherwise != nullptr) {
     EXPECT_EQ(check(lab,

@@ -127,6 +127,10 @@ Kinds setup_kinds() {
          {"unknown action", set8(10, 3)},
          {"more than can be read", set16(11, 1024)},
          {"neither on nor off", set8(13, 2)}}}},
+      {"set_outputs",
+       {bytes_with(5, [](Bytes* p) { (*p)[4] = between<uint8_t>(1, 2); }),
+        codec(bushd_decode_set_outputs, bushd_encode_set_outputs),
+        {{"no level of EN", set8(4, 0)}, {"a third level", set8(4, 3)}}}},
       {"motor_inputs",
        {bytes_with(4,
                    [](Bytes* p) {

@@ -123,6 +123,9 @@ void put(const bushd_set_velocity& m, Fields& f) {
       .add("most", m.most)
       .add("acceleration", m.acceleration);
 }
+void put(const bushd_set_outputs& m, Fields& f) {
+  f.add("step_low", m.step_low).add("direction_low", m.direction_low).add("enabled", m.enabled);
+}
 void put(const bushd_local& m, Fields& f) {
   f.add("motors", m.motors).add("keypad", m.keypad).add("keypad_ticks", m.keypad_ticks);
 }
@@ -307,6 +310,8 @@ std::string message_text(const bushd_frame& frame) {
       return text("currents", frame, bushd_decode_currents);
     case BUSHD_MSG_VELOCITY:
       return text("set_velocity", frame, bushd_decode_set_velocity);
+    case BUSHD_MSG_OUTPUTS:
+      return text("set_outputs", frame, bushd_decode_set_outputs);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
       return text("tables", frame, bushd_decode_tables);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
@@ -328,7 +333,7 @@ std::set<std::string> message_names() {
           "table_run",        "emergency",    "set_address", "get_tables",      "tables",
           "set_inputs",       "emission",     "home",        "local",           "trigger",
           "position_compare", "motor_inputs", "line_run",    "travel",          "currents",
-          "line_trigger",     "set_velocity"};
+          "line_trigger",     "set_velocity", "set_outputs"};
 }
 
 }  // namespace bushd::test

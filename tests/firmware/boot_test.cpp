@@ -11,7 +11,7 @@ TEST(Boot, BusyWithDriversOffUntilConfiguredSyncedAndEnabled) {
   rig.pins({0x1234, BUSHD_INPUT_TRIGGER});
   rig.current(700);
   EXPECT_FALSE(rig.enabled());
-  EXPECT_GE(rig.enable_calls(), 1) << "EN is driven low, not left as reset had it";
+  EXPECT_GE(rig.enable_calls(), 1) << "the port is told, not left as reset had it";
   EXPECT_EQ(rig.port_tick_ns(), BUSHD_BOOT_TICK_NS);
   bushd_report report = rig.poll();
   EXPECT_EQ(report.state, BUSHD_STATE_BUSY);
@@ -60,7 +60,7 @@ TEST(Boot, IdentitySaysWhatThePortGave) {
                 BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST | BUSHD_CAN_COMMON_DIR |
                 BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES | BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_TRAVEL |
                 BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH |
-                BUSHD_CAN_CLEAR_NAMED);
+                BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS);
   EXPECT_TRUE(std::ranges::equal(identity.unique_id, Rig::unique_id()));
 }
 

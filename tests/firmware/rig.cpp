@@ -92,9 +92,11 @@ Rig::Rig(RigOptions options)
     if (rig.options_.stores_address) rig.stored_address_ = address;
     return rig.options_.stores_address;
   };
-  port.set_enable = [](void* context, bool on) {
-    static_cast<Rig*>(context)->enabled_ = on;
-    ++static_cast<Rig*>(context)->enable_calls_;
+  port.set_enable = [](void* context, bool on, const bushd_set_outputs* levels) {
+    auto& rig = *static_cast<Rig*>(context);
+    rig.enabled_ = on;
+    rig.levels_ = *levels;
+    ++rig.enable_calls_;
   };
   port.set_tick = [](void* context, std::uint32_t ns) {
     static_cast<Rig*>(context)->port_tick_ns_ = ns;
@@ -264,6 +266,12 @@ bushd_status Rig::set_inputs(const InputSettings& settings) {
 bushd_status Rig::motor_inputs(const bushd_motor_inputs& message) {
   return request(BUSHD_MSG_MOTOR_INPUTS, payload_of([&](std::uint8_t* p) {
                    return bushd_encode_motor_inputs(&message, p);
+                 }));
+}
+
+bushd_status Rig::outputs(const bushd_set_outputs& message) {
+  return request(BUSHD_MSG_OUTPUTS, payload_of([&](std::uint8_t* p) {
+                   return bushd_encode_set_outputs(&message, p);
                  }));
 }
 

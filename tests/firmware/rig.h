@@ -132,6 +132,7 @@ class Rig {
   bushd_tables tables();
   bushd_status set_inputs(const InputSettings& settings);
   bushd_status motor_inputs(const bushd_motor_inputs& message);
+  bushd_status outputs(const bushd_set_outputs& message);
   bushd_status currents(const bushd_currents& message);
   bushd_status velocity(const bushd_set_velocity& message);
   // What the port was told, in order of time.
@@ -192,6 +193,8 @@ class Rig {
   const std::vector<int>& history(std::uint8_t motor) const { return history_[motor]; }
   void forget_history();
   bool enabled() const { return enabled_; }
+  // Of STEP, DIR and EN, as the port was told last.
+  const bushd_set_outputs& levels() const { return levels_; }
   int enable_calls() const { return enable_calls_; }
   bool enable_kept() const { return enable_kept_; }
   int stored_address() const { return stored_address_; }
@@ -222,6 +225,7 @@ class Rig {
   std::array<Bytes, 256> table_head_;  // what TABLE_BEGIN said, by slot, as a checksum has it
   Bytes last_sent_;
   bool enabled_ = true;
+  bushd_set_outputs levels_{};
   bushd_edge awaited_edge_ = BUSHD_EDGE_NONE;
   int enable_calls_ = 0;
   bool enable_kept_ = false;

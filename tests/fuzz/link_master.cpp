@@ -315,6 +315,8 @@ class Bus {
         return decodes(bushd_currents{}, bushd_decode_currents);
       case BUSHD_MSG_VELOCITY:
         return decodes(bushd_set_velocity{}, bushd_decode_set_velocity);
+      case BUSHD_MSG_OUTPUTS:
+        return decodes(bushd_set_outputs{}, bushd_decode_set_outputs);
       case BUSHD_MSG_SET_POSITION:
         return decodes(bushd_set_position{}, bushd_decode_set_position);
       case BUSHD_MSG_SYNC:

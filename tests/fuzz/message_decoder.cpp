@@ -106,6 +106,10 @@ void decode_for_mcu(Bytes payload) {
     BUSHD_REQUIRE(currents.ramp_ma <= BUSHD_MAX_CURRENT_MA);
     BUSHD_REQUIRE((currents.cruise_ma == 0) == (currents.hold_ma == 0));
   }
+  bushd_set_outputs outputs;
+  if (decoded(payload, &outputs, bushd_decode_set_outputs, bushd_encode_set_outputs)) {
+    BUSHD_REQUIRE(outputs.enabled == BUSHD_ENABLED_HIGH || outputs.enabled == BUSHD_ENABLED_LOW);
+  }
   bushd_set_velocity velocity;
   if (decoded(payload, &velocity, bushd_decode_set_velocity, bushd_encode_set_velocity)) {
     BUSHD_REQUIRE(velocity.motor < BUSHD_MOTORS_PER_MCU && velocity.most <= BUSHD_VELOCITY_MOST);

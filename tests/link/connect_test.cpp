@@ -137,6 +137,33 @@ TEST(Connect, VelocitiesAreToldToAnMcuThatHasTheLoop) {
   }
 }
 
+// EN of drivers that are enabled by a low level must not be raised and lowered by another one
+// first.
+TEST(Connect, LevelsOfOutputsAreToldBeforeTheDriversAreEnabled) {
+  for (const bool phases : {false, true}) {
+    FakeBus bus(1, 2);
+    bus.slaves[0].identity.capabilities |= BUSHD_CAN_OUTPUTS | BUSHD_CAN_PHASES;
+    bus.connect();
+    link::McuSetup setup = bus.setup.mcus[0];
+    setup.outputs = {.step_low = 0x0102, .direction_low = 0x8000, .enabled = BUSHD_ENABLED_LOW};
+    if (phases) setup.emission.settings.mode = BUSHD_EMISSION_PHASES;
+    bus.master->reconfigure(McuIndex{0}, setup);
+    bus.heard.clear();
+    bus.connect();
+    std::vector<int> requests;
+    for (const Heard& heard : bus.heard) {
+      if (heard.type == BUSHD_MSG_OUTPUTS || heard.type == BUSHD_MSG_EMISSION ||
+          heard.type == BUSHD_MSG_CONTROL) {
+        requests.push_back(heard.type);
+      }
+    }
+    const std::vector<int> pulses{BUSHD_MSG_EMISSION, BUSHD_MSG_OUTPUTS, BUSHD_MSG_CONTROL};
+    const std::vector<int> windings{BUSHD_MSG_OUTPUTS, BUSHD_MSG_EMISSION, BUSHD_MSG_CONTROL};
+    EXPECT_EQ(requests, phases ? windings : pulses);
+    EXPECT_EQ(bus.heard_of(BUSHD_MSG_OUTPUTS)[0].payload, (Bytes{2, 1, 0, 0x80, 2}));
+  }
+}
+
 TEST(Connect, AllMcusAgreeOnTheTime) {
   FakeBus bus(5, 2);
   bus.connect();

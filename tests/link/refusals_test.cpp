@@ -92,6 +92,20 @@ TEST(Connect, AnMcuWithoutTheVelocityLoopIsNamedWhereVelocityIsSet) {
               HasSubstr("moves no motor by the velocity loop, but motor 1 has `velocity`"));
 }
 
+TEST(Connect, AnMcuWhoseOutputsAreActiveHighOnlyIsNamedWithTheKey) {
+  FakeBus bus(1, 2);
+  link::McuSetup setup = bus.setup.mcus[0];
+  setup.outputs.enabled = BUSHD_ENABLED_LOW;
+  setup.outputs_at = {
+      .message = "", .file = "bushd.toml", .line = 19, .key = "mcu[0].enable_active"};
+  bus.master->reconfigure(McuIndex{0}, setup);
+  bus.run_for(3'000'000);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
+  EXPECT_EQ(bus.master->view(McuIndex{0}).detail,
+            "bushd.toml:19: mcu[0].enable_active: is \"low\", but outputs of this MCU are active "
+            "high: update its firmware, or put inverters before the drivers and remove the key");
+}
+
 TEST(Connect, AnMcuWithoutALineForAKeypadIsNamedWhereOneIsSet) {
   FakeBus bus(1, 2);
   link::McuSetup setup = bus.setup.mcus[0];

@@ -62,7 +62,7 @@ class PulsePortTest : public testing::Test {
 };
 
 TEST_F(PulsePortTest, RefusesAPtyWithoutModemLines) {
-  const auto port = PulsePort::open(path_, false);
+  const auto port = PulsePort::open(path_, {});
   ASSERT_FALSE(port);
   EXPECT_THAT(port.error().text(), HasSubstr("has no modem lines"));
   EXPECT_THAT(port.error().text(), HasSubstr(path_ + ".lines"));
@@ -70,7 +70,7 @@ TEST_F(PulsePortTest, RefusesAPtyWithoutModemLines) {
 
 TEST_F(PulsePortTest, MakesAnyRateAndSaysWhichOne) {
   listen();
-  auto port = PulsePort::open(path_, false);
+  auto port = PulsePort::open(path_, {});
   ASSERT_TRUE(port) << port.error().text();
   EXPECT_TRUE(port->any_rate());
   answer({});
@@ -83,7 +83,7 @@ TEST_F(PulsePortTest, MakesAnyRateAndSaysWhichOne) {
 
 TEST_F(PulsePortTest, TellsLinesAndWhatHasLeft) {
   listen();
-  auto port = PulsePort::open(path_, true);
+  auto port = PulsePort::open(path_, {.rts = true, .positive_off = false});
   ASSERT_TRUE(port) << port.error().text();
   EXPECT_FALSE(port->status()->empty.has_value());  // nothing is known yet
   EXPECT_GT(port->status()->queued, 0u);
@@ -96,23 +96,35 @@ TEST_F(PulsePortTest, TellsLinesAndWhatHasLeft) {
   EXPECT_EQ(read[2], 0xFF);
   answer({});
   answer({});
-  const LineOrder order = answer({.lines = 5, .positive = 1, .unused = {}, .left = 2});
+  const LineOrder order = answer({.lines = 5, .direction_on = 1, .unused = {}, .left = 2});
   EXPECT_EQ(order.sets, 1);
-  EXPECT_EQ(order.positive, 1);
+  EXPECT_EQ(order.direction_on, 1);
   auto status = port->status();
   EXPECT_EQ(status->queued, 1u);
   EXPECT_EQ(status->empty, false);
   EXPECT_EQ(status->lines, 5);
   EXPECT_EQ(status->positive, true);
-  answer({.lines = 0, .positive = 1, .unused = {}, .left = 3});
+  answer({.lines = 0, .direction_on = 1, .unused = {}, .left = 3});
   status = port->status();
   EXPECT_EQ(status->queued, 0u);
   EXPECT_EQ(status->empty, true);
 }
 
+TEST_F(PulsePortTest, DirectionLineMayBeOffInThePositiveDirection) {
+  listen();
+  auto port = PulsePort::open(path_, {.rts = false, .positive_off = true});
+  ASSERT_TRUE(port) << port.error().text();
+  answer({});
+  ASSERT_TRUE(port->set_positive(true));
+  const LineOrder order = answer({.lines = 0, .direction_on = 0, .unused = {}, .left = 0});
+  EXPECT_EQ(order.sets, 1);
+  EXPECT_EQ(order.direction_on, 0);
+  EXPECT_EQ(port->status()->positive, true);
+}
+
 TEST_F(PulsePortTest, SaysThatItsLinesAreGone) {
   listen();
-  auto port = PulsePort::open(path_, false);
+  auto port = PulsePort::open(path_, {});
   ASSERT_TRUE(port) << port.error().text();
   answer({});
   ::close(client_);

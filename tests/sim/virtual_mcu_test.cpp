@@ -32,7 +32,7 @@ INSTANTIATE_TEST_SUITE_P(Of, DisabledCapability, testing::ValuesIn(every_one_non
                          testing::PrintToStringParamName());
 
 TEST_P(DisabledCapability, IsTheOnlyOneThatIsNotInTheIdentity) {
-  EXPECT_EQ(capabilities(), (kAll & ~GetParam()) | BUSHD_CAN_CLEAR_NAMED);
+  EXPECT_EQ(capabilities(), (kAll & ~GetParam()) | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS);
 }
 
 // The one that a port has or has not. Messages of the others are those of the core, whose tests

@@ -11,7 +11,8 @@ namespace bushd::sim {
 
 class AvrAlone : public McuAlone {
  protected:
-  static constexpr TimeNs kBootNs = 200'000'000;
+  // RAM and flash are tested in 122 ms, and what is kept, up to 2.3 KB, is read.
+  static constexpr TimeNs kBootNs = 250'000'000;
 
   // `boots`: boot number of the boot before.
   explicit AvrAlone(std::uint32_t baud = kBaud, std::uint16_t boots = 6) : McuAlone(baud, kBootNs) {

@@ -172,6 +172,8 @@ FRAMES = [
     (1, 35, "set_velocity", {"motor": 0, "least": 6400, "most": 96000, "acceleration": 500}),
     (2, 36, "set_velocity", {"motor": 15, "least": 40, "most": 8388607, "acceleration": 8388607}),
     (1, 37, "set_velocity", {"motor": 3, "least": 0, "most": 0, "acceleration": 0}),
+    (1, 38, "set_outputs", {"step_low": 0x0102, "direction_low": 0xFFFF, "enabled": 2}),
+    (2, 39, "set_outputs", {"step_low": 0, "direction_low": 0x8003, "enabled": 1}),
     (1, 7, "identity", {"protocol_version": 5, "motors": 16, "firmware_version": 258, "boot_number": 4660,
                         "slots": 128, "queue_ticks": 256, "table_codes": 2048, "capabilities": 98319, "unique_id": ID}),
     (2, 255, "report", {"state": 2, "faults": 0, "flags": 7, "epoch": 3, "boot_number": 4660, "tick": 1001,

@@ -39,6 +39,7 @@ LAYOUTS = {
     "local": (0x14, [("motors", 2), ("keypad", 2), ("keypad_ticks", 2)]),
     "currents": (0x1A, [("motor", 1), ("decay", 1), ("ramp_ma", 2), ("cruise_ma", 2), ("hold_ma", 2)]),
     "set_velocity": (0x1C, [("motor", 1), ("least", 4), ("most", 4), ("acceleration", 4)]),
+    "set_outputs": (0x1D, [("step_low", 2), ("direction_low", 2), ("enabled", 1)]),
     "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),
                         ("slots", 2), ("queue_ticks", 2), ("table_codes", 2), ("capabilities", 4),
                         ("unique_id", [1])]),

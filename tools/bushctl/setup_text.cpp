@@ -96,6 +96,7 @@ std::string mcu_text(const std::string& bus, const Found& mcu) {
 [[mcu]]
 bus = "{}"
 address = {}
+#enable_active = "low"     # of A4988, DRV8825, TMC and many others
 #idle_disable_s = 60       # drivers off after a rest of all its motors
 )",
                      about(mcu), bus, mcu.address);

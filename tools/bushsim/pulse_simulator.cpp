@@ -33,7 +33,8 @@ PulseSimulator::PulseSimulator(const Options& options, Waiter waiter,
     : waiter_(std::move(waiter)),
       links_(options.links),
       trace_(std::move(trace)),
-      drive_(trace_.get()) {
+      drive_(trace_.get()),
+      positive_off_(options.setup.positive_off) {
   for (const SwitchAt& one : options.switches) {
     if (one.options.input.value_or(0) < 4) {
       drive_.attach_switch(one.options.input.value_or(0), one.options);
@@ -147,11 +148,11 @@ void PulseSimulator::take_orders() {
       client_ = Descriptor();
       return;
     }
-    if (order.sets != 0) drive_.set_direction(now_ns(), order.positive != 0);
+    if (order.sets != 0) drive_.set_direction(now_ns(), (order.direction_on != 0) != positive_off_);
     drive_.advance_to(now_ns());
     const bushd::serial::LineState state{
         .lines = drive_.lines(),
-        .positive = drive_.positive() ? std::uint8_t{1} : std::uint8_t{0},
+        .direction_on = drive_.positive() != positive_off_ ? std::uint8_t{1} : std::uint8_t{0},
         .unused = {},
         .left = taken_ - std::min<std::uint64_t>(taken_, drive_.queued())};
     static_cast<void>(::send(client_.get(), &state, sizeof state, MSG_NOSIGNAL | MSG_DONTWAIT));

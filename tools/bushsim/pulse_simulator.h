@@ -53,6 +53,7 @@ class PulseSimulator {
   Descriptor client_;
   std::uint64_t taken_ = 0;    // bytes since the client was connected
   std::int64_t start_ns_ = 0;  // CLOCK_MONOTONIC at time 0
+  bool positive_off_ = false;  // its direction line is off in the positive direction
   bool ended_ = false;
 };
 

@@ -28,6 +28,7 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
     Setup setup{.bus = candidate.name,
                 .baud = candidate.baud,
                 .pulses = candidate.kind == bushd::config::BusKind::kSerialPulse,
+                .positive_off = candidate.serial_pulse.positive_off,
                 .addresses = {},
                 .measuring = {},
                 .board_start_hz = candidate.start_hz,

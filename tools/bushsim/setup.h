@@ -16,6 +16,7 @@ struct Setup {
   std::string bus;
   std::uint32_t baud = 0;
   bool pulses = false;                  // a bus of kind "serial-pulse"
+  bool positive_off = false;            // of it: its direction line is off in that direction
   std::vector<std::uint8_t> addresses;  // at least one
   std::set<std::uint8_t> measuring;     // of these, the MCUs that measure their supply current
   std::uint32_t board_start_hz = 0;     // F_start of a commutator board; 0: it is none

@@ -8,6 +8,7 @@ from check_trace.lines import Envelope, LineMove, Part
 from check_trace.motion import Move
 from check_trace.problems import InputError
 from check_trace.tables import Tables
+from check_trace.trace import Levels
 
 
 class Autonomous:
@@ -81,11 +82,18 @@ class MoveLog:
         self._arrays = {}  # by number
         self._ticks = set()  # (bus, tick_ns)
         self.paths = {}  # by number of the way: floors by motor's name
+        self.levels = {}  # by address: which outputs are active low
+
+    def _levels_told(self, event):
+        if event["bus"] == self._bus or self._bus is None:
+            low = (frozenset(event[key]) for key in ("step_low", "direction_low"))
+            self.levels[event["address"]] = Levels(event["enable_low"], *low)
 
     def read(self, path):
         take = {
             "request": lambda event: None,  # who has asked for it
             "requests": lambda event: None,  # how many more
+            "levels": self._levels_told,
             "table": self._tables.told,
             "line": self._line,
             "path": self._path,

@@ -1,4 +1,4 @@
-"""Rising STEP edges out of a VCD file (IEEE 1364-2005, clause 18)."""
+"""Where STEP becomes active, out of a VCD file (IEEE 1364-2005, clause 18)."""
 
 import math
 import re
@@ -18,13 +18,19 @@ SEQUENCES = {
 PHASE_OUTPUTS = 4
 
 
+# Which outputs of an MCU are active low, by their numbers.
+Levels = namedtuple("Levels", "enable_low step_low direction_low")
+ACTIVE_HIGH = Levels(False, frozenset(), frozenset())
+
+
 class Trace:
     """What the pins did, by (address, output)."""
 
-    def __init__(self, path, common_dirs=(), phases=None):
-        """`common_dirs`: addresses of MCUs with one DIR for all; `phases`: sequences by address."""
+    def __init__(self, path, common_dirs=(), phases=None, levels=None):
+        """`common_dirs`: addresses of MCUs with one DIR for all; `phases`: sequences by address; `levels`: by address, too."""
         self._common_dirs = common_dirs
         self._phases = phases or {}
+        self._levels = levels or {}
         self.torn = []  # (place, time): phases that do not follow each other
         self.edges = defaultdict(list)  # rising STEP edges, with DIR and EN as they were
         self.pulses = defaultdict(list)  # of STEP: (begin, width)
@@ -38,6 +44,13 @@ class Trace:
             raise InputError(f"{path}: {error.strerror}") from None
         except (ValueError, IndexError, StopIteration) as error:
             raise InputError(f"{path}: not a VCD file that can be read: {error}") from None
+
+    def _is_low(self, address, kind, output):
+        """Whether this wire is active low."""
+        levels = self._levels.get(address, ACTIVE_HIGH)
+        if kind == "en":
+            return levels.enable_low
+        return output in (levels.step_low if kind == "step" else levels.direction_low)
 
     @staticmethod
     def _read_head(tokens):
@@ -91,7 +104,7 @@ class Trace:
                 continue
             address, kind, output = wire
             place = address, output
-            level = token[0] == "1"
+            level = (token[0] == "1") != self._is_low(address, kind, output)
             if went_back:
                 self.disorder.append((place, now))
                 went_back = False

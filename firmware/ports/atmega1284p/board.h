@@ -37,6 +37,8 @@
 #define COMPARATOR_1_BIT 3
 #define COMPARATOR_BITS (1 << COMPARATOR_0_BIT | 1 << COMPARATOR_1_BIT)
 #define REFERENCE_BIT 7
+// Where STEP rests, for the interrupts: in a register of timer 0, which makes no use of it.
+#define REST_LOW OCR0B
 // Output of the position compare pulse.
 #define COMPARE_PORT PORTD
 #define COMPARE_BIT 6
@@ -87,12 +89,29 @@
 
 #ifndef __ASSEMBLER__
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <util/atomic.h>
 
 #include "firmware/ports/atmega1284p/chopper.h"
 
 extern volatile uint16_t line_sending;
+
+static inline uint16_t board_rest(void) {
+  return REST_LOW;
+}
+// With interrupts off.
+static inline void board_set_rest(uint16_t step) {
+  STEP_PORT = REST_LOW = (uint8_t)step;
+}
+static inline void board_set_common_dir(bool high) {
+  (void)high;
+}
+// From now on these pins have the levels of their ports.
+static inline void board_drive(void) {
+  DDRC = 0xFF;
+  DDRD |= 1 << EN_BIT;
+}
 
 static inline void line_set_sending(const uint8_t* wire) {
   line_sending = (uint16_t)(uintptr_t)wire;
@@ -119,11 +138,10 @@ static inline void line_timer_start(void) {
 }
 
 static inline void board_init(void) {
-  // Outputs are low since reset.
-  DDRC = 0xFF;
+  // Outputs are low since reset; EN and STEP wait for who knows where they rest.
   DDRA = 1 << DECAY_BIT;
   DDRB = DIR_BITS;
-  DDRD = 1 << DE_BIT | 1 << EN_BIT | 1 << COMPARE_BIT | 1 << REFERENCE_BIT;
+  DDRD = 1 << DE_BIT | 1 << COMPARE_BIT | 1 << REFERENCE_BIT;
   // Pull-ups: the inputs, and the receiver's line while the transceiver does not drive it.
   PORTA = INPUT_LOW_BITS;
   PORTB = SYSTEM_BITS;

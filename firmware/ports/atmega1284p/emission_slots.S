@@ -92,8 +92,8 @@ take_next_tick:
 TIMER1_COMPB_vect:
     sbic TICK_FLAGS, TICK_LEVELS
     rjmp pulses_are_over
-    out _SFR_IO_ADDR(STEP_PORT), ZERO
-    mov WANTED, ZERO
+    in WANTED, _SFR_IO_ADDR(REST_LOW)
+    out _SFR_IO_ADDR(STEP_PORT), WANTED
 pulses_are_over:
     sbis TICK_FLAGS, TICK_CHANGES
     reti
@@ -156,5 +156,5 @@ emission_set_registers:
     ldd SLOT_HIGH, Z+TICK_MASK+1
     ldd SLOT_MARK, Z+TICK_MARK
     clr ZERO
-    clr WANTED
+    in WANTED, _SFR_IO_ADDR(REST_LOW)
     ret

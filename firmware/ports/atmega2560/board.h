@@ -13,6 +13,7 @@
 #define STEP_HIGH PORTC
 #define DIR_LOW PORTL
 #define DIR_HIGH PORTB
+#define COMMON_DIR_PORT PORTF
 #define COMMON_DIR_PIN PINF
 #define COMMON_DIR_BIT 2
 // Inputs, with pull-ups; closed to ground: active.
@@ -26,6 +27,10 @@
 #define REVERSE_BIT 3
 #define SYSTEM_BITS (1 << TRIGGER_BIT | 1 << EMERGENCY_BIT | 1 << FORWARD_BIT | 1 << REVERSE_BIT)
 // The current sensor is at ADC0.
+
+// Where STEP rests, for the interrupts: in registers of timer 2, which stands still.
+#define REST_LOW OCR2A
+#define REST_HIGH OCR2B
 
 // Output of the position compare pulse.
 #define COMPARE_PORT PORTG
@@ -78,7 +83,30 @@
 
 #ifndef __ASSEMBLER__
 
+#include <stdbool.h>
 #include <stdint.h>
+
+static inline uint16_t board_rest(void) {
+  return (uint16_t)(REST_LOW | REST_HIGH << 8);
+}
+// With interrupts off.
+static inline void board_set_rest(uint16_t step) {
+  STEP_LOW = REST_LOW = (uint8_t)step;
+  STEP_HIGH = REST_HIGH = (uint8_t)(step >> 8);
+}
+static inline void board_set_common_dir(bool high) {
+  if (high) {
+    COMMON_DIR_PORT |= 1 << COMMON_DIR_BIT;
+  } else {
+    COMMON_DIR_PORT &= (uint8_t)~(1 << COMMON_DIR_BIT);
+  }
+}
+// From now on these pins have the levels of their ports.
+static inline void board_drive(void) {
+  DDRA = DDRC = 0xFF;
+  DDRF = 1 << COMMON_DIR_BIT;
+  DDRH = 1 << EN_BIT;
+}
 
 static inline void line_set_sending(const uint8_t* wire) {
   LINE_SENDING_LOW = (uint8_t)(uintptr_t)wire;
@@ -103,12 +131,10 @@ static inline void clock_start(void) {
 }
 
 static inline void board_init(void) {
-  // Outputs are low since reset.
-  DDRA = DDRC = DDRL = DDRB = 0xFF;
-  DDRH = 1 << EN_BIT;
+  // Outputs are low since reset; EN and STEP wait for who knows where they rest.
+  DDRL = DDRB = 0xFF;
   DDRE = 1 << DE_BIT;
   DDRG = 1 << COMPARE_BIT;
-  DDRF = 1 << COMMON_DIR_BIT;
   // Pull-ups: the inputs, and the receiver's line while the transceiver does not drive it.
   PORTK = PORTJ = 0xFF;
   PORTD = SYSTEM_BITS;

@@ -61,11 +61,15 @@
 
     lds r18, enable_kept
     lds r19, enable_kept + 1
-    cpi r18, lo8(BOOT_ENABLE_ON)
+    cpi r18, lo8(BOOT_ENABLE_HIGH)
     brne 1f
-    cpi r19, hi8(BOOT_ENABLE_ON)
+    cpi r19, hi8(BOOT_ENABLE_HIGH)
+    brne 2f
+    sbi BOOT_FAULTS, BOOT_ENABLE_HIGH_BIT
+2:
+    cpi r19, hi8(BOOT_ENABLE_LOW)
     brne 1f
-    sbi BOOT_FAULTS, BOOT_ENABLE_KEPT_BIT
+    sbi BOOT_FAULTS, BOOT_ENABLE_LOW_BIT
 1:
     ldi XL, lo8(RAMSTART)
     ldi XH, hi8(RAMSTART)

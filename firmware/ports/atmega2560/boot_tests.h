@@ -9,10 +9,11 @@
 #define BOOT_RAM_BAD 1
 #define BOOT_FLASH_BAD_BIT 1
 #define BOOT_FLASH_BAD 2
-// No fault: `enable_kept` was BOOT_ENABLE_ON, as RAM still had it.
-#define BOOT_ENABLE_KEPT_BIT 2
-#define BOOT_ENABLE_KEPT 4
-#define BOOT_ENABLE_ON 0x5A69
+// No faults: `enable_kept` was the one or the other of these, as RAM still had it.
+#define BOOT_ENABLE_HIGH_BIT 2
+#define BOOT_ENABLE_LOW_BIT 3
+#define BOOT_ENABLE_HIGH 0x5A69
+#define BOOT_ENABLE_LOW 0xA569
 
 #ifdef __ASSEMBLER__
 
@@ -24,8 +25,16 @@
 #include <avr/io.h>
 #include <stdint.h>
 
+#include "engine/message.h"
+
 static inline uint8_t boot_faults(void) {
   return GPIOR0;
+}
+
+// BUSHD_ENABLED_* of drivers that were enabled when the watchdog came; 0: they were not.
+static inline uint8_t boot_enable_kept(void) {
+  if (GPIOR0 & 1 << BOOT_ENABLE_HIGH_BIT) return BUSHD_ENABLED_HIGH;
+  return GPIOR0 & 1 << BOOT_ENABLE_LOW_BIT ? BUSHD_ENABLED_LOW : 0;
 }
 
 // MCUSR as it was after reset.

@@ -40,7 +40,7 @@ volatile uint8_t emission_committed;
 uint32_t emission_begun_at;
 uint32_t emission_next_start;
 
-// Of ticks of few slots: no pulses, or the levels that the slot_buffer before has left.
+// Of ticks of few slots: where STEP rests, or the levels that the slot_buffer before has left.
 static uint16_t idle_masks[MAX_EMPTY_SLOTS];
 
 // A tick, and what its length is made of.
@@ -72,8 +72,8 @@ static void set_masks(emission_tick* tick, const uint16_t* masks, uint8_t slots)
 static uint8_t begun_flags(uint8_t outputs) {
   const uint8_t flags = 1 << TICK_CHANGES;
   if (outputs == BUSHD_OUTPUTS_LEVELS) return flags | 1 << TICK_SPECIAL | 1 << TICK_LEVELS;
-  if (outputs == BUSHD_OUTPUTS_COMMON_DIR) return flags | 1 << TICK_SPECIAL;
-  return flags;
+  if (outputs == BUSHD_OUTPUTS_COMMON_DIR) return flags | 1 << TICK_SPECIAL | 1 << TICK_COMMON;
+  return board_rest() != 0 ? flags | 1 << TICK_SPECIAL : flags;
 }
 
 static void set_plane(emission_tick* tick, const bushd_slot_buffer* slot_buffer, uint32_t cycles) {
@@ -148,7 +148,7 @@ static void give(bool again) {
   if (next_plane->active != 0 || next_plane->outputs == BUSHD_OUTPUTS_LEVELS) {
     set_plane(&next->tick, next_plane, cycles);
   } else {
-    set_empty(&next->tick, next_plane->direction, 1 << TICK_CHANGES, cycles);
+    set_empty(&next->tick, next_plane->direction, begun_flags(BUSHD_OUTPUTS_PULSES), cycles);
   }
   const uint8_t name = name_of(&next->tick);
   if (again) {
@@ -165,7 +165,7 @@ static void give(bool again) {
 void emission_start(void) {
   emission_taken = name_of(&emission_silent);
   emission_set_registers(&emission_silent);
-  GPIOR0 = 1 << TICK_IS_NEXT | 1 << TICK_CHANGES;
+  GPIOR0 = 1 << TICK_IS_NEXT | begun_flags(BUSHD_OUTPUTS_PULSES);
   OCR1A = START_CYCLES - 1u;
   OCR1B = PULSE_END_CYCLES;
 #ifdef OCR1C
@@ -181,7 +181,30 @@ void emission_start(void) {
   TIMSK1 = BOARD_SLOT_INTERRUPTS;
 }
 
-void emission_ready(const bushd_slot_buffer* slot_buffer) {
+// Where nothing moves: no pulse begins or ends meanwhile, and no tick that is prepared has other
+// masks than idle ones.
+void emission_set_rest(uint16_t step) {
+  if (step == board_rest()) return;
+  const uint8_t special = 1 << TICK_SPECIAL;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    board_set_rest(step);
+    for (uint8_t i = 0; i < MAX_EMPTY_SLOTS; ++i) idle_masks[i] = step;
+    GPIOR0 |= special;
+    prepared[0].tick.begun |= special;
+    prepared[1].tick.begun |= special;
+    emission_silent.begun |= special;
+  }
+}
+
+static void turn_round(uint16_t* mask, uint16_t rest) {
+  for (const uint16_t* const end = mask + EMISSION_SLOTS; mask != end; ++mask) *mask ^= rest;
+}
+
+void emission_ready(bushd_slot_buffer* slot_buffer) {
+  const uint16_t rest = board_rest();
+  if (rest != 0 && slot_buffer->active != 0 && slot_buffer->outputs != BUSHD_OUTPUTS_LEVELS) {
+    turn_round(slot_buffer->step, rest);
+  }
   next_plane = slot_buffer;
   given_start = core_start + given->tick.cycles;
   give(false);
@@ -199,8 +222,8 @@ bool emission_begins_soon(void) {
 // If no slot_buffer is ready after this one, its last levels stay.
 static void hold_levels(void) {
   const bool levels = next_plane->outputs == BUSHD_OUTPUTS_LEVELS;
-  const uint16_t last = levels ? next_plane->step[EMISSION_SLOTS - 1u] : 0;
-  emission_silent.begun = levels ? begun_flags(BUSHD_OUTPUTS_LEVELS) : 1 << TICK_CHANGES;
+  const uint16_t last = levels ? next_plane->step[EMISSION_SLOTS - 1u] : board_rest();
+  emission_silent.begun = begun_flags(levels ? BUSHD_OUTPUTS_LEVELS : BUSHD_OUTPUTS_PULSES);
   if (idle_masks[0] == last) return;
   for (uint8_t i = 0; i < MAX_EMPTY_SLOTS; ++i) idle_masks[i] = last;
 }

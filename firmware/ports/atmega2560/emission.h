@@ -26,8 +26,11 @@
 // they stay off.
 void emission_start(void);
 
-// The slot_buffer of the next tick is prepared.
-void emission_ready(const bushd_slot_buffer* slot_buffer);
+// Where STEP of the outputs rests: 1 is high. While nothing moves.
+void emission_set_rest(uint16_t step);
+
+// The slot_buffer of the next tick is prepared. Its masks become levels where STEP rests high.
+void emission_ready(bushd_slot_buffer* slot_buffer);
 
 // The tick after the core's present one has begun.
 bool emission_begun(void);

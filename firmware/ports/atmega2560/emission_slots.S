@@ -2,7 +2,7 @@
 ; the last slot of a tick and in the first one of the next. None of them changes a flag of SREG. In section
 ; .vectors they lie behind the vectors, so that these reach them by rjmp.
 ;
-; Cycles with entry and vector: A 23, B 16 (19 with a common DIR), and once a tick: A in the first slot 51 and in the last one 59,
+; Cycles with entry and vector: A 23, B 16 (22 where a STEP rests high, 24 with a common DIR), and once a tick: A in the first slot 51 and in the last one 59,
 ; C 26 and then 16 with interrupts off.
 
 #include <avr/io.h>
@@ -76,8 +76,12 @@ TIMER1_COMPB_vect:
 special_slot:
     sbic TICK_FLAGS, TICK_LEVELS
     reti
-    out _SFR_IO_ADDR(STEP_LOW), ZERO
-    out _SFR_IO_ADDR(STEP_HIGH), ZERO
+    lds DATA_LOW, _SFR_MEM_ADDR(REST_LOW)
+    out _SFR_IO_ADDR(STEP_LOW), DATA_LOW
+    lds DATA_LOW, _SFR_MEM_ADDR(REST_HIGH)
+    out _SFR_IO_ADDR(STEP_HIGH), DATA_LOW
+    sbis TICK_FLAGS, TICK_COMMON
+    reti
     ; A one turns the pin over.
     sbi _SFR_IO_ADDR(COMMON_DIR_PIN), COMMON_DIR_BIT
     reti

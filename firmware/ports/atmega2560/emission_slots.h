@@ -26,8 +26,9 @@
 
 // Bits of GPIOR0; the low ones hold what the tests before `main` found, until the first tick
 // begins.
+#define TICK_COMMON 3   // the common DIR changes behind every pulse
 #define TICK_LEVELS 4   // masks are levels: they stay
-#define TICK_SPECIAL 5  // that, or the common DIR changes behind every pulse
+#define TICK_SPECIAL 5  // one of these, or STEP of an output rests high
 #define TICK_IS_NEXT 6  // the mark that comes is that of a tick's first slot
 #define TICK_CHANGES 7  // from a tick's last slot into the next one's first
 

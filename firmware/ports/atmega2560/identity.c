@@ -55,8 +55,10 @@ bool identity_store_address(uint8_t address) {
   return true;
 }
 
-void identity_keep_enable(bool on) {
-  enable_kept = on ? BOOT_ENABLE_ON : 0;
+void identity_keep_enable(uint8_t enabled) {
+  enable_kept = 0;
+  if (enabled == BUSHD_ENABLED_HIGH) enable_kept = BOOT_ENABLE_HIGH;
+  if (enabled == BUSHD_ENABLED_LOW) enable_kept = BOOT_ENABLE_LOW;
 }
 
 void identity_poll(void) {

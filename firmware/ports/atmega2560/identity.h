@@ -23,8 +23,8 @@ bool identity_load(identity* kept, uint16_t* boot_number);
 // Is written by identity_poll. False while another address is being written, or the first copy.
 bool identity_store_address(uint8_t address);
 // In RAM, which outlives a reset by the watchdog: a cell of the EEPROM would wear out where drivers
-// are disabled at rest. Whether it was on: BOOT_ENABLE_KEPT of boot_faults().
-void identity_keep_enable(bool on);
+// are disabled at rest. BUSHD_ENABLED_* of drivers that are enabled, for boot_enable_kept(), or 0.
+void identity_keep_enable(uint8_t enabled);
 
 // Writes a byte of what has changed, if one is left. Precondition: the EEPROM writes nothing.
 void identity_poll(void);

@@ -32,7 +32,6 @@ static bushd_mcu_velocity velocity[BOARD_VELOCITY_MOTORS];
 #else
 #define VELOCITY NULL
 #endif
-static uint8_t failed_tests;
 
 static inline void name_parts(void) {
   name_parts_of_core();
@@ -55,13 +54,17 @@ static bool port_store_address(void* context, uint8_t address) {
   return identity_store_address(address);
 }
 
-static void port_set_enable(void* context, bool on) {
+static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels) {
   (void)context;
-  if (on) {
+  if (levels->enabled == 0) return;
+  if (on == (levels->enabled == BUSHD_ENABLED_HIGH)) {
     EN_PORT |= 1 << EN_BIT;
   } else {
     EN_PORT &= (uint8_t)~(1 << EN_BIT);
   }
+  emission_set_rest(levels->step_low);
+  board_set_common_dir((levels->direction_low & 1u) != 0);
+  board_drive();
 }
 
 static void port_set_tick(void* context, uint32_t tick_ns) {
@@ -94,14 +97,14 @@ static void port_set_trigger(void* context, bushd_edge edge) {
   trigger_await(edge);
 }
 
+// At boot only: the context is what has failed.
 static uint8_t port_self_test(void* context) {
-  (void)context;
-  return failed_tests;
+  return (uint8_t)(uintptr_t)context;
 }
 
 static void port_keep_enable(void* context, bool on) {
   (void)context;
-  identity_keep_enable(on);
+  identity_keep_enable(on ? mcu.config.outputs.enabled : 0);
 }
 
 // Of several flags the gravest counts.
@@ -116,12 +119,12 @@ static bushd_reset_cause reset_cause(void) {
 // Not inlined: what it needs would stay on the stack for good.
 __attribute__((noinline)) static void boot(void) {
   name_parts();
+  uint8_t failed_tests = 0;
   if (boot_faults() & BOOT_RAM_BAD) failed_tests |= BUSHD_TEST_RAM;
   if (boot_faults() & BOOT_FLASH_BAD) failed_tests |= BUSHD_TEST_FLASH;
   if (!inputs_test()) failed_tests |= BUSHD_TEST_INPUTS;
   // Field by field: a constant of it would lie in RAM for good.
   bushd_port port;
-  port.context = NULL;
   port.transmit = port_transmit;
   port.store_address = port_store_address;
   port.set_enable = port_set_enable;
@@ -152,13 +155,17 @@ __attribute__((noinline)) static void boot(void) {
                              .reply = line_reply(&mcu.receiver)};
   identity kept;
   config.reset_cause = reset_cause();
-  const bool enable_kept_on = (boot_faults() & BOOT_ENABLE_KEPT) != 0;
-  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept_on;
   const nvm_found found = nvm_find();
+  if (found == NVM_WHOLE) config.outputs = nvm_outputs();
+  const uint8_t enabled = boot_enable_kept();
+  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enabled != 0;
+  // The EEPROM may not have it yet.
+  if (config.enable_at_boot) config.outputs.enabled = enabled;
   const bool has_identity = identity_load(&kept, &config.boot_number);
   if (!has_identity || found == NVM_BROKEN) failed_tests |= BUSHD_TEST_EEPROM;
   config.address = kept.address;
   for (uint8_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) config.unique_id[i] = kept.unique_id[i];
+  port.context = (void*)(uintptr_t)failed_tests;
   bushd_mcu_boot(&mcu, &port, &config);
   if (found == NVM_WHOLE) nvm_load(&mcu);
 }
@@ -173,7 +180,7 @@ static void poll_eeprom(void) {
 
 static void prepare(void) {
   bushd_mcu_prepare(&mcu);
-  const bushd_slot_buffer* const slot_buffer = &mcu.slot_buffer[mcu.front ^ 1u];
+  bushd_slot_buffer* const slot_buffer = &mcu.slot_buffer[mcu.front ^ 1u];
   emission_ready(slot_buffer);
   if (slot_buffer->compare_rise) compare_rise(emission_slot_time(slot_buffer->compare_rise - 1u));
   if (slot_buffer->compare_fall) compare_fall(emission_slot_time(slot_buffer->compare_fall - 1u));

@@ -46,6 +46,12 @@ nvm_found nvm_find(void) {
   return NVM_BROKEN;
 }
 
+bushd_set_outputs nvm_outputs(void) {
+  bushd_set_outputs outputs;
+  eeprom_read_block(&outputs, (const void*)CONTENT, sizeof outputs);
+  return outputs;
+}
+
 void nvm_load(bushd_mcu* mcu) {
   for (;;) {
     const uint16_t at = (uint16_t)(CONTENT + scan.size);

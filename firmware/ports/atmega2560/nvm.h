@@ -22,6 +22,8 @@ typedef enum nvm_found {
 
 // With interrupts off.
 nvm_found nvm_find(void);
+// The first that is kept, for bushd_mcu_config. Precondition: it is whole.
+bushd_set_outputs nvm_outputs(void);
 // Precondition: it is whole, and the MCU has just booted.
 void nvm_load(bushd_mcu* mcu);
 

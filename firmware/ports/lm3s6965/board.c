@@ -38,12 +38,10 @@ void board_init(void) {
   GPIO_CR(GPIO_B) = 0xFFu;
   GPIO_AFSEL(GPIO_B) = 0;
   GPIO_PUR(GPIO_B) = 0;
-  port_init(GPIO_B, 0xFFu, 0);
-  port_init(GPIO_D, 0xFFu, 0);
   port_init(GPIO_E, 0x0Fu, 0);
   port_init(GPIO_C, 0, 1u << 4);
-  port_init(GPIO_F, 1u << 0 | 1u << 1, 0);
-  port_init(GPIO_A, 1u << 2 | 1u << 3, 0xF0u);
+  port_init(GPIO_F, 1u << 1, 0);
+  port_init(GPIO_A, 1u << 3, 0xF0u);
   INPUT_LOAD = ALL_PINS;
   // The UART has its own; its receiver's line is pulled up while the transceiver does not drive it.
   GPIO_AFSEL(GPIO_A) = 1u << 0 | 1u << 1;
@@ -55,6 +53,18 @@ void board_init(void) {
   ADC_ACTSS = ADC_SEQUENCER_3;
   board_shift_directions(0);
   board_latch_directions();
+}
+
+static void drive(uint32_t port, uint32_t outputs) {
+  GPIO_DIR(port) |= outputs;
+  GPIO_DEN(port) |= outputs;
+}
+
+void board_drive(void) {
+  drive(GPIO_A, 1u << 2);
+  drive(GPIO_B, 0xFFu);
+  drive(GPIO_D, 0xFFu);
+  drive(GPIO_F, 1u << 0);
 }
 
 // Motor 15 first: it comes to stand in the last register.

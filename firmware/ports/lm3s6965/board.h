@@ -36,8 +36,12 @@
 
 #define ALL_PINS 0xFFu  // for the masked addresses above: those of other pins are not touched
 
-// Clock and pins, all outputs low.
+// Clock and pins, all outputs low but EN, STEP and the common DIR: they wait for who knows where
+// they rest (board_drive).
 void board_init(void);
+// From now on these have the levels that are written to them. What was written before may have been
+// lost.
+void board_drive(void);
 
 // Shifts the levels of DIR to where a pulse on DIR_LATCH brings them out.
 void board_shift_directions(uint16_t levels);

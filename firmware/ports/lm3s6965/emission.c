@@ -34,12 +34,14 @@ typedef enum plane_state { PLANE_NONE, PLANE_WAITS, PLANE_TAKEN } plane_state;
 
 // Of the interrupts.
 _Static_assert(offsetof(emission_slot_state, end) == SLOT_END, "as in emission_slots.S");
+_Static_assert(offsetof(emission_slot_state, rest) == SLOT_REST, "as in emission_slots.S");
 emission_slot_state emission_slot = {
     .timer = &TIMER_ICR(SLOT_TIMER), .step_low = &STEP_LOW, .step_high = &STEP_HIGH};
 static emission_tick present;
 static emission_tick silent;  // goes on when no slot_buffer is ready
 static uint16_t held;         // its levels
 static uint32_t next_start;
+static bool common_dir_rests_high;
 
 // Between them and the main loop.
 static emission_tick next;
@@ -76,7 +78,9 @@ void emission_take_next(void) {
               (uint32_t)(left > SHORTEST_CYCLES ? left : SHORTEST_CYCLES));
 }
 
+// STEP rests high where `rest` says so; of phases nothing does.
 static void put_steps(uint32_t mask) {
+  mask ^= emission_slot.rest;
   STEP_LOW = mask & 0xFFu;
   STEP_HIGH = mask >> 8;
 }
@@ -92,7 +96,7 @@ static void half_slot_common_dir(void) {
   put_steps(0);
   const bool last = at + 1 == emission_slot.end;
   const uintptr_t next_slot = (at + 1 - (uintptr_t)present.mask) / sizeof present.mask[0];
-  COMMON_DIR = !last && next_slot % 2 != 0 ? ALL_PINS : 0;
+  COMMON_DIR = (!last && next_slot % 2 != 0) != common_dir_rests_high ? ALL_PINS : 0;
   if (last) emission_take_next();
 }
 
@@ -172,6 +176,17 @@ static void give(void) {
     next_extra_ns = extra_ns;
     next_rest_ns = length_ns % CYCLE_NS;
   }
+  interrupts_on();
+}
+
+void emission_set_rest(uint16_t step, bool common_dir) {
+  interrupts_off();
+  if (emission_slot.rest != step) {
+    emission_slot.rest = step;
+    put_steps(0);
+  }
+  common_dir_rests_high = common_dir;
+  COMMON_DIR = common_dir ? ALL_PINS : 0;
   interrupts_on();
 }
 

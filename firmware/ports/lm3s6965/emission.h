@@ -28,6 +28,9 @@
 // The first tick begins, one without steps. With interrupts off, after set_tick.
 void emission_start(void);
 
+// Where STEP of the outputs and the common DIR rest: true is high. While nothing moves.
+void emission_set_rest(uint16_t step, bool common_dir);
+
 // The slot_buffer of the next tick is prepared.
 void emission_ready(const bushd_slot_buffer* slot_buffer);
 

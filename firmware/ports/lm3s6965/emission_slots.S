@@ -17,7 +17,9 @@ emission_half_slot:
     adds    r0, #1
     str     r0, [r1]
     str     r0, [r3]
-    ldrh    r3, [r0, #-1]
+    ldrh    r0, [r0, #-1]
+    ldr     r3, [r3, #SLOT_REST]
+    eors    r3, r0
     uxtb    r0, r3
     str     r0, [r2]
     lsrs    r3, #8
@@ -28,8 +30,9 @@ emission_half_slot:
     adds    r0, #1
     str     r0, [r3]
     ldr     r1, [r3, #SLOT_END]
-    movs    r3, #0
+    ldr     r3, [r3, #SLOT_REST]
     str     r3, [r2]
+    lsrs    r3, #8
     str     r3, [r12]
     cmp     r0, r1
     beq     2f

@@ -2,7 +2,9 @@
 #ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_EMISSION_SLOTS_H
 #define BUSHD_FIRMWARE_PORTS_LM3S6965_EMISSION_SLOTS_H
 
-#define SLOT_END 16  // offset into emission_slot_state
+// Offsets into emission_slot_state.
+#define SLOT_END 16
+#define SLOT_REST 20
 
 #ifndef __ASSEMBLER__
 
@@ -14,6 +16,7 @@ typedef struct emission_slot_state {
   volatile uint32_t* step_low;
   volatile uint32_t* step_high;
   uintptr_t end;  // of the masks
+  uint32_t rest;  // levels of STEP without pulses
 } emission_slot_state;
 
 extern emission_slot_state emission_slot;

@@ -23,7 +23,7 @@ static uint8_t reply[BUSHD_MCU_MAX_REPLY];
 static bool eeprom_failed;
 static uint16_t motor_inputs;
 // In memory that a watchdog reset leaves as it is.
-#define ENABLE_KEPT 0x5AC3E917u
+#define ENABLE_KEPT 0x5AC3E910u  // plus BUSHD_ENABLED_*
 __attribute__((section(".kept"))) static uint32_t enable_kept;
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
@@ -36,9 +36,20 @@ static bool port_store_address(void* context, uint8_t address) {
   return journal_store_address(address);
 }
 
-static void port_set_enable(void* context, bool on) {
+static void put_outputs(bool on, const bushd_set_outputs* levels) {
+  ENABLE = on == (levels->enabled == BUSHD_ENABLED_HIGH) ? ALL_PINS : 0;
+  emission_set_rest(levels->step_low, (levels->direction_low & 1u) != 0);
+}
+
+static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels) {
+  static bool driven;
   (void)context;
-  ENABLE = on ? ALL_PINS : 0;
+  if (levels->enabled == 0) return;
+  put_outputs(on, levels);
+  if (driven) return;
+  driven = true;
+  board_drive();
+  put_outputs(on, levels);
 }
 
 static void port_set_tick(void* context, uint32_t tick_ns) {
@@ -81,7 +92,7 @@ static uint8_t port_self_test(void* context) {
 
 static void port_keep_enable(void* context, bool on) {
   (void)context;
-  enable_kept = on ? ENABLE_KEPT : 0;
+  enable_kept = on ? ENABLE_KEPT + mcu.config.outputs.enabled : 0;
 }
 
 static void port_set_trigger(void* context, bushd_edge edge) {
@@ -125,8 +136,13 @@ static void boot(void) {
   name_parts_of_core();
   motor_inputs = (uint16_t)~board_read_inputs();
   config.reset_cause = reset_cause();
-  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enable_kept == ENABLE_KEPT;
   const nvm_found found = nvm_find();
+  if (found == NVM_WHOLE) config.outputs = nvm_outputs();
+  const uint32_t enabled = enable_kept - ENABLE_KEPT;
+  const bool is_level = enabled == BUSHD_ENABLED_HIGH || enabled == BUSHD_ENABLED_LOW;
+  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && is_level;
+  // The flash may not have it yet.
+  if (config.enable_at_boot) config.outputs.enabled = (uint8_t)enabled;
   eeprom_failed = !journal_open(&kept) || found == NVM_BROKEN;
   config.address = kept.address;
   config.boot_number = kept.boot_number;

@@ -86,6 +86,12 @@ nvm_found nvm_find(void) {
   return NVM_BROKEN;
 }
 
+bushd_set_outputs nvm_outputs(void) {
+  bushd_set_outputs outputs;
+  memcpy(&outputs, content, sizeof outputs);
+  return outputs;
+}
+
 void nvm_load(bushd_mcu* mcu) {
   for (;;) {
     const uint32_t from = scan.size;

@@ -23,6 +23,8 @@ typedef enum nvm_found {
 
 // Once, at boot.
 nvm_found nvm_find(void);
+// The first that is kept, for bushd_mcu_config. Precondition: it is whole.
+bushd_set_outputs nvm_outputs(void);
 // Precondition: it is whole, and the MCU has just booted.
 void nvm_load(bushd_mcu* mcu);
 

@@ -44,15 +44,21 @@ static int64_t edge_time(const bushd_virtual* v, uint16_t edge) {
 
 // What the STEP outputs have from this edge of the present tick on.
 static uint16_t step_levels_at(const bushd_virtual* v, uint16_t edge) {
-  const bool pulse_is_over = edge % 2 == 1 && v->slot_buffer->outputs != BUSHD_OUTPUTS_LEVELS;
-  return pulse_is_over ? 0 : v->slot_buffer->step[edge / 2];
+  if (v->slot_buffer->outputs == BUSHD_OUTPUTS_LEVELS) return v->slot_buffer->step[edge / 2];
+  const bool pulse_is_over = edge % 2 == 1;
+  return (pulse_is_over ? 0 : v->slot_buffer->step[edge / 2]) ^ v->rest.step_low;
+}
+
+static bool common_dir_rests_high(const bushd_virtual* v) {
+  return (v->rest.direction_low & 1) != 0;
 }
 
 // The same for the common DIR.
 static uint16_t common_dir_at(const bushd_virtual* v, uint16_t edge) {
   const uint16_t slot = (uint16_t)((edge + 1) / 2);
-  return v->slot_buffer->outputs == BUSHD_OUTPUTS_COMMON_DIR && slot < v->config.mcu.slots &&
-         slot % 2;
+  const bool right = v->slot_buffer->outputs == BUSHD_OUTPUTS_COMMON_DIR &&
+                     slot < v->config.mcu.slots && slot % 2 != 0;
+  return right != common_dir_rests_high(v);
 }
 
 static void drive_compare(bushd_virtual* v, int64_t time_ns, bool level) {
@@ -140,9 +146,10 @@ static void begin_tick(bushd_virtual* v, int64_t start_own_ns) {
   v->edge_cursor = 0;
 }
 
-// What its slot_buffer of `slots` slots leaves at the STEP outputs.
-static uint16_t last_levels(const bushd_slot_buffer* slot_buffer, uint16_t slots) {
-  return slot_buffer->outputs == BUSHD_OUTPUTS_LEVELS ? slot_buffer->step[slots - 1] : 0;
+// What the slot_buffer leaves at the STEP outputs.
+static uint16_t last_levels(const bushd_virtual* v) {
+  const bool levels = v->slot_buffer->outputs == BUSHD_OUTPUTS_LEVELS;
+  return levels ? v->slot_buffer->step[v->config.mcu.slots - 1] : v->rest.step_low;
 }
 
 // Of the tick that ends.
@@ -160,13 +167,11 @@ static void tick_boundary(bushd_virtual* v) {
   turn_for_whole_tick(v);
   v->now_ns = v->next_event_ns;
   begin_tick(v, v->tick_start_own_ns + v->tick_length_ns);
-  if (v->slot_buffer != NULL)
-    v->levels_before_tick = last_levels(v->slot_buffer, v->config.mcu.slots);
+  if (v->slot_buffer != NULL) v->levels_before_tick = last_levels(v);
   v->slot_buffer = bushd_mcu_swap(&v->mcu);
   drive(v, v->now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, v->slot_buffer->direction);
   if (v->slot_buffer->active == 0) {
-    drive(v, v->now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels,
-          last_levels(v->slot_buffer, v->config.mcu.slots));
+    drive(v, v->now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, last_levels(v));
   }
   bushd_mcu_prepare(&v->mcu);
 }
@@ -185,12 +190,27 @@ static bool port_store_address(void* context, uint8_t address) {
   return true;
 }
 
-static void port_set_enable(void* context, bool on) {
-  bushd_virtual* v = context;
-  if (on == v->enable_level) return;
+static void drive_enable(bushd_virtual* v, bool level) {
+  if (level == v->enable_level) return;
   emit_slots(v, v->now_ns);
-  v->enable_level = on;
-  emit(v, v->now_ns, BUSHD_VIRTUAL_EN, 0, on);
+  v->enable_level = level;
+  emit(v, v->now_ns, BUSHD_VIRTUAL_EN, 0, level);
+}
+
+// STEP and the common DIR, where nothing moves.
+static void drive_rest(bushd_virtual* v) {
+  drive(v, v->now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, v->rest.step_low);
+  drive(v, v->now_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, common_dir_rests_high(v));
+}
+
+static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels) {
+  bushd_virtual* v = context;
+  if (levels->enabled == 0) return;
+  const bool same =
+      v->rest.step_low == levels->step_low && v->rest.direction_low == levels->direction_low;
+  v->rest = *levels;
+  drive_enable(v, on == (levels->enabled == BUSHD_ENABLED_HIGH));
+  if (!same) drive_rest(v);
 }
 
 static void port_set_tick(void* context, uint32_t tick_ns) {
@@ -335,12 +355,14 @@ void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs) {
 void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint16_t boot_number) {
   assert(boot_ns >= now_ns);
   bushd_virtual_advance(v, now_ns);
-  if (v->running) turn_for_cut_tick(v);
-  drive(v, now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, 0);
-  drive(v, now_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, 0);
+  if (v->running) {
+    turn_for_cut_tick(v);
+    v->config.mcu.outputs = v->mcu.config.outputs;
+  }
+  drive_rest(v);
   drive(v, now_ns, BUSHD_VIRTUAL_DIR, &v->dir_levels, 0);
   drive_compare(v, now_ns, false);
-  if (v->running) port_set_enable(v, false);
+  drive_enable(v, v->config.mcu.outputs.enabled == BUSHD_ENABLED_LOW);
   v->running = false;
   v->config.boot_ns = boot_ns;
   v->config.mcu.boot_number = boot_number;

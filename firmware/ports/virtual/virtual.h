@@ -91,6 +91,7 @@ typedef struct bushd_virtual {
   uint16_t levels_before_tick;  // of phases, when the present tick began
   uint16_t dir_levels;
   uint16_t common_dir_level;
+  bushd_set_outputs rest;  // what the port was told last
   bool enable_level;
   bool enable_kept;
   uint8_t reply[BUSHD_MCU_MAX_REPLY];
@@ -123,8 +124,9 @@ int bushd_virtual_keypad_display(bushd_virtual* v);
 // The inputs from the last time given on. An edge at the trigger's is captured.
 void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs);
 
-// Pulls the MCU's reset at now_ns: all pins fall, all memory is lost but what a watchdog reset
-// leaves. It boots again at boot_ns (>= now_ns).
+// Pulls the MCU's reset at now_ns: DIR falls, STEP and EN are where resistors of the board hold
+// them, at rest and disabled. All memory is lost but what a watchdog reset leaves, and the levels
+// of outputs. It boots again at boot_ns (>= now_ns).
 void bushd_virtual_reset(bushd_virtual* v, int64_t now_ns, int64_t boot_ns, uint16_t boot_number);
 
 #ifdef __cplusplus
