@@ -86,6 +86,7 @@ class Trace:
     def _read_changes(self, tokens, wires):
         now = 0
         went_back = False
+        initial = False  # what follows is how wires are when the trace begins
         high_since = {}
         direction = defaultdict(lambda: (False, -math.inf))  # level, since when
         enabled = defaultdict(bool)
@@ -99,8 +100,11 @@ class Trace:
             if token[0] in "bBrR":
                 next(tokens)  # a vector's or a real's code stands apart
                 continue
+            if token[0] == "$":
+                initial = token == "$dumpvars"
+                continue
             wire = wires.get(token[1:])
-            if wire is None or token[0] == "$":
+            if wire is None:
                 continue
             address, kind, output = wire
             place = address, output
@@ -117,6 +121,8 @@ class Trace:
             elif kind == "dir":
                 if direction[place][0] != level:
                     direction[place] = level, now
+            elif initial:
+                pass  # no edge
             elif level:
                 if place in high_since:
                     self.double.append((place, now))
