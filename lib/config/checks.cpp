@@ -8,7 +8,9 @@
 #include <string>
 
 #include "config/motor_inputs.h"
+#include "engine/emission.h"
 #include "engine/run.h"
+#include "engine/slots.h"
 #include "fieldbus/line_budget.h"
 
 namespace bushd::config {
@@ -51,6 +53,44 @@ Result<void> check_step_period(const Loading& loading, std::size_t index) {
       "by table \"{}\"; allowed: {} or less. Or use a slower table",
       mcu.emission.settings.step_us, room, bus.tick_us, bus.name, motor.name, steps,
       config.table_of(motor).name(), (bus.tick_us - dir_setup_us) / steps);
+  return fail(std::move(error));
+}
+
+// What no MCU can do, however many slots it has; what some cannot, they say when they are asked.
+Result<void> check_emission(const Loading& loading, std::size_t index) {
+  const Mcu& mcu = loading.config.mcus[index];
+  const Bus& bus = loading.config.bus_of(mcu);
+  if (bus.kind != BusKind::kRs485) return {};
+  const bushd_emission& settings = mcu.emission.settings;
+  bushd_emission_grid grid;
+  const auto fit = [&](std::uint16_t slots) {
+    return bushd_emission_fit(&settings, bus.tick_ns(), slots, &grid);
+  };
+  const bushd_status status = fit(BUSHD_MIN_SLOTS);
+  if (status == BUSHD_OK || fit(BUSHD_MAX_SLOTS) == BUSHD_OK) return {};
+  // Of the longest slots, in a tick that is shortened to follow the bus.
+  const std::uint32_t tick_us = (bus.tick_ns() - bus.tick_ns() / BUSHD_TICK_SLEW_DIVISOR) / 1000;
+  const std::uint32_t half_slot_us = tick_us / (2 * BUSHD_MIN_SLOTS);
+  Error error = mcu.emission.step_at;
+  std::string fault =
+      fmt::format("is {} us; allowed: what the {} us tick of bus \"{}\" holds besides dir_setup_us",
+                  settings.step_us, bus.tick_us, bus.name);
+  if (status == BUSHD_E_PULSE_WIDTH) {
+    error = mcu.emission.pulse_at;
+    fault = fmt::format(
+        "is {} us; allowed: half a slot of the {} us tick of bus \"{}\", {} us at "
+        "most. Use a longer tick_us",
+        settings.pulse_us, bus.tick_us, bus.name, half_slot_us);
+  } else if (status == BUSHD_E_DIR_SETUP) {
+    const bool common = settings.mode == BUSHD_EMISSION_COMMON_DIR;
+    error = mcu.emission.dir_setup_at;
+    fault = fmt::format(
+        "is {} us; allowed: less than {} of the {} us tick of bus \"{}\", {} us at "
+        "most. Use a longer tick_us",
+        settings.dir_setup_us, common ? "half a slot" : "the length", bus.tick_us, bus.name,
+        common ? half_slot_us : tick_us);
+  }
+  error.message = std::move(fault);
   return fail(std::move(error));
 }
 
@@ -181,6 +221,9 @@ std::span<const std::uint32_t> baud_rates() {
 Result<void> check_together(const Loading& loading) {
   for (std::size_t i = 0; i < loading.config.buses.size(); ++i) {
     if (auto checked = check_populated(loading, i); !checked) return checked;
+  }
+  for (std::size_t i = 0; i < loading.config.mcus.size(); ++i) {
+    if (auto checked = check_emission(loading, i); !checked) return checked;
   }
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
     if (auto checked = check_speed(loading, i); !checked) return checked;

@@ -30,6 +30,14 @@ Result<std::string> read_line(const TomlReader& reader, std::string_view key, st
   return text;
 }
 
+// "" is none, as is a key that is not there.
+bool says_something(const TomlReader& reader, std::string_view key) {
+  if (!reader.has(key)) return false;
+  if (!reader.is_string(key)) return true;  // its reader refuses it
+  const auto text = reader.string(key, "");
+  return !text || !text->empty();
+}
+
 Result<units::Ratio> read_steps_per_unit(const TomlReader& reader) {
   constexpr std::string_view kAllowed =
       "a number above 0, such as 400, or a ratio, such as \"400/1.25\"";
@@ -135,7 +143,7 @@ Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
 
 Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
   if (reader.has("backlash")) {
-    const auto backlash = reader.number("backlash", "a number other than 0");
+    const auto backlash = reader.number("backlash", "a number; 0 is none");
     if (!backlash) return fail(backlash.error());
     const auto steps = motor->coordinates.steps_of_distance(*backlash);
     if (!steps) return fail(reader.error("backlash", steps.error().message));
@@ -143,9 +151,9 @@ Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
       return fail(reader.error(
           "backlash", fmt::format("is {}; allowed without `unit`: whole steps", *backlash)));
     }
-    if (*steps == 0) {
+    if (*steps == 0 && *backlash != 0) {
       return fail(reader.error("backlash", fmt::format("is {}, which is no step; allowed: one "
-                                                       "step or more, or leave the key out",
+                                                       "step or more, or 0: none",
                                                        *backlash)));
     }
     motor->backlash = *backlash;
@@ -172,12 +180,12 @@ Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
 }  // namespace
 
 Result<void> read_coordinates(const TomlReader& reader, Motor* motor) {
-  if (reader.has("description")) {
+  if (says_something(reader, "description")) {
     auto description = read_line(reader, "description", kLongestDescription);
     if (!description) return fail(description.error());
     motor->description = std::move(*description);
   }
-  if (reader.has("unit")) {
+  if (says_something(reader, "unit")) {
     if (auto read = read_scale(reader, motor); !read) return read;
   } else {
     for (const char* key : {"steps_per_unit", "direction", "offset", "precision"}) {

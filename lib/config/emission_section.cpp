@@ -76,7 +76,7 @@ Result<fieldbus::EmissionSetup> read_emission(const TomlReader& reader) {
                                std::uint16_t* us) -> Result<void> {
     return reader.has(key) ? read_us(reader, key, lowest, us) : Result<void>{};
   };
-  if (auto read = optional_us("settle_us", 1, &settings.settle_us); !read) {
+  if (auto read = optional_us("settle_us", 0, &settings.settle_us); !read) {
     return fail(read.error());
   }
   if (settings.mode == BUSHD_EMISSION_BURST || settings.mode == BUSHD_EMISSION_STAGGERED) {

@@ -32,10 +32,11 @@ Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
   if (auto read = read_active(reader, "emergency_active", &mcu->emergency_active_open); !read) {
     return read;
   }
-  if (reader.has("emergency_active") && !reader.has("emergency_input")) {
+  if (reader.has("emergency_active") && mcu->emergency_input == BUSHD_EMERGENCY_INPUT_IGNORED) {
     return fail(reader.error("emergency_active",
-                             "applies only with emergency_input; allowed: beside "
-                             "emergency_input = \"ramp\", \"immediate\" or \"ignore\""));
+                             "says nothing while the input is ignored; allowed: beside "
+                             "emergency_input = \"ramp\" or \"immediate\". Add one of them, or "
+                             "remove this key"));
   }
   if (reader.has("debounce_ticks")) {
     const auto ticks = reader.integer("debounce_ticks", 0, BUSHD_MAX_DEBOUNCE_TICKS);

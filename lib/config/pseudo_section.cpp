@@ -181,6 +181,9 @@ Result<PseudoLaw> read_linear(const TomlReader& reader, const Pseudo& pseudo) {
   std::string_view key = "kind";
   if (reader.has("kind")) {
     if (auto kind = read_word(reader, "kind", {"slit"}); !kind) return fail(kind.error());
+    if (reader.has("matrix")) {
+      return fail(reader.error("matrix", "does not go with `kind`; allowed: one of the two keys"));
+    }
     if (pseudo.axes.size() != 2 || pseudo.motors.size() != 2) {
       return fail(
           reader.error("kind",

@@ -58,11 +58,21 @@ TEST(ConfigCoordinates, NumbersOfStepsPerUnit) {
   }
 }
 
+TEST(ConfigCoordinates, ZeroAndEmptyTextAreNone) {
+  const auto config =
+      ConfigFile(with_coordinates("backlash = 0\nunit = \"\"\ndescription = \"\"\n")).load();
+  ASSERT_TRUE(config) << config.error().text();
+  const Motor& motor = config->motors[1];
+  EXPECT_EQ(motor.backlash, 0);
+  EXPECT_FALSE(motor.coordinates.has_unit());
+  EXPECT_EQ(motor.description, "");
+}
+
 TEST(ConfigCoordinates, WhatCannotBeIsRefusedWithItsLineAndKey) {
   const std::string unit = "unit = \"mm\"\nsteps_per_unit = 400\n";
   for (const auto& [keys, error] : {
            std::pair<std::string, const char*>{"unit = \"\"\nsteps_per_unit = 1\n",
-                                               "37:8: motor[1].unit: is not allowed"},
+                                               "38:18: motor[1].steps_per_unit: needs `unit`"},
            {"unit = \"m\\u001bm\"\nsteps_per_unit = 1\n", "motor[1].unit: is not allowed"},
            {"unit = \"steps\"\nsteps_per_unit = 1\n", "37:8: motor[1].unit: is \"steps\", which"},
            {"unit = \"mm\"\n", "motor[1].steps_per_unit: is missing"},
@@ -108,7 +118,6 @@ TEST(ConfigCoordinates, Backlash) {
 TEST(ConfigCoordinates, ABadBacklashIsRefusedWithItsLine) {
   const std::string mm = "unit = \"mm\"\nsteps_per_unit = 400\n";
   for (const auto& [keys, reason] : std::initializer_list<std::pair<std::string, std::string>>{
-           {"backlash = 0\n", "37:12: motor[1].backlash: is 0, which is no step"},
            {mm + "backlash = 0.001\n", "39:12: motor[1].backlash: is 0.001, which is no step"},
            {"backlash = 0.5\n", "37:12: motor[1].backlash: "},
            {"backlash = 3e9\n", "37:12: motor[1].backlash: "},

@@ -113,5 +113,26 @@ TEST(EmissionKeys, PhasesHaveFourOutputsAMotor) {
                 "take 4 outputs a motor"));
 }
 
+// What no MCU can do is found before one is asked.
+TEST(EmissionKeys, WhatNoMcuCanDoIsRefused) {
+  EXPECT_THAT(emission_error(with_keys("dir_setup_us = 65535\n")),
+              HasSubstr("19:16: mcu[0].dir_setup_us: is 65535 us; allowed: less than the length of "
+                        "the 2560 us tick of bus \"hall\", 2520 us at most"));
+  EXPECT_THAT(emission_error(with_keys("dir_setup_us = 2560\n")), HasSubstr("is 2560 us"));
+  EXPECT_EQ(settings_of("dir_setup_us = 2400\n").dir_setup_us, 2400);
+  // Half a slot is 2520 / 256 us.
+  EXPECT_THAT(
+      emission_error(with_keys("pulse_us = 10\n")),
+      HasSubstr("mcu[0].pulse_us: is 10 us; allowed: half a slot of the 2560 us tick of bus "
+                "\"hall\", 9 us at most. Use a longer tick_us"));
+  EXPECT_EQ(settings_of("pulse_us = 9\n").pulse_us, 9);
+  EXPECT_THAT(
+      emission_error(with_keys("emission = \"common-dir\"\nstep_us = 300\ndir_setup_us = 10\n")),
+      HasSubstr(
+          "mcu[0].dir_setup_us: is 10 us; allowed: less than half a slot of the 2560 us tick"));
+  EXPECT_THAT(emission_error(with_keys("emission = \"burst\"\nstep_us = 2560\n")),
+              HasSubstr("mcu[0].step_us: is 2560"));
+}
+
 }  // namespace
 }  // namespace bushd::config

@@ -115,6 +115,8 @@ TEST(ConfigPseudo, WhatCannotBeIsRefused) {
       pseudo_error(replaced(kSlit, "\"centre\"]", "\"centre\", \"x\"]") + "kind = \"slit\"\n"),
       HasSubstr("kind: is \"slit\", which has two axes"));
   EXPECT_THAT(pseudo_error(kSlit + "kind = \"table\"\n"), HasSubstr("allowed: \"slit\""));
+  EXPECT_THAT(pseudo_error(matrix + "kind = \"slit\"\n"),
+              HasSubstr("matrix: does not go with `kind`; allowed: one of the two keys"));
 }
 
 }  // namespace
