@@ -318,7 +318,7 @@ Tick Axis::end_of(const Place& place) const {
     return place.tick + (place.path.stands() ? 1 : 0) + (left_ns + tick_ns_ - 1) / tick_ns_;
   }
   const auto units = static_cast<std::int64_t>(bushd_run_units_left(&place.run));
-  const std::int64_t ns = units * table_->time_unit_ns - (units == 0 ? 0 : place.run.since_ns);
+  const std::int64_t ns = units * run_table().time_unit_ns - (units == 0 ? 0 : place.run.since_ns);
   return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
 }
 
