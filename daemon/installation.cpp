@@ -169,7 +169,7 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
   return motors;
 }
 
-link::LineRun Mcu::line_run(const motion::LineShare& share, std::uint16_t floor,
+link::LineRun Mcu::line_run(const motion::LineShare& share, bushd_delay floor,
                             link::Tick ticks) const {
   // What really begins has its table there. A dry run may ask before: this is where it would be.
   const auto slot = master_.slot_of(on_bus_, share.table->view());
@@ -192,8 +192,9 @@ bool Installation::rests(const Mcu& mcu) const {
   return !any_moves(mcu) && (!mcu.online() || mcu.report().moving == 0);
 }
 
-bool Installation::by_table(const Mcu& mcu, std::int64_t steps) const {
+bool Installation::by_table(const Mcu& mcu, std::int64_t steps, bushd_delay floor) const {
   return (bus_of(mcu).config.table_runs || !mcu.streams()) && mcu.can_run_tables() &&
+         (bushd_delay_is_code(floor) || mcu.can_run_slowly()) &&
          std::abs(steps) <= motion::Motor::kMaxPosition;
 }
 

@@ -92,13 +92,14 @@ class Mcu {
   // Its drivers are disabled at rest (IdleDrivers), and enabled when one of its motors is to move.
   bool asleep = false;
   bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
+  bool can_run_slowly() const { return master_.can_run_slowly(on_bus_); }
   bool has_table(const bushd_table& table) const {
     return master_.slot_of(on_bus_, table).has_value();
   }
-  bool keeps_up_with(const bushd_table& table, std::uint16_t floor, bool alone) const {
+  bool keeps_up_with(const bushd_table& table, bushd_delay floor, bool alone) const {
     return master_.keeps_up_with(on_bus_, table, floor, alone);
   }
-  bool can_run_line(const bushd_table& table, std::uint16_t floor, bool alone) const {
+  bool can_run_line(const bushd_table& table, bushd_delay floor, bool alone) const {
     return master_.can_run_line(on_bus_, table, floor, alone);
   }
   bool makes_lines() const { return master_.makes_lines(on_bus_); }
@@ -137,8 +138,7 @@ class Mcu {
   }
   // Of a motor's share that the MCUs are to make themselves, in so many ticks. Precondition:
   // can_run_line of its line, or its table is yet to be uploaded.
-  link::LineRun line_run(const motion::LineShare& share, std::uint16_t floor,
-                         link::Tick ticks) const;
+  link::LineRun line_run(const motion::LineShare& share, bushd_delay floor, link::Tick ticks) const;
   link::LineRun line_run(const motion::Axis& axis) const {
     return line_run(*axis.line(), axis.floor(), axis.over_tick() - axis.start_tick());
   }
@@ -225,7 +225,7 @@ class Installation {
   bool any_moves(const Mcu& mcu) const;  // or is not at rest
   bool rests(const Mcu& mcu) const;      // all of it, as planned and as reported
   // The MCU gets such a move as a whole and runs it by the motor's table.
-  bool by_table(const Mcu& mcu, std::int64_t steps) const;
+  bool by_table(const Mcu& mcu, std::int64_t steps, bushd_delay floor) const;
 
   // By the names that clients use; none of them twice.
   Result<MotorId> find(const std::string& name) const;

@@ -13,8 +13,16 @@ namespace {
 constexpr std::uint64_t kMaxFrames = 3000;
 
 api::MovePlan::Motor plan_of(const std::string& name, bushd_table table, std::int64_t steps,
-                             std::uint16_t floor) {
-  table.cruise = std::max(table.cruise, floor);  // the same move (engine/run.h)
+                             bushd_delay floor) {
+  if (!bushd_delay_is_code(floor)) {  // the delay of all
+    const double delay_s = static_cast<double>(floor) * table.time_unit_ns * 1e-9;
+    const double all_us = delay_s * 1e6 * static_cast<double>(std::abs(steps));
+    return {.motor = name,
+            .steps = steps,
+            .duration_us = static_cast<std::int64_t>(all_us),
+            .peak_steps_per_s = steps == 0 ? 0.0 : 1 / delay_s};
+  }
+  table.cruise = std::max(table.cruise, static_cast<std::uint16_t>(floor));  // the same move
   const auto time = tables::move_time(table, static_cast<std::uint32_t>(std::abs(steps)));
   return {
       .motor = name,
@@ -26,7 +34,7 @@ api::MovePlan::Motor plan_of(const std::string& name, bushd_table table, std::in
 
 // As long as the run, which is as fast as its share of it.
 api::MovePlan::Motor plan_of_line(const std::string& name, const motion::LineShare& share,
-                                  std::int64_t steps, std::uint16_t floor) {
+                                  std::int64_t steps, bushd_delay floor) {
   if (share.track) {
     const motion::Path& path = share.track->path();
     const double ns = static_cast<double>(share.track->units()) * path.unit_ns();
@@ -65,7 +73,7 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                        .steps = steps,
                        .floor = floor,
                        .start = mcu.earliest_start(now_us, motor.output()),
-                       .by_table = !line && installation.by_table(mcu, steps),
+                       .by_table = !line && installation.by_table(mcu, steps, floor),
                        .tick_ns = bus.tick_ns(),
                        .format = bus.format,
                        .table = installation.table_of(id),

@@ -25,7 +25,7 @@ class DryRun {
   struct Part {
     MotorId motor;  // at rest; the legs of one motor stand together, in their order
     std::int64_t steps;
-    std::uint16_t floor;
+    bushd_delay floor;
     std::optional<std::int64_t> from_steps{};  // none: where it stands
     std::optional<motion::LineShare> line{};   // of its run, whose floor it is; all start together
   };
@@ -49,7 +49,7 @@ class DryRun {
     Output output;
     std::int64_t from_steps;
     std::int64_t steps;
-    std::uint16_t floor;
+    bushd_delay floor;
     link::Tick start;
     bool by_table;
     std::uint32_t tick_ns;

@@ -1,5 +1,7 @@
 #include "daemon/services/homing_queue.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -111,7 +113,11 @@ Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) co
     if (const auto may = may_home(motor); !may) {
       return fail(installation_[motor].name() + ": " + may.error().text());
     }
-    if (const auto floor = floor_of(motor, request.speed); !floor) return fail(floor.error());
+    const auto floor = floor_of(motor, request.speed);
+    if (!floor) return fail(floor.error());
+    if (const auto may = may_home_by(motor, *floor); !may) {
+      return fail(installation_[motor].name() + ": " + may.error().text());
+    }
   }
   return motors;
 }
@@ -146,8 +152,24 @@ Result<void> HomingQueue::may_home(MotorId id) const {
                                                message.slow_steps);
 }
 
-Result<std::uint16_t> HomingQueue::floor_of(MotorId id,
-                                            const std::optional<api::Speed>& speed) const {
+// An MCU without slow runs is told no longer delays than 16 bits hold.
+Result<void> HomingQueue::may_home_by(MotorId id, bushd_delay floor) const {
+  const Mcu& mcu = installation_.mcu_of(id);
+  if (mcu.can_run_slowly()) return {};
+  const bushd_home message = message_for({.motor = id, .floor = floor});
+  if (bushd_delay_is_code(message.floor) && bushd_delay_is_code(message.slow_delay)) return {};
+  const double slowest_ns =
+      std::min(static_cast<double>(installation_.table_of(id)->view().time_unit_ns),
+               static_cast<double>(BUSHD_HOME_UNIT_NS)) *
+      UINT16_MAX;
+  return fail(fmt::format(
+      "MCU {} cannot home it so slowly; ask for {:.6g} steps/s or more (--speed --steps, or speed "
+      "of its home)",
+      mcu.name(), 1e9 / slowest_ns));
+}
+
+Result<bushd_delay> HomingQueue::floor_of(MotorId id,
+                                          const std::optional<api::Speed>& speed) const {
   const auto& home = installation_.config()[id].home;
   std::optional<api::Speed> asked = speed;
   if (!asked && home && home->speed) asked = api::Speed{.per_s = *home->speed};
@@ -161,7 +183,8 @@ bushd_home HomingQueue::message_for(const Task& task) const {
   const config::Motor& motor = installation_.config()[id];
   const config::Home& home = *motor.home;
   const bushd_table& table = installation_.table_of(id)->view();
-  const std::uint64_t first = std::max({table.accel.code[0], table.decel.code[0], task.floor});
+  const std::uint64_t first =
+      std::max<std::uint64_t>({table.accel.code[0], table.decel.code[0], task.floor});
   const std::uint64_t slow_ns = std::max<std::uint64_t>(
       {first * table.time_unit_ns, installation_.config().bus_of(motor).tick_ns(),
        1'000'000'000u / home.slow_steps_per_s});
@@ -171,7 +194,7 @@ bushd_home HomingQueue::message_for(const Task& task) const {
           .most_steps = home.most_steps,
           .floor = task.floor,
           .slow_steps = home.slow_most_steps.value_or(table.decel.count + kMoreSlowSteps),
-          .slow_delay = static_cast<std::uint16_t>(std::min<std::uint64_t>(units, UINT16_MAX)),
+          .slow_delay = units,
           .position_steps = home.position_steps};
 }
 
@@ -458,7 +481,9 @@ void HomingQueue::goes_online(Mcu& mcu) {
     const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
     if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
     const auto floor = floor_of(id, {});
-    if (const auto may = floor ? may_home(id) : fail(floor.error()); !may) {
+    auto may = floor ? may_home(id) : fail(floor.error());
+    if (may) may = may_home_by(id, *floor);
+    if (!may) {
       outputs_.log(LogLevel::kWarning, id, motor.name() + " is not homed: " + may.error().text());
       continue;
     }

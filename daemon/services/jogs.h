@@ -32,7 +32,7 @@ class Jogs final : public Service {
   struct Course {
     int direction;
     std::int64_t target;
-    std::uint16_t floor;
+    bushd_delay floor;
   };
   struct Jog {
     api::Asker opened_by;  // whose result it is

@@ -266,23 +266,20 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   if (line.points.size() > 1) {
     return refuse("the line ends in a last approach for backlash; " + stop);
   }
-  std::vector<std::uint16_t> floors;
+  std::vector<bushd_delay> floors;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     const motion::Motor& motor = installation_[line.motors[i]];
     if (motor.axis().stopping() || motor.is_paused() || motor.as<motion::OnLine>()->stands) {
       return refuse(motor.name() + " is being stopped or paused; wait for that, or resume it");
     }
-    auto floor = moves_.floor_of(line.motors[i], request.speed);
-    if (floor) floor = floor_on(line, i, *floor);
+    const auto floor = moves_.floor_of(line.motors[i], request.speed);
     if (!floor) return refuse(floor.error().text());
-    floors.push_back(*floor);
+    floors.push_back(floor_on(line, i, *floor));
   }
   std::vector<units::Steps> targets;
   const auto step = step_of(line, motors, request, targets);
   if (!step) return refuse(step.error().text());
-  if (!line.way.set_floors(floors)) {
-    return refuse("that is slower than this line can be told; " + stop);
-  }
+  line.way.set_floors(floors);
   asker.answer(api::Accepted{});
   moves_.take_over(line.motors, asker);
   line.target = *step;

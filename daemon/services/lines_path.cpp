@@ -194,7 +194,7 @@ Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request)
   const Line& line = incoming.line;
   const std::size_t width = line.motors.size();
   std::vector<std::int64_t> point(width);
-  std::vector<std::uint16_t> floors;
+  std::vector<bushd_delay> floors;
   for (std::size_t at = 0; at < request.positions.size(); at += width) {
     const std::int32_t row = ++incoming.rows;
     for (std::size_t m = 0; m < width; ++m) {
@@ -223,7 +223,7 @@ Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request)
 }
 
 // Of the way to a point of a motor with speeds.
-Result<std::uint16_t> Lines::floor_to(Incoming& incoming, std::int64_t point, double speed) const {
+Result<bushd_delay> Lines::floor_to(Incoming& incoming, std::int64_t point, double speed) const {
   const Line& line = incoming.line;
   const MotorId id = line.motors.front();
   const std::int64_t way = point - line.path->point(line.path->segments(), 0);

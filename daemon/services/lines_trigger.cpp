@@ -115,7 +115,7 @@ Result<void> Lines::check_table(const Line& line, const Mcu& mcu) const {
 
 void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
-  const std::uint16_t floor = line.way.floor();
+  const bushd_delay floor = line.way.floor();
   std::map<McuId, std::vector<link::BusMaster::ArmedOnLine>> parts;
   std::vector<motion::LineShare> shares;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {

@@ -105,16 +105,15 @@ Result<std::vector<Lines::Point>> Lines::points_of(const Line& line,
     if (!legs) return fail(motor.name() + ": " + legs.error().message);
     const motion::Leg& last = legs->back();
     const bool straight = legs->size() == 1;
-    const auto fast = floor_on(line, i, *floor);
-    const auto slow = floor_on(line, i, last.floor);
-    if (!fast || !slow) return fail(fast ? slow.error() : fast.error());
+    const bushd_delay fast = floor_on(line, i, *floor);
+    const bushd_delay slow = floor_on(line, i, last.floor);
     approach = approach || !straight;
     to.steps.push_back(target->whole);
-    to.floors.push_back(straight ? *slow : *fast);
+    to.floors.push_back(straight ? slow : fast);
     back.steps.push_back(straight ? target->whole : legs->front().target);
-    back.floors.push_back(*fast);
+    back.floors.push_back(fast);
     again.steps.push_back(target->whole);
-    again.floors.push_back(*slow);
+    again.floors.push_back(slow);
     to.asked_for.push_back(*target);
     again.asked_for.push_back(*target);
   }
@@ -128,18 +127,11 @@ const tables::TablePtr& Lines::table_of(const Line& line, std::size_t motor) con
 }
 
 // A floor of the motor, which is in units of its own table, in those of the table that it goes by.
-Result<std::uint16_t> Lines::floor_on(const Line& line, std::size_t motor,
-                                      std::uint16_t floor) const {
+bushd_delay Lines::floor_on(const Line& line, std::size_t motor, bushd_delay floor) const {
   if (!line.by) return floor;
   const std::uint64_t unit_ns = line.by->view().time_unit_ns;
   const std::uint64_t own_ns = installation_.table_of(line.motors[motor])->view().time_unit_ns;
-  const std::uint64_t units = (floor * own_ns + unit_ns - 1) / unit_ns;
-  if (units <= UINT16_MAX) return static_cast<std::uint16_t>(units);
-  return fail(
-      fmt::format("{}: a step of {:.3g} s is slower than table {} can tell; raise its "
-                  "max_speed or backlash_speed, or give the table a longer time unit",
-                  installation_[line.motors[motor]].name(),
-                  static_cast<double>(floor * own_ns) * 1e-9, line.by->name()));
+  return (floor * own_ns + unit_ns - 1) / unit_ns;
 }
 
 motion::Way Lines::lay(const Line& line, const std::vector<std::int64_t>& from,

@@ -65,7 +65,7 @@ Result<Moves::Part> Moves::part_of(MotorId motor, const api::Amount& amount,
   return Part{.motor = motor, .target = *target, .legs = std::move(*legs)};
 }
 
-Result<std::uint16_t> Moves::floor_of(MotorId id, const std::optional<api::Speed>& speed) const {
+Result<bushd_delay> Moves::floor_of(MotorId id, const std::optional<api::Speed>& speed) const {
   const motion::Motor& motor = installation_[id];
   auto floor = motor.floor_at(speed);
   if (!floor) return fail(motor.name() + ": " + floor.error().message);
@@ -73,7 +73,7 @@ Result<std::uint16_t> Moves::floor_of(MotorId id, const std::optional<api::Speed
 }
 
 Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api::Move::Kind kind,
-                                      std::uint16_t floor) const {
+                                      bushd_delay floor) const {
   const motion::Motor& motor = installation_[id];
   const bool absolute = kind == api::Move::Kind::kAbsolute;
   const auto counted = absolute ? motor.position_of(amount) : motor.distance_of(amount);
@@ -186,7 +186,7 @@ void Moves::take_over(const std::vector<MotorId>& motors, const api::Asker& by) 
 }
 
 void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::int64_t target,
-                std::uint16_t floor) {
+                bushd_delay floor) {
   while (begins()) begin_next();
   motion::Motor& motor = installation_[id];
   if (motor.has_plan()) take_over({id}, asker);
@@ -199,13 +199,13 @@ void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::i
   start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), floor);
 }
 
-void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target, std::uint16_t floor) {
+void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target, bushd_delay floor) {
   installation_[id].aim(target, floor);
   open_.planned(id, 1, installation_[id].axis().most_steps_per_s(floor));
   retarget(now_us, {id});
 }
 
-void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, std::uint16_t floor) {
+void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, bushd_delay floor) {
   installation_[id].start(target, start, floor);
   begin(id);
 }
@@ -229,7 +229,8 @@ void Moves::begin(MotorId id) {
   const motion::Tick start = motor.axis().start_tick();
   const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
   // A jog will change, and of what is streamed only ticks that have not been run can be taken back.
-  const bool by_table = installation_.by_table(mcu, steps) && !(mcu.streams() && motor.jogs());
+  const bool by_table =
+      installation_.by_table(mcu, steps, motor.axis().floor()) && !(mcu.streams() && motor.jogs());
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));

@@ -1,5 +1,7 @@
 #include "daemon/services/trigger.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -57,13 +59,13 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
   if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
   const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    if (auto may = may_arm((*motors)[i], steps[i]); !may) return fail(may.error());
+    if (auto may = may_arm((*motors)[i], steps[i], request); !may) return fail(may.error());
   }
   return motors;
 }
 
 // Precondition, as of what follows: motors_of has no objection.
-std::uint16_t Trigger::floor_of(MotorId motor, const api::Arm& request) const {
+bushd_delay Trigger::floor_of(MotorId motor, const api::Arm& request) const {
   return *moves_.floor_of(motor, request.speed);
 }
 
@@ -83,7 +85,7 @@ std::vector<std::int64_t> Trigger::steps_of(const std::vector<MotorId>& motors,
   return steps;
 }
 
-Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
+Result<void> Trigger::may_arm(MotorId id, std::int64_t steps, const api::Arm& request) const {
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
   if (steps == 0) return fail(motor.name() + ": a move of no steps");
@@ -93,6 +95,12 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps) const {
   if (!mcu.can_trigger() || !mcu.can_run_tables()) {
     return fail(motor.name() + ": MCU " + mcu.name() +
                 " has no trigger input; move it without one, or by an MCU that has");
+  }
+  if (!bushd_delay_is_code(floor_of(id, request)) && !mcu.can_run_slowly()) {
+    return fail(fmt::format(
+        "{}: MCU {} makes no steps that are so slow by itself; ask for {:.6g} steps/s or more "
+        "(--speed --steps), or move it without a trigger",
+        motor.name(), mcu.name(), 1e9 / UINT16_MAX / motor.axis().time_unit_ns()));
   }
   for (const MotorId other : mcu.motors()) {
     if (!installation_[other].is<motion::Armed>()) continue;

@@ -43,8 +43,8 @@ class Trigger final : public Service {
   units::Steps target_of(MotorId motor, const api::Amount& amount, const api::Arm& request) const;
   std::vector<std::int64_t> steps_of(const std::vector<MotorId>& motors,
                                      const api::Arm& request) const;
-  std::uint16_t floor_of(MotorId motor, const api::Arm& request) const;
-  Result<void> may_arm(MotorId motor, std::int64_t steps) const;
+  bushd_delay floor_of(MotorId motor, const api::Arm& request) const;
+  Result<void> may_arm(MotorId motor, std::int64_t steps, const api::Arm& request) const;
   void follow();
 
   Installation& installation_;

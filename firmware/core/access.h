@@ -34,6 +34,11 @@ static inline const bushd_table* bushd_mcu_table_of(const bushd_mcu* mcu,
   return &mcu->tables.slot[motor->table].table;
 }
 
+// Whether it makes runs with such a delay (BUSHD_CAN_SLOW_RUNS).
+static inline bool bushd_mcu_runs_so_slowly(const bushd_mcu* mcu, bushd_delay delay) {
+  return bushd_delay_is_code(delay) || !mcu->config.no_slow_runs;
+}
+
 // Whether each step keeps the slot of its own time; if not, the emission makes the masks from the
 // counts.
 static inline bool bushd_mcu_steps_keep_slots(const bushd_mcu* mcu) {

@@ -20,7 +20,9 @@ static uint16_t speed_of(const bushd_mcu* mcu, uint8_t m) {
   if (motor->exact && motor->mode != BUSHD_MCU_STREAM) {
     if (motor->mode == BUSHD_MCU_VELOCITY) return bushd_mcu_velocity_period(mcu, m);
     const bool on_line = (mcu->line.motors & motor_bit(m)) != 0;
-    return on_line ? bushd_mcu_line_delay(mcu, m) : bushd_run_delay(&motor->made.run);
+    if (on_line) return bushd_mcu_line_delay(mcu, m);
+    const bushd_delay delay = bushd_run_delay(&motor->made.run);
+    return bushd_delay_is_code(delay) ? (uint16_t)delay : UINT16_MAX;
   }
   if (mcu->format == BUSHD_FORMAT_FINE) {
     return (motor->displacement & BUSHD_MCU_SELDOM) != 0 ? (uint16_t)1 : motor->displacement;

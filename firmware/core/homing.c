@@ -39,8 +39,13 @@ static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
   bushd_mcu_homing* homing = &mcu->homing;
   homing->stage = (uint8_t)stage;
   homing->readings = 0;
+#if BUSHD_SLOW_RUNS
+  const bushd_delay floor = homing->slow_floor;
+#else
+  const bushd_delay floor = 0;
+#endif
   bushd_run_start(&mcu->motor[homing->motor].made.run, &homing->slow, homing->slow_steps, direction,
-                  0);
+                  floor);
 }
 
 static void end(bushd_mcu* mcu, bushd_homing stage) {
@@ -179,6 +184,7 @@ static bool slow_enough(const bushd_mcu* mcu, const bushd_home* message) {
   const uint16_t first = bushd_table_accel(table, 0);
   const uint16_t last = bushd_table_decel(table, 0);
   const uint64_t slowest_ns = (uint64_t)(first > last ? first : last) * table->time_unit_ns;
+  if (!bushd_delay_is_code(message->slow_delay)) return true;  // 0.6 s are more than any of these
   const uint32_t slow_ns = (uint32_t)message->slow_delay * BUSHD_HOME_UNIT_NS;
   return slow_ns >= mcu->tick_ns && slow_ns >= slowest_ns;
 }
@@ -234,6 +240,10 @@ static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
 bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   bushd_mcu_homing* homing = &mcu->homing;
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+  if (!bushd_mcu_runs_so_slowly(mcu, message->floor) ||
+      !bushd_mcu_runs_so_slowly(mcu, message->slow_delay)) {
+    return BUSHD_E_LENGTH;
+  }
   const bool same = under_way(homing) && homing->motor == message->motor;
   if (message->most_steps == 0) {
     if (same) bushd_mcu_ramp_down_run(mcu, message->motor);
@@ -253,7 +263,13 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   homing->most_steps = message->most_steps;
   homing->slow_steps = message->slow_steps;
   homing->home_steps = message->position_steps;
-  homing->slow.cruise = message->slow_delay;
+  homing->slow.cruise = (uint16_t)message->slow_delay;
+#if BUSHD_SLOW_RUNS
+  if (!bushd_delay_is_code(message->slow_delay)) {
+    homing->slow.cruise = UINT16_MAX;
+    homing->slow_floor = message->slow_delay;
+  }
+#endif
   homing->slow.accel.code = homing->slow.decel.code = &homing->slow.cruise;
   homing->slow.accel.count = homing->slow.decel.count = 1;
   homing->slow.time_unit_ns = BUSHD_HOME_UNIT_NS;

@@ -272,7 +272,7 @@ uint16_t bushd_mcu_line_delay(const bushd_mcu* mcu, uint8_t m) {
 static void note_speed(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   const bushd_run* run = &mcu->line.run;
   const uint32_t units = bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table)->units;
-  const uint32_t of_run = units * 256u / bushd_run_delay(run);  // 15 bits
+  const uint32_t of_run = units * 256u / (uint16_t)bushd_run_delay(run);  // 15 bits
   motor->displacement = (uint16_t)(of_run * motor->on_line.share >> 16);
   motor->still_ticks = 0;
 }

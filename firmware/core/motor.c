@@ -96,12 +96,22 @@ __attribute__((noinline)) static void emit_runs(bushd_mcu* mcu, bushd_slot_buffe
 // tick.
 static void leave_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   bushd_run* run = &motor->made.run;
-  const uint16_t delay = bushd_run_delay(run);
+  const bushd_delay delay = bushd_run_delay(run);
   if (delay == 0 || mcu->format != BUSHD_FORMAT_FINE) return;
   bushd_run_note_fraction(run);
   motor->remainder = (int16_t)(run->direction < 0 ? -run->fraction : run->fraction);
-  motor->displacement = (uint16_t)(run_tick_of(mcu, motor)->units * 256u / delay);
+  const uint32_t units = run_tick_of(mcu, motor)->units;
   motor->still_ticks = 0;
+#if BUSHD_SLOW_RUNS
+  // Less than 1/256 step a tick: then by the time for one (note_speed).
+  if (!bushd_delay_is_code(delay) && delay > (uint64_t)units * 256u) {
+    const uint64_t apart = delay / (units * UINT64_C(256) + 1u) + 1u;
+    const uint16_t most = (uint16_t)(BUSHD_MCU_SELDOM - 1u);
+    motor->displacement = (uint16_t)(BUSHD_MCU_SELDOM + (apart < most ? (uint16_t)apart : most));
+    return;
+  }
+#endif
+  motor->displacement = (uint16_t)(units * 256u / delay);
 }
 
 static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t tick) {

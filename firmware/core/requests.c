@@ -101,6 +101,7 @@ static uint32_t capabilities_of(const bushd_mcu* mcu) {
   if (mcu->config.velocity_motors != 0) all |= BUSHD_CAN_VELOCITY;
   if (mcu->config.keypad) all |= BUSHD_CAN_KEYPAD;
   if (mcu->config.scratch != NULL) all |= BUSHD_CAN_SCRATCH;
+  if (BUSHD_SLOW_RUNS && !mcu->config.no_slow_runs) all |= BUSHD_CAN_SLOW_RUNS;
   return all & ~(uint32_t)mcu->config.disabled_capabilities;
 }
 

@@ -11,6 +11,36 @@
 #include "firmware/core/table_run.h"
 #include "firmware/core/velocity.h"
 
+// By the last displacement of the fine format. One of 1/256 step may be of any slower speed: then
+// by the time between two of them. 0: there was none.
+typedef struct last_way {
+  uint16_t displacement;
+  uint16_t ticks;
+} last_way;
+
+static last_way last_way_of(const bushd_mcu_motor* motor) {
+  const bool seldom = (motor->displacement & BUSHD_MCU_SELDOM) != 0;
+  const uint16_t ticks = (uint16_t)(motor->still_ticks + 1u);
+  const uint16_t apart = seldom ? motor->displacement & (uint16_t)~BUSHD_MCU_SELDOM : 0;
+  const last_way way = {seldom ? 1u : motor->displacement, apart > ticks ? apart : ticks};
+  return way;
+}
+
+// Of a delay that is told as 65535 time units, and may be longer: in the fine format the last
+// displacement, or the time between two of 1/256 step, tells by how much. One that is less than
+// twice as long may be a table's own. Whether the running step, of which `progress`/256 are over,
+// takes too long to be waited for then.
+static bool waits_too_long(const bushd_mcu* mcu, uint8_t m, uint8_t progress) {
+  const bushd_mcu_motor* motor = &mcu->motor[m];
+  const last_way way = last_way_of(motor);
+  if (mcu->format != BUSHD_FORMAT_FINE || way.displacement == 0) return false;
+  const uint64_t time_ns = (uint64_t)mcu->tick_ns * way.ticks;
+  const uint64_t told_ns = (uint64_t)bushd_mcu_table_of(mcu, motor)->time_unit_ns * UINT16_MAX;
+  if (time_ns * 128u <= told_ns * way.displacement) return false;
+  return way.ticks > UINT8_MAX ||
+         time_ns * (256u - progress) > (uint64_t)BUSHD_RUN_WAITS_NS * way.displacement;
+}
+
 void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   const bushd_table* table = bushd_mcu_table_of(mcu, motor);
@@ -21,6 +51,7 @@ void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay) {
   // that share is unknown, and taking it as 0 makes the next step late rather than early.
   const int32_t progress = (int32_t)motor->remainder * direction;
   const uint8_t fraction = progress > 0 && progress < 256 ? (uint8_t)progress : 0;
+  if (delay == UINT16_MAX && waits_too_long(mcu, m, fraction)) delay = 0;
   bushd_run_start_ramp_down(&motor->made.run, table, delay, fraction, direction);
   motor->exact = false;
   if (!bushd_run_done(&motor->made.run)) {
@@ -121,15 +152,11 @@ static uint16_t delay_for(const bushd_mcu* mcu, const bushd_mcu_motor* motor, ui
   return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;
 }
 
-// By the last displacement. One of 1/256 step in the fine format may be of any slower speed: then
-// by the time between two of them. 0: it all but stands.
+// 0: it all but stands.
 static uint16_t fine_delay(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
-  const bool seldom = (motor->displacement & BUSHD_MCU_SELDOM) != 0;
-  const uint16_t ticks = (uint16_t)(motor->still_ticks + 1u);
-  const uint16_t apart = seldom ? motor->displacement & (uint16_t)~BUSHD_MCU_SELDOM : 0;
-  const uint16_t most = apart > ticks ? apart : ticks;
-  if (most > UINT8_MAX || motor->displacement == 0) return 0;
-  return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * most, seldom ? 1u : motor->displacement);
+  const last_way way = last_way_of(motor);
+  if (way.ticks > UINT8_MAX || way.displacement == 0) return 0;
+  return delay_for(mcu, motor, (uint64_t)mcu->tick_ns * way.ticks, way.displacement);
 }
 
 // The delay of the running step of a stream. In the fine format the last displacement tells it. In

@@ -487,7 +487,7 @@ bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks*
     restore(mcu, &entry, &run);
     open_motor(mcu, entry.motor, &range);
     put_run(mcu, entry.motor, &range, &run);
-    close_motor(mcu, entry.motor, &range, bushd_run_delay(&run));
+    close_motor(mcu, entry.motor, &range, (uint16_t)bushd_run_delay(&run));
   }
   close_tick_range(mcu, &range);
   return BUSHD_OK;

@@ -52,6 +52,7 @@ static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
   const bushd_mcu_motor* motor = &mcu->motor[entry->motor];
   if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
   if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
+  if (!bushd_mcu_runs_so_slowly(mcu, entry->floor)) return BUSHD_E_FORMAT;
   // There is room for one run.
   return motor->mode == BUSHD_MCU_STREAM ? BUSHD_OK : BUSHD_E_STATE;
 }
@@ -114,7 +115,7 @@ uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction)
 }
 
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
-                               uint16_t floor) {
+                               bushd_delay floor) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction, floor);
   motor->mode = BUSHD_MCU_AUTONOMOUS;

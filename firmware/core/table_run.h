@@ -29,7 +29,7 @@ uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction)
 // ends: it is `autonomous` until it rests. `floor`: as of bushd_run_start. Precondition: so many
 // steps are counted.
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
-                               uint16_t floor);
+                               bushd_delay floor);
 // Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
 // since stays so.
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);

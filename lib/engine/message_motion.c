@@ -3,6 +3,23 @@
 
 #define POLL_ENTRY 3u
 
+// Delays of 48 bits, of which the low 16 stand where shorter ones have theirs, or 0 does. An MCU
+// without runs that are so slow knows none.
+#if BUSHD_SLOW_RUNS
+#define LONG_DELAY 6
+static inline uint32_t high_of(bushd_delay delay) {
+  return (uint32_t)(delay >> 16);
+}
+static inline bushd_delay with_high(uint16_t low, uint32_t high) {
+  return (bushd_delay)high << 16 | low;
+}
+#else
+static inline uint32_t high_of(bushd_delay delay) {
+  (void)delay;
+  return 0;
+}
+#endif
+
 size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload) {
   writer w = {payload};
   put8(&w, count);
@@ -226,18 +243,34 @@ static void put_run_entries(writer* w, const bushd_table_run_entry* entries, uin
     uint8_t head = (uint8_t)(entries[i].motor | entries[i].slot << HEAD_SLOT_SHIFT);
     if (entries[i].direction > 0) head |= HEAD_POSITIVE;
     put8(w, head);
-    put32(w, entries[i].steps | (entries[i].floor != 0 ? STEPS_FLOOR : 0));
-    if (entries[i].floor != 0) put16(w, entries[i].floor);
+    const bushd_delay floor = entries[i].floor;
+    put32(w, entries[i].steps | (floor != 0 ? STEPS_FLOOR : 0));
+    if (floor == 0) continue;
+    if (high_of(floor) != 0) put16(w, 0);
+    put16(w, (uint16_t)floor);
+    if (high_of(floor) != 0) put32(w, high_of(floor));
   }
 }
 
 // `in_range`: a floor that is announced is one.
+static bushd_delay get_floor(reader* r, bool* in_range) {
+  const uint16_t floor = get16(r);
+  if (floor != 0) return floor;
+#if BUSHD_SLOW_RUNS
+  if (r->end - r->at >= LONG_DELAY) {
+    const uint16_t low = get16(r);
+    const uint32_t high = get32(r);
+    if (high != 0) return with_high(low, high);
+  }
+#endif
+  *in_range = false;
+  return 0;
+}
+
 static bushd_table_run_entry get_run_entry(reader* r, bool* in_range) {
   const uint8_t head = get8(r);
   const uint32_t steps = get32(r);
-  const bool has_floor = (steps & STEPS_FLOOR) != 0;
-  const uint16_t floor = has_floor ? get16(r) : 0;
-  if (has_floor && floor == 0) *in_range = false;
+  const bushd_delay floor = (steps & STEPS_FLOOR) != 0 ? get_floor(r, in_range) : (bushd_delay)0;
   const bushd_table_run_entry entry = {(uint8_t)(head & HEAD_MOTOR),
                                        (uint8_t)(head >> HEAD_SLOT_SHIFT & 7u),
                                        head & HEAD_POSITIVE ? 1 : -1, steps & ~STEPS_FLOOR, floor};
@@ -346,10 +379,14 @@ size_t bushd_encode_home(const bushd_home* message, uint8_t* payload) {
   put8(&w, message->motor);
   put8(&w, (uint8_t)message->direction);
   put32(&w, message->most_steps);
-  put16(&w, message->floor);
+  put16(&w, (uint16_t)message->floor);
   put32(&w, message->slow_steps);
-  put16(&w, message->slow_delay);
+  put16(&w, (uint16_t)message->slow_delay);
   put32(&w, (uint32_t)message->position_steps);
+  if ((high_of(message->floor) | high_of(message->slow_delay)) != 0) {
+    put32(&w, high_of(message->floor));
+    put32(&w, high_of(message->slow_delay));
+  }
   return (size_t)(w.at - payload);
 }
 
@@ -362,7 +399,17 @@ bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* 
   message->slow_steps = get32(&r);
   message->slow_delay = get16(&r);
   message->position_steps = (int32_t)get32(&r);
-  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU &&
+  bool in_range = true;
+#if BUSHD_SLOW_RUNS
+  if (r.at != r.end) {
+    const uint32_t floor = get32(&r);
+    const uint32_t slow_delay = get32(&r);
+    message->floor = with_high((uint16_t)message->floor, floor);
+    message->slow_delay = with_high((uint16_t)message->slow_delay, slow_delay);
+    in_range = (floor | slow_delay) != 0;
+  }
+#endif
+  return finish(&r, in_range && message->motor < BUSHD_MOTORS_PER_MCU &&
                         (message->direction == 1 || message->direction == -1) &&
                         message->most_steps <= INT32_MAX && message->slow_steps >= 1 &&
                         message->slow_steps <= INT32_MAX && message->slow_delay >= 1);

@@ -14,7 +14,7 @@
 #include "engine/run.h"
 
 // First index of a side whose code is <= delay.
-static uint16_t codes_above(const bushd_ramp* ramp, uint16_t delay) {
+static uint16_t codes_above(const bushd_ramp* ramp, bushd_delay delay) {
   uint16_t low = 0;
   uint16_t high = ramp->count;
   while (low < high) {
@@ -78,12 +78,12 @@ static void cut(bushd_run* run, uint16_t first, uint32_t steps) {
   run->decel_left = down;
 }
 
-static uint16_t cruise_above(const bushd_table* table, uint16_t floor) {
+static bushd_delay cruise_above(const bushd_table* table, bushd_delay floor) {
   return floor > table->cruise ? floor : table->cruise;
 }
 
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction,
-                     uint16_t floor) {
+                     bushd_delay floor) {
   clear(run, table, direction);
   run->cruise = cruise_above(table, floor);
   cut(run, 0, steps);
@@ -92,7 +92,7 @@ void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, i
 void bushd_run_begin_late(bushd_run* run, uint32_t ns) {
   const uint32_t unit_ns = run->table->time_unit_ns;
   const uint32_t units = ns / unit_ns + (ns % unit_ns != 0);
-  run->since = 0u - units;
+  run->since = 0u - (bushd_since)units;
   run->since_ns = units * unit_ns - ns;
 }
 
@@ -116,12 +116,13 @@ void bushd_run_leave_out_slow(bushd_run* run) {
 // delay x unit - (since x unit + since_ns) > BUSHD_RUN_WAITS_NS, in 32 bits.
 static bool waits_too_long(const bushd_run* run) {
   const uint32_t unit_ns = run->table->time_unit_ns;
-  const int32_t more = (int32_t)(run->lead_delay - run->since - longest_wait(run));
+  const bushd_since left = run->lead_delay - run->since;
+  const bushd_signed_since more = (bushd_signed_since)(left - longest_wait(run));
   if (more <= 0) return false;
   return more > 1 || run->since_ns < unit_ns - BUSHD_RUN_WAITS_NS % unit_ns;
 }
 
-static void lead_then_ramp_down(bushd_run* run, uint16_t delay) {
+static void lead_then_ramp_down(bushd_run* run, bushd_delay delay) {
   run->lead_delay = delay;
   run->accel_at = run->accel_end;
 #if BUSHD_RUN_BRAKES
@@ -139,14 +140,14 @@ static void rest_if_it_waits(bushd_run* run) {
   run->accel_at = run->accel_end;
 }
 
-void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
+void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, bushd_delay delay,
                                uint8_t fraction, int direction) {
   clear(run, table, direction);
   if (delay == 0) return;
   // Rounded up to whole ns: rounded down, the position would first fall back behind `fraction`.
   const uint32_t unit_ns = table->time_unit_ns;
   const uint64_t over_ns = ((uint64_t)delay * unit_ns * fraction + 255u) / 256u;
-  run->since = (uint32_t)(over_ns / unit_ns);
+  run->since = (bushd_since)(over_ns / unit_ns);
   run->since_ns = (uint32_t)(over_ns % unit_ns);
   run->fraction = fraction;
   lead_then_ramp_down(run, delay);
@@ -154,7 +155,7 @@ void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_
 }
 
 void bushd_run_ramp_down_after_step(bushd_run* run) {
-  const uint16_t delay = bushd_run_delay(run);
+  const bushd_delay delay = bushd_run_delay(run);
   if (delay != 0) lead_then_ramp_down(run, delay);
 }
 
@@ -175,8 +176,8 @@ static void brake(bushd_run* run, uint32_t to_stop, uint32_t steps) {
   run->decel_left = decel_codes;
 }
 
-bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, uint16_t floor) {
-  const uint16_t delay = bushd_run_delay(run);
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, bushd_delay floor) {
+  const bushd_delay delay = bushd_run_delay(run);
   if (delay == 0) return false;
   const uint32_t to_stop = bushd_table_steps_to_stop(run->table, delay);
   if (to_stop > steps_after) return false;
@@ -206,7 +207,7 @@ static inline uint16_t brake_left(const bushd_run* run) {
 #endif
 }
 
-uint16_t bushd_run_delay(const bushd_run* run) {
+bushd_delay bushd_run_delay(const bushd_run* run) {
   if (run->lead_delay != 0) return run->lead_delay;
   if (run->accel_at < run->accel_end) return run->table->accel.code[run->accel_at];
   if (brake_left(run) != 0) return run->table->decel.code[run->decel_left + brake_left(run) - 1];
@@ -216,8 +217,8 @@ uint16_t bushd_run_delay(const bushd_run* run) {
 }
 
 #if BUSHD_RUN_BRAKES
-uint16_t bushd_run_take_step(bushd_run* run) {
-  const uint16_t delay = bushd_run_delay(run);
+bushd_delay bushd_run_take_step(bushd_run* run) {
+  const bushd_delay delay = bushd_run_delay(run);
   if (delay == 0) return 0;
   if (run->lead_delay != 0) {
     run->lead_delay = 0;
@@ -263,10 +264,17 @@ uint64_t bushd_run_units_left(const bushd_run* run) {
   // Where steps are left out, accel_at may lie beyond the side.
   const bool rises = run->accel_at < run->accel_end;
   const uint32_t rising = rises ? units_between(&table->accel, run->accel_at, run->accel_end) : 0u;
-  return (uint64_t)run->lead_delay + rising + (uint64_t)run->cruise_left * run->cruise +
+  uint64_t cruising = (uint64_t)run->cruise_left * run->cruise;
+#if BUSHD_SLOW_RUNS
+  if (__builtin_mul_overflow(run->cruise_left, run->cruise, &cruising) ||
+      cruising > INT64_MAX / 2) {
+    cruising = INT64_MAX / 2;
+  }
+#endif
+  return (uint64_t)run->lead_delay + rising + cruising +
          units_between(&table->decel, bushd_run_decel_end(run),
                        (uint16_t)(run->decel_left + brake_left(run))) -
-         (uint64_t)(int32_t)run->since;
+         (uint64_t)(bushd_signed_since)run->since;
 }
 
 #if BUSHD_RAMP_INDEX
@@ -282,7 +290,7 @@ static uint32_t look_up(const bushd_ramp* ramp, uint32_t units) {
 
 static uint16_t look_up_accel(bushd_run* run) {
   const bushd_ramp* ramp = &run->table->accel;
-  const uint32_t now = ramp->sum[run->accel_at] + run->since;
+  const uint32_t now = ramp->sum[run->accel_at] + (uint32_t)run->since;
   const bool over = now >= ramp->sum[run->accel_end];
   const uint16_t i = over ? run->accel_end : (uint16_t)look_up(ramp, now);
   run->since = now - ramp->sum[i];
@@ -295,7 +303,7 @@ static uint16_t look_up_decel(bushd_run* run) {
   const bushd_ramp* ramp = &run->table->decel;
   const uint16_t end = bushd_run_decel_end(run);
   const uint32_t whole = ramp->sum[run->decel_left];
-  const uint32_t remaining = whole - run->since;
+  const uint32_t remaining = whole - (uint32_t)run->since;
   const bool over = run->since >= whole - ramp->sum[end];
   const uint16_t left = over ? end : (uint16_t)(look_up(ramp, remaining - 1) + 1);
   run->since = ramp->sum[left] - remaining;
@@ -320,9 +328,16 @@ static uint32_t advance_accel(bushd_run* run) {
 }
 
 static uint32_t advance_cruise(bushd_run* run) {
+  if (run->since < run->cruise) return 0;
+#if BUSHD_SLOW_RUNS
+  // A tick is less than 32 bits, but for what it begins with, and that is less than a delay.
+  uint32_t steps = bushd_delay_is_code(run->cruise) ? (uint32_t)run->since / (uint16_t)run->cruise
+                                                    : (uint32_t)(run->since / run->cruise);
+#else
   uint32_t steps = run->since / run->cruise;
+#endif
   if (steps > run->cruise_left) steps = run->cruise_left;
-  run->since -= steps * run->cruise;
+  run->since -= (bushd_since)steps * run->cruise;
   run->cruise_left -= steps;
   return steps;
 }
@@ -448,7 +463,7 @@ static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t 
   const bushd_ramp* ramp = &run->table->accel;
   if (ramp->sum == NULL) return 0;
   uint32_t i = run->accel_at;
-  uint32_t now = ramp->sum[i] + run->since;
+  uint32_t now = ramp->sum[i] + (uint32_t)run->since;
   const uint32_t safe = safe_ramp_ticks(ramp, tick, ramp->sum[run->accel_end] - now);
   if (ticks > safe) ticks = (size_t)safe;
   if (tick->rest_ns == 0) {
@@ -469,7 +484,7 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   // One unit before the time that remains, the step that runs is the fewest left, less one
   // (advance_decel).
   uint32_t i = run->decel_left - 1u;
-  uint32_t now = ramp->sum[run->decel_left] - run->since - 1;
+  uint32_t now = ramp->sum[run->decel_left] - (uint32_t)run->since - 1;
   const uint32_t safe = safe_ramp_ticks(ramp, tick, now + 1 - ramp->sum[bushd_run_decel_end(run)]);
   if (ticks > safe) ticks = (size_t)safe;
   if (tick->rest_ns == 0) {
@@ -485,18 +500,17 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
 
 static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t ticks,
                                   coarse_out out) {
-  const uint16_t cruise = run->cruise;
   // In units if ticks are whole units, else in ns: one remainder to carry instead of two.
   const bool in_ns = tick->rest_ns != 0;
   const int64_t scale = in_ns ? tick->unit_ns : 1;
-  const int64_t delay = cruise * scale;
+  const int64_t delay = (int64_t)run->cruise * scale;
   const int64_t tick_length = in_ns ? tick->whole * scale + tick->rest_ns : tick->whole;
   const uint32_t whole = (uint32_t)(tick_length / delay);
   const int64_t rest = tick_length - whole * delay;
   const uint32_t safe = run->cruise_left / (whole + 1);
   if (ticks > safe) ticks = (size_t)safe;
   // Kept negative: what is missing to the next step.
-  int64_t missing = run->since * scale + (in_ns ? run->since_ns : 0) - delay;
+  int64_t missing = (int64_t)run->since * scale + (in_ns ? run->since_ns : 0) - delay;
   const uint8_t byte = (uint8_t)(whole | out.direction_bit);
   uint32_t extra = 0;
   for (size_t n = 0; n < ticks; ++n) {
@@ -509,7 +523,7 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
     out.at += out.stride;
   }
   const int64_t since = missing + delay;
-  run->since = (uint32_t)(in_ns ? since / scale : since);
+  run->since = (bushd_since)(in_ns ? since / scale : since);
   if (in_ns) run->since_ns = (uint32_t)(since % scale);
   const uint32_t steps = (uint32_t)ticks * whole + extra;
   run->cruise_left -= steps;
@@ -558,6 +572,17 @@ static uint32_t sub_units(uint32_t since_ns, uint32_t unit_ns) {
   return (uint32_t)((uint64_t)since_ns * 256u / unit_ns);
 }
 
+// Of the running delay, 1/256 rounded down.
+static inline uint32_t fraction_now(const bushd_run* run, uint32_t unit_ns) {
+  const bushd_delay delay = bushd_run_delay(run);
+  if (delay == 0) return 0;
+  const uint32_t rest = sub_units(run->since_ns, unit_ns);
+#if BUSHD_SLOW_RUNS
+  if (!bushd_delay_is_code(delay)) return (uint32_t)((run->since * 256u + rest) / delay);
+#endif
+  return ((uint32_t)run->since * 256u + rest) / (uint16_t)delay;
+}
+
 size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int16_t* out,
                              size_t stride) {
   const tick_units tick = in_units(run, tick_ns);
@@ -565,9 +590,7 @@ size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int
   while (n < ticks && !bushd_run_done(run)) {
     const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
     bushd_run_count(run, steps);
-    const uint16_t delay = bushd_run_delay(run);
-    const uint32_t fraction =
-        delay == 0 ? 0 : (run->since * 256u + sub_units(run->since_ns, tick.unit_ns)) / delay;
+    const uint32_t fraction = fraction_now(run, tick.unit_ns);
     const int32_t displacement = (int32_t)(steps * 256u + fraction) - (int32_t)run->fraction;
     run->fraction = (uint8_t)fraction;
     out[n++ * stride] = (int16_t)(displacement * run->direction);

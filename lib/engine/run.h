@@ -40,14 +40,14 @@ typedef struct bushd_run {
   uint32_t steps_done;
 #endif
   uint32_t cruise_left;  // steps left at the cruise delay
-  uint32_t since;        // whole time units since the last step; before the run begins (begin_late)
-                         // negative, modulo 2^32
+  bushd_since since;     // whole time units since the last step; before the run begins (begin_late)
+                         // negative
   uint32_t since_ns;     // and the rest, < time_unit_ns
-  uint16_t cruise;       // the table's cruise delay, or the run's floor above it
-  uint16_t lead_delay;   // of a step with a delay of its own, before all others; 0: none
-  uint16_t accel_at;     // next index on the accelerating side
-  uint16_t accel_end;    // and where that part ends; of a ramp-down, where it lies before accel_at,
-                         // so many steps at its end are left out
+  bushd_delay cruise;    // the table's cruise delay, or the run's floor above it
+  bushd_delay lead_delay;  // of a step with a delay of its own, before all others; 0: none
+  uint16_t accel_at;       // next index on the accelerating side
+  uint16_t accel_end;  // and where that part ends; of a ramp-down, where it lies before accel_at,
+                       // so many steps at its end are left out
 #if BUSHD_RUN_BRAKES
   uint16_t brake_left;  // steps on the decelerating side before those at the cruise delay
 #endif
@@ -78,17 +78,18 @@ static inline void bushd_run_count(bushd_run* run, uint32_t steps) {
 
 // A move of `steps` (>= 0) from rest; direction is +1 or -1. The first tick expanded is the one in
 // which the move starts at its beginning. O(log steps).
-//   floor  no delay is shorter, time units; the table's own delays where they are longer. 0: none
+//   floor  no delay is shorter, time units; the table's own delays where they are longer. 0: none.
+//          Beyond all codes it is the delay of every step
 // Precondition: the table passed bushd_table_check.
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction,
-                     uint16_t floor);
+                     bushd_delay floor);
 
 // Puts the beginning of a run that has just been started `ns` after the beginning of its first
 // tick. Precondition: ns < length of the ticks that it will be expanded in. O(1).
 void bushd_run_begin_late(bushd_run* run, uint32_t ns);
 // Its first tick has not been expanded: it begins later in it. O(1).
 static inline bool bushd_run_begins_later(const bushd_run* run) {
-  return (int32_t)run->since < 0;
+  return (bushd_signed_since)run->since < 0;
 }
 
 // A ramp-down waits for no step that is to come later: a motor that slow may just stand. The
@@ -99,7 +100,7 @@ static inline bool bushd_run_begins_later(const bushd_run* run) {
 // A ramp-down taken up in the middle of a step whose delay is `delay`, of which fraction/256
 // (rounded up to whole ns) is over: that step, then D(k-1) .. D(0), but for those that it does not
 // wait for. It is what an MCU runs when its queue ends early. O(log count).
-void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, uint16_t delay,
+void bushd_run_start_ramp_down(bushd_run* run, const bushd_table* table, bushd_delay delay,
                                uint8_t fraction, int direction);
 
 // Shortens the run to the nearest end that its table allows: the running step is completed, then
@@ -124,7 +125,7 @@ void bushd_run_leave_out_slow(bushd_run* run);
 // so that the run goes on speeding up, slows down to its floor, holds cruise, or ramps down,
 // whatever it did before. Returns false, and changes nothing, if a ramp-down takes more steps than
 // that (the run would overshoot) or the run is done. O(log steps).
-bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, uint16_t floor);
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, bushd_delay floor);
 
 // The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of
 // the run they are 0. If that came in the middle of a step, the first fine one after it leads back
@@ -138,17 +139,17 @@ size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int
                              size_t stride);
 
 // The delay of the step that is running, time units; 0 when the run is done. O(1).
-uint16_t bushd_run_delay(const bushd_run* run);
+bushd_delay bushd_run_delay(const bushd_run* run);
 bool bushd_run_done(const bushd_run* run);
 #if BUSHD_RUN_BRAKES
 // Makes the next step, whenever that is: returns the delay before it, time units; 0 when the run is
 // done. What is over of the running step is forgotten. O(1).
-uint16_t bushd_run_take_step(bushd_run* run);
+bushd_delay bushd_run_take_step(bushd_run* run);
 #endif
 // Steps still to be made. O(1).
 uint32_t bushd_run_steps_left(const bushd_run* run);
-// Time from now to the last step, in time units and rounded up. O(steps left on the ramps) without
-// an index, else O(1).
+// Time from now to the last step, in time units and rounded up; what 62 bits do not hold is cut
+// off. O(steps left on the ramps) without an index, else O(1).
 uint64_t bushd_run_units_left(const bushd_run* run);
 
 #ifdef __cplusplus

@@ -28,7 +28,7 @@ void bushd_run_ramp_down_once(bushd_run* run);
 #define BUSHD_SLOW_LINE_DELAY_NS UINT32_C(270000)
 // Where other motors of the MCU may be streamed meanwhile.
 #define BUSHD_SHARED_LINE_DELAY_NS UINT32_C(400000)
-bool bushd_run_is_slow(const bushd_table* table, uint16_t floor, uint32_t tick_ns,
+bool bushd_run_is_slow(const bushd_table* table, bushd_delay floor, uint32_t tick_ns,
                        uint32_t delay_ns);
 
 #ifdef __cplusplus

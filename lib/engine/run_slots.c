@@ -179,7 +179,7 @@ static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_p
     uint64_t rate = 0;
     part->rate = &tick->per_cruise;
     if (run->cruise != tick->cruise) {
-      bushd_run_move_place(&rate, &tick->per_unit, run->cruise);
+      bushd_run_move_place(&rate, &tick->per_unit, (uint16_t)run->cruise);
       part->rate = &rate;
     }
     bushd_run_make_evenly(part);
@@ -221,8 +221,9 @@ __attribute__((noinline)) static int16_t make_by_places(bushd_run* run, const bu
   while (true) {
     steps = (int16_t)(steps + make_part(run, tick, &part));
     if (part.left != 0) break;
-    part.delay = bushd_run_delay(run);
-    if (part.delay == 0 || part.since < part.delay) break;
+    const bushd_delay next = bushd_run_delay(run);
+    if (next == 0 || part.since < next) break;
+    part.delay = (uint16_t)next;
     bushd_run_move_place(&part.place, &tick->per_unit, part.delay);
   }
   run->since = part.since;
@@ -231,8 +232,8 @@ __attribute__((noinline)) static int16_t make_by_places(bushd_run* run, const bu
 
 // The same, for all times: `since` may be beyond 16 bits.
 __attribute__((noinline)) static int16_t make_by_rests(bushd_run* run, const bushd_run_tick* tick,
-                                                       uint32_t since, uint16_t delay, uint16_t bit,
-                                                       uint16_t* masks) {
+                                                       bushd_since since, bushd_delay delay,
+                                                       uint16_t bit, uint16_t* masks) {
   const uint16_t slot_count = tick->slot_count;
   const scaled_ns unit_slots = (scaled_ns)tick->unit_ns * slot_count;
   scaled_ns rest = (scaled_ns)((delay - run->since) * tick->unit_ns - run->since_ns) * slot_count;
@@ -261,15 +262,16 @@ static uint8_t carry_rest(const bushd_run* run, const bushd_run_tick* tick, uint
 }
 
 __attribute__((noinline)) static int16_t make_any(bushd_run* run, const bushd_run_tick* tick,
-                                                  uint16_t delay, uint16_t bit, uint16_t* masks) {
-  uint32_t since = run->since + tick->units;
+                                                  bushd_delay delay, uint16_t bit,
+                                                  uint16_t* masks) {
+  bushd_since since = run->since + tick->units;
   uint32_t since_ns = run->since_ns;
   if (tick->rest_ns != 0) since += carry_rest(run, tick, &since_ns);
   int16_t steps = 0;
   if (since < delay) {
     run->since = since;
   } else if (tick->has_places && since <= UINT16_MAX) {
-    steps = make_by_places(run, tick, (uint16_t)since, delay, bit, masks);
+    steps = make_by_places(run, tick, (uint16_t)since, (uint16_t)delay, bit, masks);
   } else {
     steps = make_by_rests(run, tick, since, delay, bit, masks);
   }
@@ -278,7 +280,7 @@ __attribute__((noinline)) static int16_t make_any(bushd_run* run, const bushd_ru
 }
 
 int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit, uint16_t* masks) {
-  const uint16_t delay = bushd_run_delay(run);
+  const bushd_delay delay = bushd_run_delay(run);
   if (delay == 0) return 0;
   // Mostly 16 bits will do.
   const uint16_t before = (uint16_t)run->since;
@@ -289,7 +291,7 @@ int16_t bushd_run_slots(bushd_run* run, const bushd_run_tick* tick, uint16_t bit
   } else if (since < delay) {
     run->since = since;
   } else {
-    steps = make_by_places(run, tick, since, delay, bit, masks);
+    steps = make_by_places(run, tick, since, (uint16_t)delay, bit, masks);
   }
   return run->direction < 0 ? (int16_t)-steps : steps;
 }
@@ -302,14 +304,14 @@ void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bush
   spans->masks = masks;
   spans->slot_count = tick->slot_count;
   walk->tick = tick;
-  walk->since = run->since + tick->units;
+  walk->since = (uint32_t)run->since + tick->units;
   walk->since_ns = run->since_ns;
   if (tick->rest_ns != 0) walk->since += carry_rest(run, tick, &walk->since_ns);
   walk->over = false;
   walk->place = 0;
   if (!tick->has_places) return;
   const bool later = bushd_run_begins_later(run);
-  const uint16_t units = (uint16_t)(later ? 0u - run->since : run->since);
+  const uint16_t units = (uint16_t)(later ? 0u - (uint32_t)run->since : (uint32_t)run->since);
   bushd_run_move_place(&walk->place, &tick->per_unit, units);
   if (!later) walk->place = 0 - walk->place;
   if (run->since_ns == 0) return;
@@ -365,26 +367,27 @@ static uint8_t take_spans(bushd_run_walk* walk, const uint16_t* code, int8_t str
 }
 
 // The part of the run that is next: `left` steps, 0 if the run is done, whose delays are every
-// `stride`th code.
+// `stride`th code, or all `same` if there is none.
 typedef struct part_codes {
   const uint16_t* code;
   uint32_t left;
+  uint16_t same;
   int8_t stride;
 } part_codes;
 
 static part_codes codes_of(const bushd_run* run) {
   const uint16_t* const accel = run->table->accel.code;
   const uint16_t* const decel = run->table->decel.code;
-  if (run->lead_delay != 0) return (part_codes){&run->lead_delay, 1, 0};
+  if (run->lead_delay != 0) return (part_codes){NULL, 1, (uint16_t)run->lead_delay, 0};
   if (run->accel_at < run->accel_end) {
-    return (part_codes){accel + run->accel_at, (uint32_t)(run->accel_end - run->accel_at), 1};
+    return (part_codes){accel + run->accel_at, (uint32_t)(run->accel_end - run->accel_at), 0, 1};
   }
-  if (run->cruise_left != 0) return (part_codes){&run->cruise, run->cruise_left, 0};
+  if (run->cruise_left != 0) return (part_codes){NULL, run->cruise_left, (uint16_t)run->cruise, 0};
   if (run->decel_left != 0) {
     const uint16_t left = (uint16_t)(run->decel_left - bushd_run_decel_end(run));
-    return (part_codes){decel + run->decel_left - 1, left, -1};
+    return (part_codes){decel + run->decel_left - 1, left, 0, -1};
   }
-  return (part_codes){decel, 0, 0};
+  return (part_codes){decel, 0, 0, 0};
 }
 
 static void walk_part(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* spans) {
@@ -395,7 +398,8 @@ static void walk_part(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* spa
     walk->over = true;
     return;
   }
-  const uint8_t made = take_spans(walk, codes.code, codes.stride, most, &spans->span[spans->count]);
+  const uint16_t* const code = codes.code != NULL ? codes.code : &codes.same;
+  const uint8_t made = take_spans(walk, code, codes.stride, most, &spans->span[spans->count]);
   if (made != 0) make_steps(run, made);
   spans->count = (uint8_t)(spans->count + made + (walk->over ? 1 : 0));
 }
@@ -418,9 +422,18 @@ bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* 
 }
 
 void bushd_run_note_fraction(bushd_run* run) {
-  const uint16_t delay = bushd_run_delay(run);
+  const bushd_delay delay = bushd_run_delay(run);
+#if BUSHD_SLOW_RUNS
+  if (!bushd_delay_is_code(delay)) {
+    const uint32_t unit_ns = run->table->time_unit_ns;
+    const uint64_t rest = (uint64_t)run->since_ns * 256u / unit_ns;
+    run->fraction = (uint8_t)((run->since * 256u + rest) / delay);
+    return;
+  }
+#endif
   uint8_t low = 0;
   if (run->since_ns != 0) low = share(run->since_ns, 0, run->table->time_unit_ns);
   // Less than the delay, since the step that runs is not over.
-  run->fraction = delay == 0 ? (uint8_t)0 : bushd_run_share((uint16_t)run->since, low, delay);
+  run->fraction =
+      delay == 0 ? (uint8_t)0 : bushd_run_share((uint16_t)run->since, low, (uint16_t)delay);
 }

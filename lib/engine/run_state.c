@@ -17,16 +17,22 @@ bool bushd_run_has_state(const bushd_run* run) {
   if (run->brake_left != 0) return false;
 #endif
   // All that would come after the running step is left out.
-  return left != 1 || bushd_table_decel(run->table, 0) <= bushd_run_delay(run);
+  if (left == 1 && bushd_table_decel(run->table, 0) > bushd_run_delay(run)) return false;
+  return bushd_delay_is_code(bushd_run_delay(run)) && bushd_delay_is_code(run->cruise);
 }
 
 bushd_run_state bushd_run_save(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
-  const uint16_t cruise = run->cruise == run->table->cruise ? (uint16_t)0 : run->cruise;
-  const bushd_run_state state = {run->direction,       cruises(run, tick_ns, ticks),
-                                 (uint16_t)run->since, run->since_ns,
-                                 run->lead_delay,      run->accel_at,
-                                 run->accel_end,       run->cruise_left,
-                                 run->decel_left,      cruise};
+  const uint16_t cruise = run->cruise == run->table->cruise ? (uint16_t)0 : (uint16_t)run->cruise;
+  const bushd_run_state state = {run->direction,
+                                 cruises(run, tick_ns, ticks),
+                                 (uint16_t)run->since,
+                                 run->since_ns,
+                                 (uint16_t)run->lead_delay,
+                                 run->accel_at,
+                                 run->accel_end,
+                                 run->cruise_left,
+                                 run->decel_left,
+                                 cruise};
   return state;
 }
 
@@ -106,14 +112,14 @@ bool bushd_run_restore(bushd_run* run, const bushd_table* table, const bushd_run
     if (state->lead_delay != 0) return false;
     run->cruise_left = UINT32_MAX;
   } else {
-    if (!parts_fit(table, run->cruise, state)) return false;
+    if (!parts_fit(table, (uint16_t)run->cruise, state)) return false;
     run->lead_delay = state->lead_delay;
     run->accel_at = state->accel_at;
     run->accel_end = state->accel_end;
     run->cruise_left = state->cruise_left;
     run->decel_left = state->decel_left;
   }
-  const uint16_t delay = bushd_run_delay(run);
+  const bushd_delay delay = bushd_run_delay(run);
   if (state->since >= delay || state->since_ns >= table->time_unit_ns) return false;
   run->since = state->since;
   run->since_ns = state->since_ns;

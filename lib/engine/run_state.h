@@ -26,7 +26,8 @@ typedef struct bushd_run_state {
 } bushd_run_state;
 
 // Whether its state may be told: it is not done, has begun (bushd_run_begin_late), does not brake
-// (bushd_run_retarget), and leaves out no steps (bushd_run_ramp_down). O(1).
+// (bushd_run_retarget), leaves out no steps (bushd_run_ramp_down), and its delays have 16 bits.
+// O(1).
 bool bushd_run_has_state(const bushd_run* run);
 
 // The state of a run, for going on with it for `ticks` ticks. Precondition: bushd_run_has_state,

@@ -52,7 +52,7 @@ uint16_t bushd_table_delay(const bushd_table* table, uint32_t j, uint32_t n) {
   return delay;
 }
 
-uint32_t bushd_table_steps_to_stop(const bushd_table* table, uint16_t delay) {
+uint32_t bushd_table_steps_to_stop(const bushd_table* table, bushd_delay delay) {
   // D(k) never rises with k, and is the cruise delay from `count` on: binary search for the first
   // D(k) <= delay. A delay below cruise cannot be running; the whole side is then the honest
   // answer.

@@ -24,6 +24,37 @@ extern "C" {
 #define BUSHD_RAMP_INDEX 1
 #endif
 
+// Runs may have delays beyond the 16 bits of a code. A build for a small MCU does without, and with
+// the memory for it.
+#ifndef BUSHD_SLOW_RUNS
+#define BUSHD_SLOW_RUNS 1
+#endif
+
+// Of a run, in time units: `bushd_delay` before a step, `bushd_since` after the last one, which may
+// be negative, modulo its width.
+#if BUSHD_SLOW_RUNS
+typedef uint64_t bushd_delay;
+typedef uint64_t bushd_since;
+typedef int64_t bushd_signed_since;
+#else
+typedef uint16_t bushd_delay;
+typedef uint32_t bushd_since;
+typedef int32_t bushd_signed_since;
+#endif
+
+// Whether it has the 16 bits of a code.
+static inline bool bushd_delay_is_code(bushd_delay delay) {
+#if BUSHD_SLOW_RUNS
+  return delay <= UINT16_MAX;
+#else
+  (void)delay;
+  return true;
+#endif
+}
+
+// No step takes longer.
+#define BUSHD_LONGEST_DELAY_NS UINT64_C(3600000000000)
+
 // One side of a table, ordered from slow to fast: code[0] is the delay next to rest.
 // The index is optional (all set or all NULL): with it a run finds its place in a ramp in constant
 // time (bushd_ramp_index makes it); without, it walks the codes. Results agree.
@@ -58,7 +89,7 @@ uint16_t bushd_table_delay(const bushd_table* table, uint32_t j, uint32_t n);
 
 // The fewest steps k with D(k) <= delay: after a step made at `delay` a ramp-down takes k more
 // steps, with the delays D(k-1) .. D(0). O(log count).
-uint32_t bushd_table_steps_to_stop(const bushd_table* table, uint16_t delay);
+uint32_t bushd_table_steps_to_stop(const bushd_table* table, bushd_delay delay);
 
 // The shortest delay that any move with this table can have, in time units. O(1).
 uint16_t bushd_table_fastest(const bushd_table* table);

@@ -207,13 +207,14 @@ void Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const 
   synchroniser_.lines_run(true);
 }
 
-bool Master::can_run_line(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
+bool Master::can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay floor,
                           bool alone) const {
   return makes_lines(mcu) && slot_of(mcu, table) && keeps_up_with(mcu, table, floor, alone);
 }
 
-bool Master::keeps_up_with(McuIndex mcu, const bushd_table& table, std::uint16_t floor,
+bool Master::keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay floor,
                            bool alone) const {
+  if (!bushd_delay_is_code(floor)) return false;  // LINE_RUN cannot tell it
   if (can(mcu, BUSHD_CAN_TABLE_TICKS)) return true;
   return bushd_run_is_slow(&table, floor, setup_.tick_ns,
                            alone ? BUSHD_SLOW_LINE_DELAY_NS : BUSHD_SHARED_LINE_DELAY_NS);

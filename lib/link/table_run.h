@@ -10,8 +10,8 @@
 namespace bushd::link {
 
 struct TableRun {
-  std::int32_t steps;       // either sign, not 0
-  std::uint16_t floor = 0;  // of bushd_run_start
+  std::int32_t steps;     // either sign, not 0
+  bushd_delay floor = 0;  // of bushd_run_start
 };
 
 // A motor's part of a run that all motors of its line follow, on whatever MCU. All but the last two
@@ -19,7 +19,7 @@ struct TableRun {
 // line (engine/message_line.h).
 struct LineRun {
   std::uint8_t slot;  // of the run's table
-  std::uint16_t floor;
+  bushd_delay floor;  // a code (engine/table.h)
   std::uint32_t longest;
   std::uint32_t from;
   std::uint32_t steps;
@@ -33,7 +33,7 @@ using McuRun = std::variant<TableRun, LineRun>;
 // What the motors of an MCU have in common of a line's run.
 inline bushd_line_part line_part_of(const LineRun& run) {
   return {.slot = run.slot,
-          .floor = run.floor,
+          .floor = static_cast<std::uint16_t>(run.floor),
           .longest = run.longest,
           .from = run.from,
           .steps = run.steps,

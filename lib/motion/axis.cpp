@@ -28,20 +28,25 @@ bool ramps_down(const bushd_run& run) {
 
 }  // namespace
 
-double Axis::duration_ticks(std::int64_t steps, std::uint16_t floor) const {
+double Axis::duration_ticks(std::int64_t steps, bushd_delay floor) const {
+  const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
+  if (!bushd_delay_is_code(floor)) {  // the delay of all, maybe longer than units are counted
+    return std::ceil(static_cast<double>(count) * static_cast<double>(floor) *
+                     table_->time_unit_ns / tick_ns_);
+  }
   bushd_run run;
-  bushd_run_start(&run, table_, static_cast<std::uint32_t>(steps < 0 ? -steps : steps), 1, floor);
+  bushd_run_start(&run, table_, count, 1, floor);
   const double ns = static_cast<double>(bushd_run_units_left(&run)) * table_->time_unit_ns;
   return std::ceil(ns / tick_ns_);
 }
 
-double Axis::most_steps_per_s(std::uint16_t floor) const {
-  const std::uint16_t delay = std::max(bushd_table_fastest(table_), floor);
+double Axis::most_steps_per_s(bushd_delay floor) const {
+  const bushd_delay delay = std::max<bushd_delay>(bushd_table_fastest(table_), floor);
   return 1e9 / (static_cast<double>(delay) * table_->time_unit_ns);
 }
 
 void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns,
-                 std::uint16_t floor) {
+                 bushd_delay floor) {
   busy_ = true;
   start_ = start;
   late_ns_ = late_ns;
@@ -60,12 +65,12 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::u
   plan_end();
 }
 
-void Axis::restart(bushd_run& run, std::uint32_t steps, int direction, std::uint16_t floor) const {
+void Axis::restart(bushd_run& run, std::uint32_t steps, int direction, bushd_delay floor) const {
   bushd_run_start(&run, &run_table(), steps, direction, floor);
   bushd_run_begin_late(&run, late_ns_);
 }
 
-void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, std::uint16_t floor,
+void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, bushd_delay floor,
                       std::uint32_t late_ns) {
   busy_ = true;
   start_ = start;
@@ -118,14 +123,14 @@ void Axis::stop() {
   stale_ = true;
 }
 
-void Axis::aim(std::int64_t target_steps, std::uint16_t floor) {
+void Axis::aim(std::int64_t target_steps, bushd_delay floor) {
   stopping_ = false;
   target_ = target_steps;
   floor_ = floor;
   stale_ = true;
 }
 
-void Axis::aim_on_line(std::uint32_t line_step, std::uint16_t floor) {
+void Axis::aim_on_line(std::uint32_t line_step, bushd_delay floor) {
   run_target_ = line_step - share_->from;
   aim(from_ + share_->direction * (line_steps(run_target_) - share_from_steps_), floor);
 }
@@ -152,7 +157,8 @@ bool Axis::change(Tick at, std::uint32_t least_end) {
   if (followed_) return true;
   const bool same_end = planned_end_ == planned_end && planned_run_steps_ == planned_run_steps;
   const bool same_speed =
-      stopping_ || on_path() || base_.run.cruise == std::max(run_table().cruise, change_->floor);
+      stopping_ || on_path() ||
+      base_.run.cruise == std::max<bushd_delay>(run_table().cruise, change_->floor);
   if (share_ && at >= unchanged_end_) end_ = unchanged_end_;  // it has made all of its steps
   if (!same_end || !same_speed) {
     // Its MCU makes the run to its end, also when the motor has made its last step.
@@ -245,8 +251,8 @@ void Axis::pass(Place& place, std::size_t ticks) const {
 // now, rounded up; its table lets no motor be faster than its own table at that place.
 std::uint16_t Axis::delay_of(const Place& place) const {
   if (followed_ && place.follows) return follower_delay(place);
-  const std::uint32_t delay = run_delay(place);
-  if (!share_ || delay == 0) return static_cast<std::uint16_t>(delay);
+  const bushd_delay delay = run_delay(place);
+  if (!share_ || delay == 0) return at_most_16_bits(delay);
   const bool changes_later = change_ && change_->at > start_ && place.tick <= change_->at;
   if (place.tick >= (changes_later ? unchanged_end_ : end_)) return 0;
   if (on_path()) {
@@ -340,7 +346,7 @@ Tick Axis::own_end_of(const Place& place) const {
   const std::int64_t unit_ns = run_table().time_unit_ns;
   const auto delay_ns = static_cast<std::int64_t>(before - after) * unit_ns;
   const auto whole = static_cast<std::int64_t>(bushd_run_units_of_last(&place.run, left) - before) -
-                     static_cast<std::int32_t>(place.run.since);
+                     static_cast<std::int64_t>(place.run.since);
   const std::int64_t ns = whole * unit_ns - place.run.since_ns + (crossing * delay_ns + 255) / 256;
   return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
 }
@@ -448,7 +454,7 @@ double Axis::velocity_steps_per_s() const {
   Place place = base_;
   take_change(place);
   if (followed_ && place.follows) return trajectory_velocity(place);
-  const std::uint32_t delay = run_delay(place);
+  const bushd_delay delay = run_delay(place);
   if (delay == 0) return 0.0;
   const double run_steps_per_s = 1e9 / (static_cast<double>(delay) * run_unit_ns());
   if (!share_) return place.run.direction * run_steps_per_s;

@@ -22,7 +22,7 @@ std::uint32_t Axis::run_steps_left(const Place& place) const {
   return place.path.track()->to() - place.path.step();
 }
 
-std::uint32_t Axis::run_delay(const Place& place) const {
+bushd_delay Axis::run_delay(const Place& place) const {
   return on_path() ? place.path.delay() : bushd_run_delay(&place.run);
 }
 

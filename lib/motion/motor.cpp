@@ -27,37 +27,37 @@ std::string Motor::busy_text() const {
   return name() + (is<Armed>() ? " waits for the trigger" : " moves");
 }
 
-void Motor::start(std::int64_t target, Tick start, std::uint16_t floor) {
+void Motor::start(std::int64_t target, Tick start, bushd_delay floor) {
   activity_ = Moving{};
   pause_ = Pause::kNo;
   axis_.start(position_, target - position_, start, 0, floor);
 }
 
-void Motor::arm(std::uint8_t number, std::int64_t steps, std::uint16_t floor) {
+void Motor::arm(std::uint8_t number, std::int64_t steps, bushd_delay floor) {
   activity_ = Armed{.number = number, .steps = steps};
   axis_.start(position_, steps, kNever, 0, floor);
 }
 
 void Motor::arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
-                     std::uint16_t floor) {
+                     bushd_delay floor) {
   axis_.start_line(position_, std::move(share), kNever, floor);
   const std::int64_t steps = axis_.target_steps() - position_;
   activity_ = Armed{.number = number, .steps = steps, .on_line = on_line};
 }
 
-void Motor::aim(std::int64_t target, std::uint16_t floor) {
+void Motor::aim(std::int64_t target, bushd_delay floor) {
   pause_ = Pause::kNo;
   axis_.aim(target, floor);
 }
 
-void Motor::start_line(const OnLine& on_line, LineShare share, Tick start, std::uint16_t floor) {
+void Motor::start_line(const OnLine& on_line, LineShare share, Tick start, bushd_delay floor) {
   activity_ = on_line;
   pause_ = Pause::kNo;
   further_.clear();
   axis_.start_line(position_, std::move(share), start, floor);
 }
 
-void Motor::aim_on_line(const OnLine& on_line, std::uint32_t line_step, std::uint16_t floor) {
+void Motor::aim_on_line(const OnLine& on_line, std::uint32_t line_step, bushd_delay floor) {
   activity_ = on_line;
   axis_.aim_on_line(line_step, floor);
 }

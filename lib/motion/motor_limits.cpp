@@ -30,7 +30,7 @@ Result<void> Motor::may_be_used() const {
   return {};
 }
 
-Result<void> Motor::may_move_to(std::int64_t target, std::uint16_t floor) const {
+Result<void> Motor::may_move_to(std::int64_t target, bushd_delay floor) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
                 (setup_.has_home ? "run " + api::remedy("home", name()) + ", or " : "") +
@@ -115,8 +115,8 @@ Result<std::int64_t> Motor::rounded_distance_from() const {
   return target_steps();
 }
 
-Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) const {
-  std::uint16_t floor = 0;
+Result<bushd_delay> Motor::floor_at(const std::optional<api::Speed>& speed) const {
+  bushd_delay floor = 0;
   if (setup_.max_speed) {
     const auto slowest = setup_.coordinates.delay_at(*setup_.max_speed, axis_.time_unit_ns());
     if (!slowest) return fail("max_speed: " + slowest.error().message);
@@ -126,11 +126,11 @@ Result<std::uint16_t> Motor::floor_at(const std::optional<api::Speed>& speed) co
   const units::Coordinates in_steps;
   const auto delay = (speed->in_steps ? in_steps : setup_.coordinates)
                          .delay_at(speed->per_s, axis_.time_unit_ns());
-  if (!delay) return delay;
-  return std::max(floor, *delay);
+  if (!delay) return fail(delay.error());
+  return std::max<bushd_delay>(floor, *delay);
 }
 
-std::int64_t Motor::farthest(int direction, std::uint16_t floor) const {
+std::int64_t Motor::farthest(int direction, bushd_delay floor) const {
   Range range{.low = -kMaxPosition, .high = kMaxPosition};
   if (setup_.soft_limits) range = allowed_steps();
   const std::int64_t limit = direction > 0 ? range.high : range.low;
@@ -148,14 +148,14 @@ std::int64_t Motor::farthest(int direction, std::uint16_t floor) const {
   return position_ + direction * low;
 }
 
-Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, std::uint16_t floor) const {
+Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, bushd_delay floor) const {
   if (auto may = may_move_to(target, floor); !may) return fail(may.error());
   const auto backlash = setup_.coordinates.steps_of_distance(setup_.backlash);
   const std::int64_t way = target - position_;
   if (!backlash || *backlash == 0 || (way == 0 && stands())) {
     return std::vector<Leg>{{target, floor}};
   }
-  std::uint16_t slow = floor;
+  bushd_delay slow = floor;
   if (setup_.backlash_speed) {
     const auto approach = floor_at(api::Speed{.per_s = *setup_.backlash_speed});
     if (!approach) return fail("backlash_speed: " + approach.error().message);

@@ -36,7 +36,7 @@ Path::Path(std::vector<Motor> motors, std::span<const std::int64_t> begin, Corne
   prepare(points);
 }
 
-void Path::add(std::span<const std::int64_t> point, std::span<const std::uint16_t> floors) {
+void Path::add(std::span<const std::int64_t> point, std::span<const bushd_delay> floors) {
   const std::size_t width = motors_.size();
   const std::int64_t* from = &points_[points_.size() - width];
   std::uint64_t longest = 0;
@@ -74,10 +74,22 @@ std::unique_ptr<Path> Path::rest(std::uint32_t begin, std::size_t last) const {
   return std::unique_ptr<Path>(new Path(*this, begin, last));
 }
 
-// What grows with the points grows while they are looked at.
-void Path::prepare(std::size_t points) {
+// The shortest of the motors', or a longer one if 31 bits of it were too few for the slowest step.
+void Path::choose_unit() {
   unit_ns_ = UINT32_MAX;
-  for (const Motor& motor : motors_) unit_ns_ = std::min(unit_ns_, motor.table->time_unit_ns);
+  std::uint64_t slowest_ns = 0;
+  for (std::size_t m = 0; m < motors_.size(); ++m) {
+    const std::uint64_t own_ns = motors_[m].table->time_unit_ns;
+    unit_ns_ = std::min<std::uint32_t>(unit_ns_, motors_[m].table->time_unit_ns);
+    bushd_delay floor = motors_[m].floor;
+    for (std::size_t i = m; i < floors_.size(); i += motors_.size()) {
+      floor = std::max(floor, floors_[i]);
+    }
+    slowest_ns = std::max(slowest_ns, floor * own_ns);
+  }
+  unit_ns_ = std::max(unit_ns_, static_cast<std::uint32_t>((slowest_ns >> 31) + 1));
+  unit_ratio_.clear();
+  start_units_.clear();
   for (const Motor& motor : motors_) {
     const std::uint64_t own_ns = motor.table->time_unit_ns;
     const std::uint64_t common = std::gcd(own_ns, std::uint64_t{unit_ns_});
@@ -85,6 +97,11 @@ void Path::prepare(std::size_t points) {
     const std::uint16_t slowest = std::max(motor.table->accel.code[0], motor.table->cruise);
     start_units_.push_back(static_cast<double>(slowest) * static_cast<double>(own_ns) / unit_ns_);
   }
+}
+
+// What grows with the points grows while they are looked at.
+void Path::prepare(std::size_t points) {
+  choose_unit();
   const std::size_t width = motors_.size();
   travel_.assign(width, 0);
   flat_.reserve(points);
@@ -150,8 +167,9 @@ std::uint32_t Path::flat(std::size_t segment, const std::vector<PathShare>& shar
   return least;
 }
 
-std::uint16_t Path::own_least(std::size_t segment, std::size_t motor) const {
-  const std::uint16_t least = std::max(motors_[motor].table->cruise, motors_[motor].floor);
+bushd_delay Path::own_least(std::size_t segment, std::size_t motor) const {
+  const bushd_delay least =
+      std::max<bushd_delay>(motors_[motor].table->cruise, motors_[motor].floor);
   return floors_.empty() ? least : std::max(least, floors_[segment * motors_.size() + motor]);
 }
 
@@ -236,14 +254,14 @@ std::int64_t Path::decel_place(const PathShare& now, const PathShare& behind, st
 
 // What holds a motor back in the first half of the interval over a corner.
 Path::Head Path::head(std::size_t segment, std::size_t motor, const PathShare& before,
-                      const PathShare& now, std::uint16_t own) const {
+                      const PathShare& now, bushd_delay own) const {
   // Behind a rest on the way the first step comes after a whole delay, whatever was before.
   const bool rest = rests_at(segment);
   const double r1 = rest ? 1 : before.ratio;
   const double r2 = now.ratio;
   if (!now.moves() || (!rest && !goes_on(before, now)) || r2 >= r1) return {0, 0};
-  const std::uint16_t code = std::max(own, own_least(segment, motor));
-  const double delay = code * static_cast<double>(now.numerator) /
+  const bushd_delay code = std::max(own, own_least(segment, motor));
+  const double delay = static_cast<double>(code) * static_cast<double>(now.numerator) /
                        static_cast<double>(now.denominator) * (1 + r1) / (1 + r2);
   const std::uint64_t twice = std::uint64_t{now.longest} + now.steps;
   const std::uint64_t twice_own = 2 * std::uint64_t{now.steps};
@@ -352,6 +370,7 @@ void Path::forth_step(std::size_t i) {
 
 bool Path::plan(std::size_t count) {
   const std::size_t n = segments();
+  if (phase_ == Phase::kCorners && at_ == 0) choose_unit();
   while (count > 0 && phase_ != Phase::kDone) {
     --count;
     if (phase_ == Phase::kCorners) {

@@ -40,14 +40,14 @@ class Path {
   };
   struct Motor {
     const bushd_table* table;  // outlives the path
-    std::uint16_t floor = 0;   // none of its steps has a shorter delay
+    bushd_delay floor = 0;     // none of its steps has a shorter delay
   };
   // `begin`: where they stand. `points`: as many as are to come, if that is known.
   Path(std::vector<Motor> motors, std::span<const std::int64_t> begin, Corners corners,
        std::size_t points = 0);
   // The next point. `floors`: as that of a motor, of the way there; none: of none. Preconditions:
   // |to - from| < 2^32, steps() < 2^31 before plan() is called, which has not been.
-  void add(std::span<const std::int64_t> point, std::span<const std::uint16_t> floors = {});
+  void add(std::span<const std::int64_t> point, std::span<const bushd_delay> floors = {});
   Path(const Path&) = delete;
   Path& operator=(const Path&) = delete;
 
@@ -113,6 +113,7 @@ class Path {
  private:
   enum class Phase { kCorners, kBack, kForth, kDone };
   Path(const Path& whole, std::uint32_t begin, std::size_t last);
+  void choose_unit();
   void prepare(std::size_t points);
 
   using Shares = std::vector<PathShare>;     // by motor, as those below
@@ -123,7 +124,7 @@ class Path {
   };
 
   void load(std::size_t segment, Shares& shares) const;
-  std::uint16_t own_least(std::size_t segment, std::size_t motor) const;
+  bushd_delay own_least(std::size_t segment, std::size_t motor) const;
   std::uint32_t flat(std::size_t segment, const Shares& shares) const;
   bool rests_at(std::size_t segment) const;
   std::uint32_t corner(const Shares& before, const Shares& behind) const;
@@ -135,7 +136,7 @@ class Path {
   std::int64_t decel_place(const PathShare& now, const PathShare& behind, std::uint32_t delay,
                            std::int64_t place, std::uint32_t travel) const;
   Head head(std::size_t segment, std::size_t motor, const PathShare& before, const PathShare& now,
-            std::uint16_t own) const;
+            bushd_delay own) const;
   void raise_heads(std::size_t segment, const Shares& before, const Shares& now, bool decel,
                    const Places& places, std::uint32_t most, Profile& profile) const;
   std::uint32_t first_delay(std::size_t segment, const Shares& before, const Shares& now,
@@ -161,7 +162,7 @@ class Path {
   std::vector<Motor> motors_;
   std::vector<std::int64_t> points_;
   Corners corners_;
-  std::vector<std::uint16_t> floors_;
+  std::vector<bushd_delay> floors_;
   std::vector<std::uint32_t> row_segments_;  // of each given point: segments before it
   std::vector<std::uint64_t> start_;
   std::uint32_t first_step_ = 0;

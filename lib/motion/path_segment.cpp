@@ -24,7 +24,7 @@ std::uint64_t run_step(const PathShare& share, std::uint64_t made) {
 
 }  // namespace
 
-std::uint32_t PathShare::scaled_widely(std::uint16_t own) const {
+std::uint32_t PathShare::scaled_widely(bushd_delay own) const {
   return static_cast<std::uint32_t>((Wide{own} * numerator + denominator - 1) / denominator);
 }
 

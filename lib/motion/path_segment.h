@@ -43,12 +43,14 @@ struct PathShare {
   double ratio = 0;  // r
 
   bool moves() const { return steps != 0; }
-  std::uint32_t scaled(std::uint16_t own) const {
-    if (numerator == denominator) return own;
+  // A delay of its own as one of the run, which is kRest - 1 at most.
+  std::uint32_t scaled(bushd_delay own) const {
+    if (!bushd_delay_is_code(own)) return scaled_widely(own);
+    if (numerator == denominator) return static_cast<std::uint32_t>(own);
     if (numerator >> 47 != 0) return scaled_widely(own);
     return static_cast<std::uint32_t>(quotient(own * numerator + denominator - 1, denominator));
   }
-  std::uint32_t scaled_widely(std::uint16_t own) const;  // where 64 bits may be too few
+  std::uint32_t scaled_widely(bushd_delay own) const;  // where 64 bits may be too few
   std::uint16_t code(bool decel, std::int64_t index) const {
     const bushd_ramp& ramp = decel ? table->decel : table->accel;
     if (index >= ramp.count) return table->cruise;

@@ -26,7 +26,8 @@ double start_speed(const bushd_table& table) {
 }
 
 double least_delay_ns(const TrajectoryCheck::Motor& motor) {
-  return std::max(bushd_table_fastest(motor.table), motor.floor) * unit_ns(*motor.table);
+  return static_cast<double>(std::max<bushd_delay>(bushd_table_fastest(motor.table), motor.floor)) *
+         unit_ns(*motor.table);
 }
 
 // How many codes of a side are at least this delay, which comes first.

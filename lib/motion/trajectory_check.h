@@ -39,7 +39,7 @@ class TrajectoryCheck {
  public:
   struct Motor {
     const bushd_table* table;  // outlives the check
-    std::uint16_t floor;
+    bushd_delay floor;
     std::int64_t lowest;  // steps where it may be
     std::int64_t highest;
   };

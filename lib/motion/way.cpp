@@ -29,8 +29,11 @@ std::vector<tables::LinePart> Way::parts() const {
   return parts;
 }
 
-double Way::duration_ns(std::uint16_t floor) const {
+double Way::duration_ns(bushd_delay floor) const {
   if (longest_ == 0) return 0;
+  if (!bushd_delay_is_code(floor)) {  // the delay of all, maybe longer than units are counted
+    return static_cast<double>(longest_) * static_cast<double>(floor) * table_->view().time_unit_ns;
+  }
   bushd_run run;
   bushd_run_start(&run, &table_->view(), longest_, 1, floor);
   return static_cast<double>(bushd_run_units_left(&run)) * table_->view().time_unit_ns;
@@ -38,7 +41,7 @@ double Way::duration_ns(std::uint16_t floor) const {
 
 double Way::most_steps_per_s(std::size_t motor) const {
   if (longest_ == 0) return 0;
-  const std::uint16_t delay = std::max(bushd_table_fastest(&table_->view()), floor_);
+  const bushd_delay delay = std::max<bushd_delay>(bushd_table_fastest(&table_->view()), floor_);
   const double run = 1e9 / (static_cast<double>(delay) * table_->view().time_unit_ns);
   return run * increment(motor) / longest_;
 }
@@ -63,14 +66,22 @@ LineShare Way::share(std::size_t motor, std::uint32_t from, std::uint32_t to) co
           .to = to};
 }
 
-bool Way::set_floors(std::span<const std::uint16_t> floors) {
-  std::vector<tables::LinePart> changed = parts();
-  for (std::size_t i = 0; i < changed.size(); ++i) changed[i].floor = floors[i];
-  const auto floor = table_->floor_of(changed, longest_);
-  if (!floor) return false;
+void Way::set_floors(std::span<const bushd_delay> floors) {
   for (std::size_t i = 0; i < motors_.size(); ++i) motors_[i].floor = floors[i];
-  floor_ = *floor;
-  return true;
+  floor_ = table_->floor_of(parts(), longest_);
+}
+
+// With a floor that this table's units would need more than 16 bits for they are longer.
+void Way::make_slower(double duration_ns) {
+  const double delay_ns = duration_ns / longest_;
+  for (std::size_t i = 0; i < motors_.size(); ++i) {
+    if (increment(i) != longest_) continue;
+    motors_[i].floor =
+        static_cast<bushd_delay>(std::ceil(delay_ns / motors_[i].table->time_unit_ns));
+    break;
+  }
+  table_ = std::make_shared<const tables::Envelope>(parts(), longest_);
+  floor_ = table_->floor();
 }
 
 Result<void> Way::take(double duration_s, double longest_ns) {
@@ -86,25 +97,30 @@ Result<void> Way::take(double duration_s, double longest_ns) {
                     "or more",
                     duration_s, least_ns * 1e-9));
   }
-  const double most_ns = std::min(duration_ns(UINT16_MAX), longest_ns);
+  const double most_ns =
+      std::min(static_cast<double>(longest_) * BUSHD_LONGEST_DELAY_NS, longest_ns);
   if (wanted_ns > most_ns) {
     return fail(
         fmt::format("duration of {:.6g} s: the line takes at most {:.6g} s; ask for that or "
                     "less",
                     duration_s, most_ns * 1e-9));
   }
+  if (wanted_ns > duration_ns(UINT16_MAX)) {
+    make_slower(wanted_ns);
+    return {};
+  }
   // The least floor by which it is so long: the longer the floor, the longer the line.
-  std::uint32_t low = floor_;
-  std::uint32_t high = UINT16_MAX;
+  bushd_delay low = floor_;
+  bushd_delay high = UINT16_MAX;
   while (low < high) {
-    const std::uint32_t middle = low + (high - low) / 2;
-    if (duration_ns(static_cast<std::uint16_t>(middle)) >= wanted_ns) {
+    const bushd_delay middle = low + (high - low) / 2;
+    if (duration_ns(middle) >= wanted_ns) {
       high = middle;
     } else {
       low = middle + 1;
     }
   }
-  floor_ = static_cast<std::uint16_t>(low);
+  floor_ = low;
   return {};
 }
 

@@ -21,7 +21,7 @@ class Way {
     const bushd_table* table;  // outlives the way
     std::int64_t from;
     std::int64_t to;  // |to - from| < 2^31
-    std::uint16_t floor;
+    bushd_delay floor;
   };
   Way() = default;
   // At least one motor.
@@ -34,7 +34,7 @@ class Way {
   std::uint32_t increment(std::size_t motor) const;
   // In steps of the motor with most of them; 0: none moves, and all else says nothing.
   std::uint32_t longest() const { return longest_; }
-  std::uint16_t floor() const { return floor_; }  // of its runs
+  bushd_delay floor() const { return floor_; }  // of its runs
   const std::shared_ptr<const tables::Envelope>& table() const { return table_; }
   // By whose table it takes so long.
   std::size_t limiting() const { return limiting_; }
@@ -45,22 +45,22 @@ class Way {
   // A motor's share of a run between these steps of the way.
   LineShare share(std::size_t motor, std::uint32_t from, std::uint32_t to) const;
 
-  // Other floors of the motors. Returns false, and changes nothing, if they are too slow to be
-  // told.
-  bool set_floors(std::span<const std::uint16_t> floors);
+  // Other floors of the motors.
+  void set_floors(std::span<const bushd_delay> floors);
   // Takes at least this long, and not much longer. Errors: more or less than what is possible.
   Result<void> take(double duration_s, double longest_ns);
 
  private:
   std::vector<tables::LinePart> parts() const;
-  double duration_ns(std::uint16_t floor) const;
+  double duration_ns(bushd_delay floor) const;
+  void make_slower(double duration_ns);
 
   std::vector<Motor> motors_;
   std::uint64_t number_ = 0;
   std::uint32_t longest_ = 0;
   std::shared_ptr<const tables::Envelope> table_;
   std::shared_ptr<RunBlocks> blocks_ = std::make_shared<RunBlocks>();
-  std::uint16_t floor_ = 0;
+  bushd_delay floor_ = 0;
   std::size_t limiting_ = 0;
 };
 

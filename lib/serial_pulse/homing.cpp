@@ -8,6 +8,8 @@
 // a look at the switch. The next byte goes out when that one has left for sure, so home is exact to
 // the step. A contact bounces: nothing is read for 5 ms behind a step, then it counts after three
 // readings in a row, and no step is made before.
+#include <algorithm>
+
 #include "serial_pulse/master.h"
 
 namespace bushd::serial_pulse {
@@ -55,12 +57,13 @@ void Master::begin_fast(std::int64_t now_us, int direction) {
 void Master::begin_slow(std::int64_t now_us, bushd_homing stage, int direction) {
   homing_->stage = stage;
   homing_->readings = 0;
-  slow_.cruise = homing_->message.slow_delay;
+  const bushd_delay slow = homing_->message.slow_delay;
+  slow_.cruise = static_cast<std::uint16_t>(std::min<bushd_delay>(slow, UINT16_MAX));
   slow_.time_unit_ns = BUSHD_HOME_UNIT_NS;
   slow_.accel.code = slow_.decel.code = &slow_.cruise;
   slow_.accel.count = slow_.decel.count = 1;
   bushd_run run;
-  bushd_run_start(&run, &slow_, homing_->message.slow_steps, direction, 0);
+  bushd_run_start(&run, &slow_, homing_->message.slow_steps, direction, slow);
   begin_run(now_us, {.run = run, .line = {}}, 0, false);
   run_->slow = true;
 }

@@ -19,7 +19,7 @@ constexpr std::uint32_t kLowestOnLine = 1'000;
 constexpr std::int64_t kChangeUs = 2'000;
 
 // A delay of the run between two steps of the motor; none is told to be longer than a day.
-std::uint64_t motor_ns(const link::MotorPlan& plan, std::uint32_t delay) {
+std::uint64_t motor_ns(const link::MotorPlan& plan, bushd_delay delay) {
   __extension__ using Wide = unsigned __int128;
   constexpr Wide kLongestNs = Wide{86'400} * 1'000'000'000;
   Wide ns = Wide{delay} * plan.run.table->time_unit_ns;
@@ -35,7 +35,8 @@ Master::Master(link::BusSetup setup, link::TickSource& source, std::uint64_t uni
   identity.protocol_version = BUSHD_PROTOCOL_VERSION;
   identity.motors = 1;
   identity.boot_number = setup_.master;  // the counter is the daemon's
-  identity.capabilities = BUSHD_CAN_FINE | BUSHD_CAN_COARSE | BUSHD_CAN_TABLE_RUN | BUSHD_CAN_HOME;
+  identity.capabilities = BUSHD_CAN_FINE | BUSHD_CAN_COARSE | BUSHD_CAN_TABLE_RUN | BUSHD_CAN_HOME |
+                          BUSHD_CAN_SLOW_RUNS;
   for (std::size_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {
     identity.unique_id[i] = static_cast<std::uint8_t>(unique_id >> (56 - 8 * i));
   }
@@ -276,7 +277,8 @@ void Master::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick st
   const bushd_run& run = plan.run;
   // Of a line the delay before the first step counts from when all are ready.
   const std::int64_t first_us =
-      plan.line ? 0 : us_of(std::int64_t{bushd_run_delay(&run)} * run.table->time_unit_ns);
+      plan.line ? 0
+                : us_of(static_cast<std::int64_t>(bushd_run_delay(&run) * run.table->time_unit_ns));
   const std::int64_t start_us = planned ? base_us_ + us_per_ticks(start - base_tick_) + 1 : now_us;
   run_.emplace(Run{.ahead = Steps(plan),
                    .by_ticks = Ticks(plan),
@@ -294,9 +296,9 @@ void Master::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick st
 
 void Master::plan_rates(const link::MotorPlan& plan) {
   const bushd_run& run = plan.run;
-  const auto ns_of = [&](std::uint32_t delay) { return motor_ns(plan, delay); };
-  const std::uint64_t longest =
-      ns_of(std::max({run.table->accel.code[0], run.table->decel.code[0], run.cruise}));
+  const auto ns_of = [&](bushd_delay delay) { return motor_ns(plan, delay); };
+  const std::uint64_t longest = ns_of(
+      std::max<bushd_delay>({run.table->accel.code[0], run.table->decel.code[0], run.cruise}));
   Rates driver{.any = status_->any_rate, .base = status_->base};
   // On a line slower steps wait for their time one by one, where that does not take longer.
   if (plan.line && status_->empty) driver.lowest = kLowestOnLine;

@@ -18,7 +18,7 @@ class Scale {
   Scale(std::uint32_t longest, std::uint32_t unit_ns) : longest_(longest), unit_ns_(unit_ns) {}
 
   // Rounded up.
-  std::uint64_t delay(const LinePart& part, std::uint16_t code) const {
+  std::uint64_t delay(const LinePart& part, bushd_delay code) const {
     const Wide own = Wide{part.increment} * code * part.table->time_unit_ns;
     const Wide unit = Wide{longest_} * unit_ns_;
     return static_cast<std::uint64_t>((own + unit - 1) / unit);
@@ -29,12 +29,13 @@ class Scale {
   std::uint32_t unit_ns_;
 };
 
-std::uint16_t least_delay(const LinePart& part) {
-  return std::max(part.table->cruise, part.floor);
+bushd_delay least_delay(const LinePart& part) {
+  return std::max<bushd_delay>(part.table->cruise, part.floor);
 }
 
-std::uint16_t slowest_code(const LinePart& part) {
-  return std::max({part.table->accel.code[0], part.table->decel.code[0], least_delay(part)});
+bushd_delay slowest_code(const LinePart& part) {
+  return std::max<bushd_delay>(
+      {part.table->accel.code[0], part.table->decel.code[0], least_delay(part)});
 }
 
 std::uint32_t unit_of(std::span<const LinePart> parts, std::uint32_t longest) {
@@ -134,20 +135,18 @@ Envelope::Envelope(std::span<const LinePart> parts, std::uint32_t longest) {
     return static_cast<std::uint16_t>(most);
   };
   view_.cruise = greatest([](const LinePart& part) { return part.table->cruise; });
-  floor_ = floor_of(parts, longest).value_or(UINT16_MAX);
+  floor_ = floor_of(parts, longest);
   accel_.code = side_of(parts, scale, longest, false, view_.cruise);
   decel_.code = side_of(parts, scale, longest, true, view_.cruise);
   view_.accel = accel_.index();
   view_.decel = decel_.code == accel_.code ? view_.accel : decel_.index();  // the same codes
 }
 
-std::optional<std::uint16_t> Envelope::floor_of(std::span<const LinePart> parts,
-                                                std::uint32_t longest) const {
+bushd_delay Envelope::floor_of(std::span<const LinePart> parts, std::uint32_t longest) const {
   const Scale scale(longest, view_.time_unit_ns);
   std::uint64_t floor = 0;
   for (const LinePart& part : parts) floor = std::max(floor, scale.delay(part, part.floor));
-  if (floor > UINT16_MAX) return std::nullopt;
-  return static_cast<std::uint16_t>(floor);
+  return floor;
 }
 
 std::size_t limiting_part(std::span<const LinePart> parts, std::uint32_t longest) {
@@ -157,7 +156,8 @@ std::size_t limiting_part(std::span<const LinePart> parts, std::uint32_t longest
     if (parts[i].increment == 0) continue;
     const Envelope alone(parts.subspan(i, 1), longest);
     bushd_table table = alone.view();
-    table.cruise = std::max(table.cruise, alone.floor());  // the same run (engine/run.h)
+    // The same run (engine/run.h); of its own parts a floor has 16 bits.
+    table.cruise = static_cast<std::uint16_t>(std::max<bushd_delay>(table.cruise, alone.floor()));
     const std::uint64_t time_ns = move_time(table, longest).time_ns;
     if (time_ns <= longest_ns) continue;
     longest_ns = time_ns;

@@ -13,7 +13,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,7 +23,7 @@ namespace bushd::tables {
 struct LinePart {
   const bushd_table* table;  // passed bushd_table_check
   std::uint32_t increment;   // |N|
-  std::uint16_t floor = 0;   // none of its steps has a shorter delay; 0: none
+  bushd_delay floor = 0;     // none of its steps has a shorter delay; 0: none
 };
 
 // Not copied: view() points into it.
@@ -39,12 +38,11 @@ class Envelope {
   static constexpr std::size_t kMostCodes = 32767;  // of a side
 
   // Passed bushd_table_check, and both sides are indexed. Its time unit is the shortest of the
-  // motors', or a longer one if the slowest delay would not fit 16 bits.
+  // motors', or a longer one if the slowest delay, or floor, would not fit 16 bits.
   const bushd_table& view() const { return view_; }
-  std::uint16_t floor() const { return floor_; }
-  // With other floors of its motors. None: it does not fit 16 bits.
-  std::optional<std::uint16_t> floor_of(std::span<const LinePart> parts,
-                                        std::uint32_t longest) const;
+  bushd_delay floor() const { return floor_; }
+  // With other floors of its motors, which may have more bits.
+  bushd_delay floor_of(std::span<const LinePart> parts, std::uint32_t longest) const;
 
  private:
   struct Side {
@@ -56,7 +54,7 @@ class Envelope {
 
   Side accel_;
   Side decel_;
-  std::uint16_t floor_ = 0;
+  bushd_delay floor_ = 0;
   bushd_table view_{};
 };
 

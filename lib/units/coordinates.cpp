@@ -12,7 +12,7 @@
 namespace bushd::units {
 namespace {
 
-constexpr unsigned kLongestDelay = 65535;  // time units, a code of a table
+constexpr long kLongestDelayNs = 3'600'000'000'000;  // as of the engine (engine/table.h)
 
 // What is shown is within two units in the last place of a double of the exact position: its own
 // rounding, and where long double is no wider than double those of quotient and sum. 2^50 steps of
@@ -186,21 +186,19 @@ Result<std::int64_t> Coordinates::steps_of_distance(double user_units) const {
   return scale_.negative ? -*steps : *steps;
 }
 
-Result<std::uint16_t> Coordinates::delay_at(double user_units_per_s, std::uint32_t unit_ns) const {
+Result<std::uint64_t> Coordinates::delay_at(double user_units_per_s, std::uint32_t unit_ns) const {
   const auto speed = number(user_units_per_s);
   if (!speed || *speed <= 0) {
     return fail(fmt::format("a speed of {}; allowed: any above 0", user_units_per_s));
   }
-  const mpq_class units =
-      mpq_class(1'000'000'000) / (*speed * as_mpq(scale_.steps_per_unit) * mpq_class(unit_ns));
-  const mpz_class delay = -floor_of(-units);
-  if (delay <= kLongestDelay) return static_cast<std::uint16_t>(delay.get_ui());
-  const mpq_class slowest = mpq_class(1'000'000'000) /
-                            (as_mpq(scale_.steps_per_unit) * mpq_class(unit_ns) * kLongestDelay);
+  const mpq_class delay_ns = mpq_class(1'000'000'000) / (*speed * as_mpq(scale_.steps_per_unit));
+  if (delay_ns <= kLongestDelayNs) {
+    return mpz_class(-floor_of(-(delay_ns / mpq_class(unit_ns)))).get_ui();
+  }
+  const mpq_class slowest = *speed * delay_ns / kLongestDelayNs;
   return fail(fmt::format(
-      "{} {}/s would take {:.0f} time units a step; allowed: up to {}, "
-      "which is {:.6g} {}/s with this table",
-      user_units_per_s, scale_.unit, delay.get_d(), kLongestDelay, slowest.get_d(), scale_.unit));
+      "{} {}/s would take {:.6g} s a step; allowed: up to an hour a step, which is {:.6g} {}/s",
+      user_units_per_s, scale_.unit, delay_ns.get_d() * 1e-9, slowest.get_d(), scale_.unit));
 }
 
 std::int64_t Coordinates::first_step_from(double dial) const {

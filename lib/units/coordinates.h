@@ -83,8 +83,8 @@ class Coordinates {
   // The delay of a step at this speed, in time units rounded up: never faster.
   //   user_units_per_s  above 0
   //   unit_ns  of time, >= 1
-  // Errors: not a number above 0; longer than 65535 units, with the slowest speed.
-  Result<std::uint16_t> delay_at(double user_units_per_s, std::uint32_t unit_ns) const;
+  // Errors: not a number above 0; slower than a step an hour, with the slowest speed.
+  Result<std::uint64_t> delay_at(double user_units_per_s, std::uint32_t unit_ns) const;
 
   // The first step at or above this dial position, the last at or below it: limits are never
   // rounded outwards. Clamped to +-kMaxSteps. Precondition: finite.

@@ -58,7 +58,7 @@ class Atmega2560 final : public Avr {
             .queue_ticks = 64,
             .code_count = 952,
             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_CURRENTS |
-                                     BUSHD_CAN_VELOCITY | BUSHD_CAN_SCRATCH};
+                                     BUSHD_CAN_VELOCITY | BUSHD_CAN_SCRATCH | BUSHD_CAN_SLOW_RUNS};
   }
 };
 
@@ -74,7 +74,8 @@ class Atmega1284p final : public Avr {
             .queue_ticks = 64,
             .code_count = 1536,
             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN |
-                                     BUSHD_CAN_COMMON_DIR | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH,
+                                     BUSHD_CAN_COMMON_DIR | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH |
+                                     BUSHD_CAN_SLOW_RUNS,
             .current_motors = 1,
             .velocity_motors = 2};
   }

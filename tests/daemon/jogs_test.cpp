@@ -286,8 +286,8 @@ TEST(Jogs, ThatCannotBeAreRefusedWithTheFigure) {
     EXPECT_EQ(answer.result, "refused");
     return answer.reason;
   };
-  EXPECT_THAT(reason({.motor = "m01", .per_s = 0.0009}),
-              HasSubstr("m01: 0.0009 mm/s would take 69445 time units a step"));
+  EXPECT_THAT(reason({.motor = "m01", .per_s = 6e-7}),
+              HasSubstr("m01: 6e-07 mm/s would take 4166.67 s a step"));
   for (const double bad : {std::nan(""), HUGE_VAL}) reason({.motor = "m01", .per_s = bad});
   EXPECT_THAT(reason({.motor = "m01", .per_s = 1, .keepalive_ms = 49}), HasSubstr("50 to 10000"));
   EXPECT_THAT(reason({.motor = "m01", .per_s = 1, .steps_after = 5}), HasSubstr("of speed 0"));

@@ -78,11 +78,10 @@ TEST(Speeds, MaxSpeedHoldsForEveryMoveInTheMotorsUnit) {
 TEST(Speeds, ASpeedThatNoStepCanHaveIsRefusedWithItsFigure) {
   Lab lab(lab_with("unit = \"mm\"\nsteps_per_unit = 400\n"));
   lab.connect();
-  // 65535 units of 40 us a step.
-  const Answer slow = lab.wait(lab.send(by(5, 0.0009, false)));
+  const Answer slow = lab.wait(lab.send(by(5, 6e-7, false)));
   EXPECT_EQ(slow.result, "refused");
-  EXPECT_THAT(slow.reason, HasSubstr("m01: 0.0009 mm/s would take 69445 time units a step"));
-  EXPECT_THAT(slow.reason, HasSubstr("0.000953689 mm/s"));
+  EXPECT_THAT(slow.reason, HasSubstr("m01: 6e-07 mm/s would take 4166.67 s a step"));
+  EXPECT_THAT(slow.reason, HasSubstr("6.94444e-07 mm/s"));
   for (const double speed : {-1.0, std::nan(""), HUGE_VAL}) {
     EXPECT_EQ(lab.wait(lab.send(by(5, speed))).result, "refused") << speed;
   }

@@ -54,9 +54,9 @@ class Jogs(EndToEndTest):
         self.command("jog", "a0", "0")
         self.assertEqual(jog.process.wait(), 1)
         self.assertIn("ended by command", jog.said())
-        refused = self.bushctl("jog", "a0", "0.0001")
+        refused = self.bushctl("jog", "a0", "0.0000001")
         self.assertEqual(refused.returncode, 1)
-        self.assertIn("time units a step", refused.stderr)
+        self.assertIn("allowed: up to an hour a step", refused.stderr)
         self.assertEqual(self.bushctl("jog", "a0").returncode, 2)
 
     def test_a_paused_move_goes_on(self):

@@ -136,11 +136,14 @@ Bytes any_table_run() {
   Bytes payload = random_bytes(BUSHD_TABLE_RUN_HEADER);
   for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((mask >> m & 1) == 0) continue;
-    const bool has_floor = between(0, 1) != 0;
-    Bytes entry(has_floor ? BUSHD_TABLE_RUN_MAX_ENTRY : BUSHD_TABLE_RUN_MAX_ENTRY - 2);
+    const bool has_floor = between(0, 2) != 0;
+    const bool is_long = has_floor && between(0, 1) != 0;
+    Bytes entry(is_long ? 13 : has_floor ? 7 : 5);
     entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 15) << 4);
     bushd_put_u32(&entry[1], between<uint32_t>(1, INT32_MAX) | (has_floor ? 0x80000000u : 0u));
-    if (has_floor) bushd_put_u16(&entry[5], between<uint16_t>(1, 65535));
+    if (has_floor && !is_long) bushd_put_u16(&entry[5], between<uint16_t>(1, 65535));
+    if (is_long) bushd_put_u16(&entry[7], between<uint16_t>(0, 65535));
+    if (is_long) bushd_put_u32(&entry[9], between<uint32_t>(1, UINT32_MAX));
     payload.insert(payload.end(), entry.begin(), entry.end());
   }
   return payload;
@@ -269,7 +272,8 @@ Kinds motion_kinds() {
          {"too many steps", set32(2, 0x80000000)},
          {"no slow steps", set32(8, 0)},
          {"too many slow steps", set32(8, 0x80000000)},
-         {"no delay", set16(12, 0)}}}},
+         {"no delay", set16(12, 0)},
+         {"longer delays that are none", [](Bytes* p) { p->resize(26); }}}}},
       {"travel",
        {any_travel,
         codec(bushd_decode_travel, bushd_encode_travel),

@@ -165,7 +165,8 @@ void put_entries(const uint8_t* entries, uint8_t count, Fields& f) {
   std::string text;
   for (uint8_t i = 0; i < count; ++i) {
     const bushd_table_run_entry entry = bushd_next_table_run_entry(&entries);
-    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps, entry.floor}));
+    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps,
+                         static_cast<int64_t>(entry.floor)}));
   }
   f.add_text("entries", text);
 }

@@ -37,7 +37,7 @@ struct Step {
 
 class Reference {
  public:
-  static Reference move(const Law& law, size_t steps, uint16_t floor = 0) {
+  static Reference move(const Law& law, size_t steps, uint64_t floor = 0) {
     Reference r(law);
     for (size_t j = 1; j <= steps; ++j) {
       Wide delay = std::max<Wide>(law.cruise, floor);
@@ -49,7 +49,7 @@ class Reference {
   }
 
   // Taken up in the middle of a step of `delay` units of which fraction/256 is over, to whole ns.
-  static Reference ramp_down(const Law& law, uint16_t delay, uint8_t fraction) {
+  static Reference ramp_down(const Law& law, uint64_t delay, uint8_t fraction) {
     Reference r(law);
     const Wide over_ns = (Wide{delay} * law.unit_ns * fraction + 255) / 256;
     r.append(delay);
@@ -94,7 +94,7 @@ class Reference {
   // From `ns` on: the running step, then `after` more, the accelerating side taken up where its
   // delay stands. Returns false if it cannot come to rest within so few steps, or is at rest.
   // The floor is approached along the decelerating side.
-  bool retarget_at(uint64_t ns, size_t after, uint16_t floor = 0) {
+  bool retarget_at(uint64_t ns, size_t after, uint64_t floor = 0) {
     const size_t made = steps_at(ns);
     if (made == steps_.size()) return false;
     const Wide delay = steps_[made].delay / (Wide{law_.unit_ns} * 256);
@@ -147,12 +147,14 @@ class Reference {
   }
 
   // The delay of the step that runs at `ns`, in units; 0 when all are made.
-  uint16_t delay_at(uint64_t ns) const {
+  uint64_t long_delay_at(uint64_t ns) const {
     const size_t made = steps_at(ns);
     if (made == steps_.size() && (!begun_ || ns >= rest_ns_)) return 0;
     const Wide delay = made < steps_.size() ? steps_[made].delay : begun_->delay;
-    return static_cast<uint16_t>(delay / (Wide{law_.unit_ns} * 256));
+    return static_cast<uint64_t>(delay / (Wide{law_.unit_ns} * 256));
   }
+  // Of a delay that is a code.
+  uint16_t delay_at(uint64_t ns) const { return static_cast<uint16_t>(long_delay_at(ns)); }
 
  private:
   explicit Reference(const Law& law) : law_(law) {}

@@ -27,7 +27,7 @@ struct Flight {
       const auto block = static_cast<std::size_t>(std::min(count, between<uint64_t>(1, 20)));
       fly_block(block);
       count -= block;
-      RC_ASSERT(bushd_run_delay(&run) == reference.delay_at(now_ns()));
+      RC_ASSERT(bushd_run_delay(&run) == reference.long_delay_at(now_ns()));
       RC_ASSERT(bushd_run_steps_left(&run) == reference.steps() - reference.steps_at(now_ns()));
       RC_ASSERT(bushd_run_units_left(&run) == reference.units_left_at(now_ns()));
     }
@@ -49,7 +49,7 @@ struct Flight {
         RC_ASSERT(fine_ticks[n] == want * direction);
       } else {
         const std::size_t want = reference.steps_at(now_ns()) - reference.steps_at(from_ns);
-        const bool forward = direction > 0 && reference.delay_at(from_ns) != 0;
+        const bool forward = direction > 0 && reference.long_delay_at(from_ns) != 0;
         RC_ASSERT(coarse_ticks[n] == (want | (forward ? BUSHD_COARSE_DIRECTION : 0u)));
       }
     }
@@ -82,7 +82,7 @@ TEST(Retarget, ChangesAtAnyTickFollowTheDefinition) {
     const Law law = any_law();
     const TestTable table(law, *rc::gen::arbitrary<bool>());
     const auto steps = between<uint32_t>(1, 120);
-    const uint16_t first_floor = any_floor(law);
+    const uint64_t first_floor = any_long_floor(law);
     Flight flight{.run = {},
                   .reference = Reference::move(law, steps, first_floor),
                   .tick_ns = any_tick_ns(law),
@@ -94,7 +94,7 @@ TEST(Retarget, ChangesAtAnyTickFollowTheDefinition) {
       flight.fly(std::min<uint64_t>(between<uint64_t>(0, left / flight.tick_ns + 1), kMostTicks));
       const auto after = between<uint32_t>(0, between(0, 1) != 0 ? 10 : 150);
       const bushd_run before = flight.run;
-      const uint16_t floor = any_floor(law);
+      const uint64_t floor = any_long_floor(law);
       const bool taken = bushd_run_retarget(&flight.run, after, floor);
       RC_ASSERT(taken == flight.reference.retarget_at(flight.now_ns(), after, floor));
       if (!taken) {

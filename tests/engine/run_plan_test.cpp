@@ -13,7 +13,7 @@ std::vector<uint16_t> delays_left(bushd_run run) {
   std::vector<uint16_t> delays;
   while (!bushd_run_done(&run)) {
     const uint32_t before = run.steps_done;
-    const uint16_t delay = bushd_run_delay(&run);
+    const auto delay = static_cast<uint16_t>(bushd_run_delay(&run));
     // Up to its end, and not a ns more.
     const uint32_t unit_ns = run.table->time_unit_ns;
     const uint64_t ns = uint64_t{delay - run.since} * unit_ns - run.since_ns;

@@ -36,10 +36,11 @@ TEST(RunSlots, EveryStepFallsIntoItsSlotByTheSumOfTheDelays) {
     const auto steps = between<uint32_t>(1, 200);
     const int direction = between(0, 1) != 0 ? 1 : -1;
     const auto late_ns = between<uint32_t>(0, 2) == 0 ? between<uint32_t>(0, tick_ns - 1) : 0;
-    auto reference = Reference::move(table.law(), steps);
+    const uint64_t floor = any_long_floor(table.law());
+    auto reference = Reference::move(table.law(), steps, floor);
     reference.begin_late(late_ns);
     bushd_run run;
-    bushd_run_start(&run, table.view(), steps, direction, 0);
+    bushd_run_start(&run, table.view(), steps, direction, floor);
     bushd_run_begin_late(&run, late_ns);
     size_t made = 0;
     for (uint64_t tick = 0; tick < 3000 && !bushd_run_done(&run); ++tick) {
@@ -56,6 +57,45 @@ TEST(RunSlots, EveryStepFallsIntoItsSlotByTheSumOfTheDelays) {
       RC_ASSERT(run.steps_done == made);
     }
   });
+}
+
+// A step an hour, by tables of nanoseconds too: each step to its slot, and its 256 parts before it.
+TEST(RunSlots, AStepAnHourIsExactToASlot) {
+  constexpr uint32_t kTickNs = 2'560'000;
+  constexpr uint64_t kHourNs = BUSHD_LONGEST_DELAY_NS;
+  const std::vector<uint8_t> nothing(1000, BUSHD_COARSE_DIRECTION);
+  for (const uint32_t unit_ns : {1u, 19u, 40'000u}) {
+    const TestTable table({{60'000, 30'000}, {60'000}, 30'000, unit_ns}, true);
+    const uint64_t delay_ns = kHourNs / unit_ns * unit_ns;
+    bushd_run run;
+    bushd_run_start(&run, table.view(), 3, 1, kHourNs / unit_ns);
+    bushd_run fine = run;
+    uint64_t tick = 0;
+    for (uint64_t step = 1; step <= 3; ++step) {
+      const uint64_t tick_of_step = (step * delay_ns - 1) / kTickNs;
+      while (tick + 10 < tick_of_step) {
+        const size_t ticks = std::min<uint64_t>(nothing.size(), tick_of_step - 10 - tick);
+        std::vector<uint8_t> made(ticks);
+        bushd_run_expand_coarse(&run, kTickNs, ticks, made.data(), 1);
+        ASSERT_TRUE(std::equal(made.begin(), made.end(), nothing.begin())) << tick;
+        tick += ticks;
+      }
+      for (; tick < tick_of_step; ++tick) ASSERT_EQ(emit(&run, kTickNs, 256, 1).steps, 0) << tick;
+      std::vector<uint16_t> expected(256);
+      const uint64_t in_tick_ns = step * delay_ns - tick_of_step * kTickNs;
+      expected[std::min<uint64_t>(in_tick_ns * 256 / kTickNs, 255)] = 1;
+      const Emitted emitted = emit(&run, kTickNs, 256, 1);
+      ++tick;
+      EXPECT_EQ(emitted.steps, 1);
+      EXPECT_EQ(emitted.masks, expected) << "step " << step << ", unit " << unit_ns;
+    }
+    EXPECT_TRUE(bushd_run_done(&run));
+    uint64_t ticks = 0;
+    for (int16_t displacement = 0; displacement == 0; ++ticks) {
+      bushd_run_expand_fine(&fine, kTickNs, 1, &displacement, 1);
+    }
+    EXPECT_EQ(ticks, (delay_ns / 256 + (delay_ns % 256 != 0) + kTickNs - 1) / kTickNs);
+  }
 }
 
 TEST(RunSlots, TimeUnitOfSecondsIsCountedToItsEnd) {
@@ -85,7 +125,8 @@ TEST(RunSlots, LeavesTheRunWhereAnExpandedTickLeavesIt) {
     const TestTable table(any_law(), between(0, 1) != 0);
     const uint32_t tick_ns = any_tick_ns(table.law());
     bushd_run by_ticks;
-    bushd_run_start(&by_ticks, table.view(), between<uint32_t>(1, 300), -1, 0);
+    bushd_run_start(&by_ticks, table.view(), between<uint32_t>(1, 300), -1,
+                    any_long_floor(table.law()));
     bushd_run mixed = by_ticks;
     for (int tick = 0; tick < 400; ++tick) {
       if (tick == 50) {

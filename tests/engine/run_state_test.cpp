@@ -135,7 +135,7 @@ TEST(RunState, CruisesOnlyIfItDoesThroughout) {
 std::vector<uint32_t> delays(bushd_run run, size_t most) {
   std::vector<uint32_t> all;
   while (!bushd_run_done(&run) && all.size() < most) {
-    all.push_back(bushd_run_delay(&run));
+    all.push_back(static_cast<uint32_t>(bushd_run_delay(&run)));
     if (run.lead_delay != 0) {
       run.lead_delay = 0;
     } else if (run.accel_at < run.accel_end) {

@@ -91,6 +91,14 @@ inline uint16_t any_floor(const Law& law) {
   }
 }
 
+// That, or one beyond all codes, up to a step an hour.
+inline uint64_t any_long_floor(const Law& law) {
+  const uint64_t longest = BUSHD_LONGEST_DELAY_NS / law.unit_ns;
+  if (longest <= UINT16_MAX || between(0, 1) != 0) return any_floor(law);
+  const auto factor = *rc::gen::element<uint64_t>(1, 2, 100, 100'000, 100'000'000);
+  return std::min(longest, (UINT16_MAX + between<uint64_t>(1, 70'000)) * factor);
+}
+
 // A tick of any length that lets no more than 127 steps fall into it, as the engine demands.
 inline uint32_t any_tick_ns(const Law& law) {
   const uint64_t most = uint64_t{law.cruise} * law.unit_ns * 127 - 1;

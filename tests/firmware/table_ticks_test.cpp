@@ -30,7 +30,7 @@ class TableTicks : public Streams {
       bushd_run_expand_coarse(run, Rig::kTickNs, count, bytes.data(), 1);
       head.displacements.assign(bytes.begin(), bytes.end());
     }
-    head.delays = {bushd_run_delay(run)};
+    head.delays = {static_cast<std::uint16_t>(bushd_run_delay(run))};
     return head;
   }
   const TestTable table{law, false};

@@ -258,7 +258,7 @@ FakeBus::Ticks FakeBus::read_table_ticks(const Heard& frame) const {
       bushd_run_expand_coarse(&run, setup.tick_ns, ticks.count, coarse.data(), 1);
       std::copy(coarse.begin(), coarse.end(), displacements.begin());
     }
-    delay = bushd_run_delay(&run);
+    delay = static_cast<std::uint16_t>(bushd_run_delay(&run));
   }
   return read;
 }

@@ -12,7 +12,7 @@ class Tables : public testing::TestWithParam<bushd_format> {
     bus.source.displacement = [this](std::uint8_t m, Tick t) { return displacement(m, t); };
     bus.source.delay = [this](std::uint8_t m, Tick t) {
       const auto run = at(m, t);
-      return run ? bushd_run_delay(&*run) : std::uint16_t{0};
+      return run ? static_cast<std::uint16_t>(bushd_run_delay(&*run)) : std::uint16_t{0};
     };
     bus.source.end = [this](std::uint8_t m) { return end(m); };
     bus.source.segment = [this](std::uint8_t m, Tick first,

@@ -200,12 +200,14 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
         before.reset();
         const Tick at = now + between<Tick>(1, 12);
         Plan changed = plan;
-        random.stopping() ? changed.stop(at)
-                          : changed.aim(at, random.target_steps(), random.floor());
+        random.stopping()
+            ? changed.stop(at)
+            : changed.aim(at, random.target_steps(), static_cast<std::uint16_t>(random.floor()));
         const bool over = at >= std::max<Tick>(plan.end_tick(), 1);
         const auto cruise = [&](std::uint16_t floor) { return std::max(any.law().cruise, floor); };
         const bool faster_or_slower =
-            !random.stopping() && cruise(random.floor()) != cruise(plan.floor);
+            !random.stopping() &&
+            cruise(static_cast<std::uint16_t>(random.floor())) != cruise(plan.floor);
         const bool differs = !over && (changed.end_steps() != plan.end_steps() || faster_or_slower);
         RC_ASSERT(random.change(at) == differs);
         if (differs) {

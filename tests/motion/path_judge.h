@@ -22,7 +22,7 @@ namespace bushd::test {
 inline std::unique_ptr<motion::Path> path_through(const std::vector<motion::Path::Motor>& motors,
                                                   const std::vector<std::int64_t>& points,
                                                   motion::Path::Corners corners,
-                                                  const std::vector<std::uint16_t>& floors = {}) {
+                                                  const std::vector<bushd_delay>& floors = {}) {
   const std::size_t width = motors.size();
   const std::span all(points);
   auto path = std::make_unique<motion::Path>(motors, all.first(width), corners);
@@ -111,7 +111,8 @@ inline std::string too_close(const motion::Path& path, const std::vector<Ran>& r
       const OwnStep& a = steps[i - 1];
       const OwnStep& b = steps[i];
       made = b.begins ? 0 : made + 1;
-      std::uint32_t least = std::max(table.cruise, path.motors()[m].floor);
+      auto least =
+          static_cast<std::uint32_t>(std::max<bushd_delay>(table.cruise, path.motors()[m].floor));
       if (b.begins) {
         if (rests) least = std::max<std::uint32_t>(least, table.accel.code[0]);
       } else {

@@ -28,7 +28,7 @@ struct Planned {
 };
 
 Planned planned(const std::vector<Law>& laws, std::vector<std::int64_t> points,
-                Path::Corners corners, std::vector<std::uint16_t> floors = {}) {
+                Path::Corners corners, std::vector<bushd_delay> floors = {}) {
   Planned made;
   std::vector<Path::Motor> motors;
   for (const Law& law : laws) {

@@ -67,17 +67,28 @@ TEST_F(WayTest, TakesAsLongAsIsAsked) {
   EXPECT_LT(way.duration_ns(), 1.001e9);
   EXPECT_THAT(Way({{quick_.view(), 0, 1000, 0}}).take(least_s / 2, 1e12).error().message,
               HasSubstr("the line takes at least"));
-  EXPECT_THAT(way.take(1000.0, 1e12).error().message, HasSubstr("the line takes at most 65.535 s"));
+  EXPECT_THAT(way.take(4e6, 1e16).error().message, HasSubstr("the line takes at most 3.6e+06 s"));
   EXPECT_THAT(way.take(50.0, 3e10).error().message, HasSubstr("the line takes at most 30 s"));
   EXPECT_FALSE(way.take(-1, 1e12));
   EXPECT_FALSE(way.take(0.0 / 0.0, 1e12));
 }
 
+// Its table has longer time units then, so that its MCUs can be told.
+TEST_F(WayTest, TakesLongerThan16BitsOfItsUnitsTell) {
+  for (const double asked_s : {70.0, 1000.0, 3.6e6}) {
+    Way way({{quick_.view(), 0, 1000, 0}, {slow_.view(), 0, 100, 0}});
+    ASSERT_TRUE(way.take(asked_s, 1e16));
+    EXPECT_GE(way.duration_ns(), asked_s * 1e9);
+    EXPECT_LT(way.duration_ns(), asked_s * 1e9 * (1 + 2.0 / UINT16_MAX));
+    EXPECT_TRUE(bushd_delay_is_code(way.floor()));
+  }
+}
+
 TEST_F(WayTest, TakesOtherFloors) {
   Way way({{quick_.view(), 0, 1000, 0}, {quick_.view(), 0, 100, 0}});
-  EXPECT_TRUE(way.set_floors(std::vector<std::uint16_t>{0, 4000}));
-  EXPECT_EQ(way.floor(), 400);
-  EXPECT_EQ(way.motors()[1].floor, 4000);
+  way.set_floors(std::vector<bushd_delay>{0, 4000});
+  EXPECT_EQ(way.floor(), 400U);
+  EXPECT_EQ(way.motors()[1].floor, 4000U);
   EXPECT_EQ(way.most_steps_per_s(1), 250.0);
 }
 

@@ -191,7 +191,7 @@ class InMotion:
         steps_per_s = rng.randint(100, 3000) * rng.choice((-1, 1))
         speed = written(Fraction(steps_per_s) / (1 if in_steps else motor.steps_per_unit), 6)
         if rng.random() < 0.03 or Fraction(speed) == 0:
-            speed = "0.00001"
+            speed = "0.0000000001"
         silent = rng.random() < 0.15
         request = {"motor": motor.name, "speed": float(speed), "speed_in_steps": in_steps,
                    "keepalive_ms": rng.randint(100, 400) if silent else 10000}

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Optional
 
 MOST_STEPS = 2**31 - 1
-LONGEST_DELAY = 65535  # time units
+LONGEST_DELAY_S = 3600
 
 
 class Refused(Exception):
@@ -141,10 +141,9 @@ class Motor:
         for value, scale in ((self.max_speed, self.steps_per_unit), (speed, 1 if in_steps else self.steps_per_unit)):
             if value is None:
                 continue
-            delay = above(Fraction(10**9) / (value * scale * self.time_unit_ns))
-            if delay > LONGEST_DELAY:
-                raise Refused("time units a step")
-            floors.append(delay)
+            if value * scale * LONGEST_DELAY_S < 1:
+                raise Refused("an hour a step")
+            floors.append(above(Fraction(10**9) / (value * scale * self.time_unit_ns)))
         return max(floors)
 
     def backlash_steps(self) -> int:

@@ -109,7 +109,7 @@ class Sequence(InMotion):
         steps_per_s = rng.choice((rng.randint(100, 3000), rng.randint(30, 300), rng.randint(100, 3000)))
         speed = written(Fraction(steps_per_s) / scale, 6)
         if Fraction(speed) <= 0 or rng.random() < 0.03:
-            speed = "0.00001"
+            speed = "0.0000000001"
         return {"speed": float(speed), "speed_in_steps": in_steps}
 
     def make_move(self, motors, bases, absolute=None):

@@ -180,7 +180,7 @@ TEST(TakeStep, HasTheDelaysOfTheRule) {
     for (std::uint32_t j = 1; j <= steps; ++j) {
       ASSERT_EQ(bushd_run_take_step(&run), bushd_table_delay(&profile.table, j, steps));
     }
-    EXPECT_EQ(bushd_run_take_step(&run), 0);
+    EXPECT_EQ(bushd_run_take_step(&run), 0U);
     EXPECT_EQ(run.steps_done, steps);
   }
 }

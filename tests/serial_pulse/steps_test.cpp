@@ -172,14 +172,14 @@ TEST(StepsOnALine, TwoChangesBetweenTwoStepsOfAMotor) {
   for (const auto& [at, floor] : {std::pair<std::uint32_t, std::uint16_t>{604, 100}, {1400, 50}}) {
     while (run.steps_done < at) {
       ends_ns.push_back(ends_ns.back() +
-                        std::int64_t{bushd_run_take_step(&run)} * table.time_unit_ns);
+                        static_cast<std::int64_t>(bushd_run_take_step(&run)) * table.time_unit_ns);
     }
     ASSERT_TRUE(bushd_run_retarget(&run, bushd_run_steps_left(&run) - 1, floor));
     steps.become(run);
   }
   while (bushd_run_steps_left(&run) > 0) {
     ends_ns.push_back(ends_ns.back() +
-                      std::int64_t{bushd_run_take_step(&run)} * table.time_unit_ns);
+                      static_cast<std::int64_t>(bushd_run_take_step(&run)) * table.time_unit_ns);
   }
   while (steps.left() > 0) {
     made_ns.push_back(made_ns.back() + static_cast<std::int64_t>(steps.take_ns()));

@@ -89,7 +89,7 @@ void judge(const LinePart& part, std::uint32_t longest, const std::vector<Wide>&
   const auto made = static_cast<std::uint32_t>(times.size());
   for (std::uint32_t j = 2; j <= made; ++j) {
     const Wide between_steps = (times[j - 1] - times[j - 2]) * unit_ns;
-    const Wide allowed = std::max(bushd_table_delay(part.table, j, made), part.floor);
+    const Wide allowed = std::max<bushd_delay>(bushd_table_delay(part.table, j, made), part.floor);
     RC_ASSERT(between_steps >= allowed * part.table->time_unit_ns * 2 * n);
   }
 }
@@ -100,11 +100,13 @@ TEST(Envelope, NoMotorStepsFasterThanItsOwnTable) {
     const Envelope envelope(line.parts, line.longest);
     const bushd_table& table = envelope.view();
     RC_ASSERT(bushd_table_check(&table, nullptr, nullptr) == BUSHD_OK);
-    const std::vector<Wide> whole = delays_of(table, line.longest, envelope.floor());
+    const std::vector<Wide> whole =
+        delays_of(table, line.longest, static_cast<std::uint16_t>(envelope.floor()));
     for (int stops = 0; stops < 8; ++stops) {
       std::vector<Wide> delays = whole;
       if (stops > 0) {
-        stop_at(delays, between<std::size_t>(0, delays.size() - 1), table, envelope.floor());
+        stop_at(delays, between<std::size_t>(0, delays.size() - 1), table,
+                static_cast<std::uint16_t>(envelope.floor()));
       }
       for (const LinePart& part : line.parts) {
         judge(part, line.longest, delays, table.time_unit_ns);
@@ -162,7 +164,7 @@ TEST(Envelope, AFloorIsThatOfItsMotorTimesItsShare) {
   const TestTable table({.accel = {100, 50}, .decel = {100, 50}, .cruise = 50, .unit_ns = 1000},
                         false);
   const std::vector<LinePart> parts{{table.view(), 10}, {table.view(), 3, 501}};
-  EXPECT_EQ(Envelope(parts, 10).floor(), 151);
+  EXPECT_EQ(Envelope(parts, 10).floor(), 151U);
   EXPECT_EQ(tables::limiting_part(parts, 10), 1u);
 }
 

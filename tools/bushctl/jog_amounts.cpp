@@ -10,7 +10,7 @@ using bushd::tables::TableContent;
 using bushd::units::Coordinates;
 
 constexpr double kStepsOfAStep = 10;
-constexpr double kLongestDelay = 65534;  // and not 65535, which the daemon might round up
+constexpr double kSlowestPerS = 1.0001 / 3600;  // a step an hour is what the daemon takes
 
 // The next of ..., 0.1, 0.2, 0.5, 1, 2, 5, ...
 double round_up(double value) {
@@ -35,7 +35,7 @@ JogAmounts jog_amounts(const TableContent* table, const bushd::units::Scale& sca
   if (table == nullptr) return amounts;
   const double per_s = 1e9 / table->time_unit_ns * units_per_step;  // of a step a time unit
   amounts.speed = per_s / table->accel.front();
-  amounts.least_speed = per_s / kLongestDelay;
+  amounts.least_speed = kSlowestPerS * units_per_step;
   amounts.most_speed = per_s / table->cruise.value_or(table->accel.back());
   return amounts;
 }

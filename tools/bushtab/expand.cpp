@@ -72,7 +72,7 @@ int expand(const Places& places, const Expansion& expansion) {
             steps_per_tick, expansion.tick_us, BUSHD_MAX_STEPS_PER_TICK),
         .file = (*table)->path()});
   }
-  std::uint16_t floor = 0;
+  bushd_delay floor = 0;
   if (expansion.speed) {
     const auto delay = bushd::units::Coordinates().delay_at(*expansion.speed, view->time_unit_ns);
     if (!delay) return refuse(delay.error());

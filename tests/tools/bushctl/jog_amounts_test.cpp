@@ -47,9 +47,11 @@ TEST(JogAmounts, StayWithinTheTable) {
   amounts.change_speed(5);
   EXPECT_DOUBLE_EQ(amounts.speed, 2.5) << "1000 steps/s";
   amounts.change_speed(-20);
-  // 65535 time units a step are what the daemon takes.
-  EXPECT_GT(amounts.speed * 400, 1e6 / 65535);
-  EXPECT_LT(amounts.speed * 400, 1e6 / 65535 * 1.0001);
+  EXPECT_DOUBLE_EQ(amounts.speed, 2.5 / (1 << 20)) << "twenty times the half of it";
+  amounts.change_speed(-20);
+  // A step an hour is what the daemon takes.
+  EXPECT_GT(amounts.speed * 400, 1.0 / 3600);
+  EXPECT_LT(amounts.speed * 400, 1.001 / 3600);
   amounts.change_step(-20);
   EXPECT_DOUBLE_EQ(amounts.step * 400, 1);
 }
