@@ -136,7 +136,7 @@ class Script : public testing::Test {
             bushd_encode_table_ticks(0, state_flags, first, kCount, &entry, 1, payload.data()));
         tell(BUSHD_MSG_TABLE_TICKS, payload);
       } else {
-        const std::uint16_t delay = bushd_run_delay(&run);
+        const auto delay = static_cast<std::uint16_t>(bushd_run_delay(&run));
         std::size_t size = bushd_encode_ticks_head(0, flags, first, kCount,
                                                    static_cast<std::uint16_t>(1u << motor), &delay,
                                                    payload.data());
