@@ -211,10 +211,11 @@ void Connector::identify_ended(std::int64_t now_us, McuIndex mcu) {
     take(now_us, mcu, first);
     return;
   }
-  mcus_[mcu].view.detail = "shares its address " + std::to_string(mcus_[mcu].setup.address.value) +
-                           " with another: unique ids " + unique_id_text(first) + " and " +
-                           unique_id_text(*other) +
-                           "; unplug one, or give one another address with 'bushctl address'";
+  mcus_[mcu].view.detail =
+      "shares its address " + std::to_string(mcus_[mcu].setup.address.value) +
+      " with another: unique ids " + unique_id_text(first) + " and " + unique_id_text(*other) +
+      "; unplug one, or stop bushd and give one another address: 'bushctl address PORT "
+      "UNIQUE_ID NEW --baud B'";
   links_[mcu].retry_due_us = now_us + kRefusedRetryUs;
   links_[mcu].identify_attempts = 1;  // in slots again
 }

@@ -11,7 +11,7 @@ namespace bushctl {
 
 void add_doctor_command(CommandLine& line) {
   struct Options {
-    std::string config = kSystemConfig;
+    std::string config;
     double watch_s = 2;
     bool json = false;
   };
@@ -21,7 +21,9 @@ void add_doctor_command(CommandLine& line) {
           "Changes nothing, and works without a daemon. As root it also sees which programs of "
           "other users have a port open.\n"
           "Exit codes: 0 no errors (warnings perhaps), 1 an error was found.")
-      .file("--config", &options->config, "Configuration of the daemon")
+      .file("--config", &options->config,
+            "Configuration to examine (default: that of the daemon that runs, else that of the "
+            "service)")
       .number<double>("--watch-s", &options->watch_s, 0.0, 3600.0,
                       "How long errors on the lines are counted")
       .flag("--json", &options->json, "Print JSON")

@@ -69,8 +69,8 @@ int latency_test(const LineOptions& options, std::uint8_t address, unsigned coun
     if (!answers->empty()) test.latencies_us.push_back(answers->front().latency_us);
   }
   if (test.latencies_us.empty()) {
-    return failed({.message = fmt::format("{}: address {} does not answer at {} baud; 'bushctl "
-                                          "scan' shows who does",
+    return failed({.message = fmt::format("{0}: address {1} does not answer at {2} baud; "
+                                          "'bushctl scan {0} --baud {2}' shows who does",
                                           options.port, address, options.baud)});
   }
   std::sort(test.latencies_us.begin(), test.latencies_us.end());
@@ -100,8 +100,8 @@ int set_address(const LineOptions& options, const std::string& unique_id, std::u
   if (!id) {
     fmt::print(stderr,
                "bushctl: \"{}\" is no unique id; one has 16 hexadecimal digits, and "
-               "'bushctl scan' shows them\n",
-               unique_id);
+               "'bushctl scan {} --baud {}' shows them\n",
+               unique_id, options.port, options.baud);
     return kUsage;
   }
   auto line = BusLine::open(options.port, options.baud);

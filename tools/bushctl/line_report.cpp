@@ -141,7 +141,7 @@ std::vector<std::string> scan_lines(std::vector<Found> found) {
   for (const auto& [address, ids] : doubled(found)) {
     notes.push_back(
         fmt::format("address {} is that of {} MCUs ({}): give all but one another, with "
-                    "'bushctl address'",
+                    "'bushctl address PORT UNIQUE_ID NEW --baud B'",
                     address, ids.size(), fmt::join(ids, ", ")));
   }
   std::vector<std::string> out = grid.lines();

@@ -47,8 +47,10 @@ std::string trouble(const Found& mcu) {
         "(bushd-flash)",
         mcu.address, mcu.identity.protocol_version, BUSHD_PROTOCOL_VERSION);
   }
-  return fmt::format("address {} is that of another MCU too: 'bushctl address' gives {} another",
-                     mcu.address, unique_id_text(mcu.identity));
+  return fmt::format(
+      "address {} is that of another MCU too: 'bushctl address PORT {} NEW --baud B' gives it "
+      "another",
+      mcu.address, unique_id_text(mcu.identity));
 }
 
 std::string in_quotes(std::string_view text) {

@@ -81,10 +81,11 @@ Observations good() {
 // Of what is not in order: "error port: ... -> ...".
 std::vector<std::string> complaints(const Observations& seen) {
   std::vector<std::string> out;
-  for (const auto& [level, check, text, remedy] : diagnose(seen)) {
-    if (level == Level::kOk) continue;
-    EXPECT_FALSE(remedy.empty()) << text;
-    out.push_back(std::string(word(level)) + " " + check + ": " + text + " -> " + remedy);
+  for (const Finding& found : diagnose(seen)) {
+    if (found.level == Level::kOk) continue;
+    EXPECT_FALSE(found.remedy.empty()) << found.seen;
+    out.push_back(std::string(word(found.level)) + " " + found.check + ": " + found.seen + " -> " +
+                  found.remedy);
   }
   return out;
 }
@@ -185,8 +186,11 @@ TEST(Doctor, LcmNeedsARouteThatFitsItsTtlAndRoom) {
               ElementsAre(HasSubstr("leads to eth0")));
   EXPECT_THAT(with([](Observations& seen) { seen.lcm.largest_buffer = 212'992; }),
               ElementsAre(HasSubstr("net.core.rmem_max is 212992")));
-  EXPECT_THAT(with([](Observations& seen) { seen.lcm.sockets = {{.port = 7667, .drops = 5}}; }),
-              ElementsAre(HasSubstr("5 datagrams found no room")));
+  EXPECT_THAT(with([](Observations& seen) { seen.lcm.sockets = {{.port = 7667, .drops = 42}}; }),
+              IsEmpty())
+      << "bushd's own filter has refused them, or it was long ago";
+  EXPECT_THAT(with([](Observations& seen) { seen.lcm.lost_meanwhile = 5; }),
+              ElementsAre(HasSubstr("5 datagrams found no room at port 7667 while doctor looked")));
 }
 
 TEST(Doctor, AClockThatNobodySetsIsAWarningAndOneThatIsWrongAnError) {
@@ -342,6 +346,54 @@ TEST(Doctor, JsonHasEveryFindingAndTextsDoNotSteerTheTerminal) {
   EXPECT_EQ(parsed["findings"][0]["level"], "ok");
   EXPECT_TRUE(parsed["findings"][0]["remedy"].is_null());
   for (const std::string& line : lines(found)) EXPECT_EQ(line.find('\x1b'), std::string::npos);
+}
+
+TEST(Doctor, WhatManyHaveIsToldInOneLine) {
+  Observations seen = good();
+  auto& motors = seen.daemon.status.states[0].snapshot.motors;
+  motors.clear();
+  for (int i = 1; i <= 128; ++i) {
+    motors.push_back({.name = "m" + std::to_string(i),
+                      .trust = api::Trust::kUncertain,
+                      .uncertain_reason = "it moved, last at " + std::to_string(i)});
+  }
+  const Findings found = diagnose(seen);
+  const auto told = lines(found);
+  const auto of_positions = std::ranges::find_if(
+      told, [](const std::string& line) { return line.starts_with("warning  position"); });
+  ASSERT_NE(of_positions, told.end());
+  EXPECT_THAT(*of_positions, HasSubstr("128 motors are uncertain: m1, m2, m3 and 125 more. m1 is "
+                                       "uncertain, it moved, last at 1"));
+  EXPECT_THAT(of_positions[1],
+              HasSubstr("find out where it stands and run 'bushctl set NAME --dial "
+                        "POSITION'"));
+  EXPECT_EQ(told.back(), "0 errors, 128 warnings");
+  EXPECT_EQ(told.end() - of_positions, 3);
+  EXPECT_EQ(nlohmann::json::parse(json(found))["warnings"], 128);
+  motors.resize(3);
+  EXPECT_THAT(lines(diagnose(seen)), testing::Contains(HasSubstr("m3 is uncertain")));
+}
+
+TEST(Doctor, OnlyWhatHasAHomeSwitchIsToBeHomed) {
+  const auto remedy = [](std::vector<std::string> with_home) {
+    return with([&](Observations& seen) {
+      seen.configuration.with_home = with_home;
+      auto& motor = seen.daemon.status.states[0].snapshot.motors[0];
+      motor = {.name = "theta", .trust = api::Trust::kUncertain};
+    });
+  };
+  EXPECT_THAT(remedy({}), ElementsAre(AllOf(HasSubstr("'bushctl set theta --dial POSITION'"),
+                                            testing::Not(HasSubstr("home")))));
+  EXPECT_THAT(remedy({"theta"}), ElementsAre(HasSubstr("run 'bushctl home theta', or")));
+}
+
+TEST(Proc, FiltersOfProgramsLoseNothing) {
+  EXPECT_EQ(datagrams_without_room("Ip: Forwarding InErrors\nIp: 1 5\n"
+                                   "Udp: InDatagrams InErrors RcvbufErrors\nUdp: 7595 3705 3510\n"
+                                   "UdpLite: InDatagrams InErrors RcvbufErrors\nUdpLite: 1 2 3\n"),
+            3510);
+  EXPECT_EQ(datagrams_without_room(""), 0);
+  EXPECT_EQ(datagrams_without_room("Udp: InDatagrams RcvbufErrors\nUdp: 5\n"), 0);
 }
 
 TEST(Proc, TheLongestPrefixIsTheRoute) {

@@ -69,10 +69,9 @@ TEST(Setup, McusThatCannotBeNamedAreComments) {
   ASSERT_TRUE(config) << config.error().text();
   EXPECT_EQ(config->mcus.size(), 1u);
   const std::string text = configuration_text({found}, 2560, "x");
-  EXPECT_THAT(text,
-              AllOf(HasSubstr("# address 1 is that of another MCU too: 'bushctl address' gives "
-                              "00000000000000bb another"),
-                    HasSubstr("# address 7 speaks protocol version 1")));
+  EXPECT_THAT(text, AllOf(HasSubstr("# address 1 is that of another MCU too: 'bushctl address PORT "
+                                    "00000000000000bb NEW --baud B' gives it another"),
+                          HasSubstr("# address 7 speaks protocol version 1")));
   EXPECT_THAT(found_lines(found),
               ElementsAre(HasSubstr("00000000000000aa"), HasSubstr("00000000000000bb"),
                           HasSubstr("protocol version 1")));

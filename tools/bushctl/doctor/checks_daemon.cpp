@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "api/remedy.h"
 #include "api/words.h"
 #include "diagnosis.h"
 
@@ -52,7 +53,7 @@ void check_file(const Observations& seen, Findings& out) {
   if (daemon.config_path != file.path) {
     out.push_back({Level::kWarning, "daemon",
                    "the daemon has another configuration: " + daemon.config_path,
-                   "bushctl doctor --config " + daemon.config_path});
+                   "'bushctl doctor --config " + daemon.config_path + "'"});
   } else if (!file.sha256.empty() && daemon.config_sha256 != file.sha256) {
     out.push_back({Level::kWarning, "daemon", file.path + " was changed since bushd has read it",
                    "sudo systemctl restart bushd: motors ramp down first"});
@@ -91,19 +92,37 @@ void check_messages(const Observations& seen, Findings& out) {
   }
 }
 
+Finding of_mcu(const api::StateSnapshot& mcu, std::string seen, std::string remedy,
+               std::string of_several) {
+  return {.level = Level::kError,
+          .check = "mcu",
+          .seen = std::move(seen),
+          .remedy = std::move(remedy),
+          .about = mcu.mcu,
+          .of_several = std::move(of_several)};
+}
+
 Finding offline(const api::StateSnapshot& mcu) {
+  constexpr const char* kSeveral = "MCUs are offline";
   const std::string seen = fmt::format("{} is offline: {}", mcu.mcu, mcu.detail);
   if (mcu.detail.find("protocol version") != std::string::npos) {
-    return {Level::kError, "mcu", seen,
-            "'bushd-flash --check' compares image and daemon; flash the MCU, or upgrade bushd"};
+    return of_mcu(
+        mcu, seen,
+        "'bushd-flash --check' compares image and daemon; flash the MCU, or upgrade bushd",
+        kSeveral);
   }
   if (mcu.detail.find("shares its address") != std::string::npos) {
-    return {Level::kError, "mcu", seen,
-            "stop bushd; 'bushctl scan' shows both, 'bushctl address' gives one another address"};
+    return of_mcu(
+        mcu, seen,
+        "stop bushd; 'bushctl scan PORT --baud B' shows both, 'bushctl address PORT UNIQUE_ID NEW "
+        "--baud B' gives one another address",
+        kSeveral);
   }
-  return {Level::kError, "mcu", seen,
-          "is it powered, is its address and baud rate that of bushd.toml, are A and B swapped? "
-          "Stop bushd: 'bushctl scan PORT --baud B' shows who answers"};
+  return of_mcu(
+      mcu, seen,
+      "is it powered, is its address and baud rate that of bushd.toml, are A and B swapped? "
+      "Stop bushd: 'bushctl scan PORT --baud B' shows who answers",
+      kSeveral);
 }
 
 // Of the MCUs of all buses, by bus.
@@ -128,18 +147,30 @@ void check_versions(const Observations& seen, Findings& out) {
   }
 }
 
-Finding position(const api::MotorState& motor) {
+// How its position becomes known, as far as this PC knows what the motor has.
+std::string home_or_set(const Observations& seen, const std::string& motor) {
+  const std::string set = "find out where it stands and run " + api::set_remedy(motor);
+  const ConfigurationSeen& file = seen.configuration;
+  const bool told = !file.path.empty() && file.path == seen.daemon.config_path;
+  if (!told) return api::remedy("home", motor) + " if it has a home switch, or " + set;
+  const bool has_home = std::ranges::find(file.with_home, motor) != file.with_home.end();
+  return (has_home ? "run " + api::remedy("home", motor) + ", or " : "") + set;
+}
+
+Finding position(const Observations& seen, const api::MotorState& motor) {
   const std::string why =
       motor.uncertain_reason.empty() ? "" : ", " + std::string(motor.uncertain_reason);
-  const std::string seen = fmt::format("{} is {}{}", motor.name, word(motor.trust), why);
+  Finding finding{.level = Level::kWarning,
+                  .check = "position",
+                  .seen = fmt::format("{} is {}{}", motor.name, word(motor.trust), why),
+                  .remedy = home_or_set(seen, motor.name),
+                  .about = motor.name,
+                  .of_several = fmt::format("motors are {}", word(motor.trust))};
   if (motor.trust == api::Trust::kRestored) {
-    return {Level::kWarning, "position", seen,
-            "look at the motor: 'bushctl confirm " + motor.name +
-                "' if it has not been turned, "
-                "else home or set it"};
+    finding.remedy = "look at the motor: " + api::remedy("confirm", motor.name) +
+                     " if it has not been turned, else " + finding.remedy;
   }
-  return {Level::kWarning, "position", seen,
-          "'bushctl home " + motor.name + "', or find out where it stands and 'bushctl set' it"};
+  return finding;
 }
 
 }  // namespace
@@ -189,8 +220,10 @@ Findings check_mcus(const Observations& seen) {
     if (mcu.state == api::McuState::kOffline) {
       out.push_back(offline(mcu));
     } else if (mcu.state == api::McuState::kFault) {
-      out.push_back({Level::kError, "mcu", fmt::format("{}: {}", mcu.mcu, mcu.detail),
-                     "remove the cause, then 'bushctl clear' (docs/troubleshooting.md, Moves)"});
+      out.push_back(
+          of_mcu(mcu, fmt::format("{}: {}", mcu.mcu, mcu.detail),
+                 "remove the cause, then 'bushctl clear' (docs/troubleshooting.md, Moves)",
+                 "MCUs have a fault"));
     }
   });
   check_versions(seen, out);
@@ -204,7 +237,7 @@ Findings check_positions(const Observations& seen) {
   for_each_mcu(seen, [&](const api::StateSnapshot& mcu) {
     for (const api::MotorState& motor : mcu.motors) {
       if (motor.trust == api::Trust::kRestored || motor.trust == api::Trust::kUncertain) {
-        out.push_back(position(motor));
+        out.push_back(position(seen, motor));
       } else if (motor.trust == api::Trust::kKnown) {
         ++known;
       }

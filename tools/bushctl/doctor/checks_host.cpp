@@ -156,17 +156,13 @@ Findings check_lcm(const Observations& seen) {
                                *lcm.device),
                    "sudo systemctl restart bushd-lcm-route: LCM stops when that network does"});
   }
-  std::uint64_t drops = 0;
   std::uint64_t queued = 0;
-  for (const UdpSocket& socket : lcm.sockets) {
-    drops += socket.drops;
-    queued = std::max(queued, socket.queued_bytes);
-  }
-  if (drops > 0 || queued > kManyQueuedBytes) {
+  for (const UdpSocket& socket : lcm.sockets) queued = std::max(queued, socket.queued_bytes);
+  if (lcm.lost_meanwhile > 0 || queued > kManyQueuedBytes) {
     out.push_back({Level::kWarning, "lcm",
-                   fmt::format("{} datagrams found no room at port {}; {} KB wait in the fullest "
-                               "queue",
-                               drops, lcm.port, queued >> 10),
+                   fmt::format("{} datagrams found no room at port {} while doctor looked; {} KB "
+                               "wait in the fullest queue",
+                               lcm.lost_meanwhile, lcm.port, queued >> 10),
                    "a program there does not keep up: give it more room (sudo sysctl "
                    "net.core.rmem_max=4194304, and restart it), or let it use the control socket"});
   } else if (lcm.largest_buffer > 0 && lcm.largest_buffer < kBufferEnough) {

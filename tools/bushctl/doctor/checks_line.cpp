@@ -108,7 +108,8 @@ void check_reception(const Bus& bus, Findings& out) {
   }
   if (health.two_masters) {
     out.push_back({Level::kError, "line", health.bus + ": another master talks on the line",
-                   "end the other bushd, 'bushctl scan', or program: on this PC or another"});
+                   "end the other program on this line, bushd, bushctl or another one: on this PC "
+                   "or another"});
   }
   if (health.recent_latency_us >= kSlowUs) {
     out.push_back({Level::kWarning, "line",
@@ -126,7 +127,8 @@ void check_mcu(const api::McuHealth& mcu, Findings& out) {
                    fmt::format("{} has restarted {} times; the last reset was by {}", mcu.mcu,
                                mcu.restarts, mcu.reset_cause.empty() ? "?" : mcu.reset_cause),
                    supply ? "look at its supply: does the voltage drop when motors start?"
-                          : "'bushctl health' counts them; a watchdog reset is worth a report"});
+                          : "'bushctl health' counts them; a watchdog reset is worth a report",
+                   mcu.mcu, "MCUs have restarted"});
   }
   if (mcu.ramp_downs > 0 || mcu.missed_ticks > 0) {
     out.push_back({Level::kWarning, "mcu",
@@ -134,7 +136,8 @@ void check_mcu(const api::McuHealth& mcu, Findings& out) {
                                "received",
                                mcu.mcu, mcu.ramp_downs, mcu.missed_ticks),
                    "the line is noisy (above), or this PC stood still for 0.3 s: run less on it "
-                   "(docs/troubleshooting.md, A heavily loaded PC)"});
+                   "(docs/troubleshooting.md, A heavily loaded PC)",
+                   mcu.mcu, "MCUs ran out of ticks"});
   }
 }
 

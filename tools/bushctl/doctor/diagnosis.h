@@ -17,6 +17,10 @@ struct Finding {
       check{};         // configuration, port, lcm, clock, disk, socket, daemon, mcu, line, position
   std::string seen{};  // what it is about, and what was seen
   std::string remedy{};  // "" where nothing is wrong
+  // Of one of many things of which the same may be found: which one, and what is told of several at
+  // once, "motors are uncertain".
+  std::string about{};
+  std::string of_several{};
 };
 using Findings = std::vector<Finding>;
 
@@ -35,7 +39,7 @@ Findings check_mcus(const Observations& seen);
 Findings check_lines(const Observations& seen);
 Findings check_positions(const Observations& seen);
 
-// Lines for a terminal, the last of which sums up.
+// Lines for a terminal, the last of which sums up. What is found of more than three is told once.
 std::vector<std::string> lines(const Findings& findings);
 // {"findings":[{"level","check","seen","remedy"}],"errors":1,"warnings":0}; no remedy: null.
 std::string json(const Findings& findings);

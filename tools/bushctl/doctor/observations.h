@@ -41,6 +41,7 @@ struct ConfigurationSeen {
   std::string extent{};  // "2 buses, 3 MCUs, 32 motors"
   std::string sha256{};  // of its text
   bool lcm_commands = false;
+  std::vector<std::string> with_home{};  // motors that can be homed
 };
 
 struct PortSeen {
@@ -57,7 +58,7 @@ struct PortSeen {
 struct UdpSocket {
   std::uint32_t port = 0;
   std::uint64_t queued_bytes = 0;
-  std::uint64_t drops = 0;  // datagrams that had no room
+  std::uint64_t drops = 0;  // datagrams that had no room, or that the program's own filter refused
 };
 
 struct LcmSeen {
@@ -69,6 +70,8 @@ struct LcmSeen {
   std::optional<std::string> device{};  // where the route leads to; none: there is no route
   std::uint64_t largest_buffer = 0;     // net.core.rmem_max; 0: unknown
   std::vector<UdpSocket> sockets{};     // those at `port`
+  // Datagrams that found no room there while doctor looked.
+  std::uint64_t lost_meanwhile = 0;
 };
 
 struct ClockSeen {

@@ -73,6 +73,9 @@ ConfigurationSeen configuration_of(const std::string& path,
                             counted(config->buses.size(), "bus", "buses"));
   seen.sha256 = config->text_sha256;
   seen.lcm_commands = config->lcm.commands;
+  for (const auto& motor : config->motors) {
+    if (motor.home) seen.with_home.push_back(motor.name);
+  }
   return seen;
 }
 
@@ -187,9 +190,28 @@ Scope as_configured(Scope scope, const bushd::Result<bushd::config::Config>& con
   return scope;
 }
 
+// Of the daemon that runs here, if it tells; else that of the service.
+std::string configuration_to_examine(const Scope& scope) {
+  if (const auto client = Client::open(scope.client); client && !(*client)->link().loses()) {
+    DaemonSeen seen;
+    ask_for_configuration(**client, seen);
+    std::error_code error;
+    if (!seen.config_path.empty() && fs::exists(seen.config_path, error)) return seen.config_path;
+  }
+  return kSystemConfig;
+}
+
+std::uint64_t drops_of(const LcmSeen& lcm) {
+  std::uint64_t drops = 0;
+  for (const UdpSocket& socket : lcm.sockets) drops += socket.drops;
+  return drops;
+}
+
 }  // namespace
 
-Observations observe(const Scope& asked) {
+Observations observe(const Scope& as_asked) {
+  Scope asked = as_asked;
+  if (asked.config_path.empty()) asked.config_path = configuration_to_examine(asked);
   const auto config = bushd::config::load(asked.config_path);
   const Scope scope = as_configured(asked, config);
   Observations seen;
@@ -206,7 +228,16 @@ Observations observe(const Scope& asked) {
   for (const std::string& path : socket_paths(scope.client, config)) {
     seen.sockets.push_back(socket_seen(path, seen.asking));
   }
+  const std::string url = seen.lcm.url;
+  const std::uint64_t no_room = datagrams_without_room(text_of("/proc/net/snmp"));
+  const std::uint64_t drops = drops_of(seen.lcm);
   seen.daemon = daemon_seen(scope);
+  // The kernel counts for a socket also what the filter of its program refuses, and for all
+  // programs of this PC what found no room: of the sockets at this port it is what both have
+  // counted.
+  seen.lcm = lcm_seen(url);
+  seen.lcm.lost_meanwhile = std::min(datagrams_without_room(text_of("/proc/net/snmp")) - no_room,
+                                     drops_of(seen.lcm) - std::min(drops, drops_of(seen.lcm)));
   return seen;
 }
 

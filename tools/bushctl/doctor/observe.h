@@ -9,7 +9,7 @@
 namespace bushctl::doctor {
 
 struct Scope {
-  std::string config_path{};
+  std::string config_path{};  // "": that of the daemon that runs, else that of the service
   bushd::client::ClientOptions client{};
   double watch_s = 2;  // how long errors on lines are counted
 };

@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -67,6 +68,26 @@ std::optional<std::string> route_to(std::string_view text, const std::string& ad
     best_metric = *metric;
   }
   return device;
+}
+
+std::uint64_t datagrams_without_room(std::string_view text) {
+  // A line of names, then one of numbers, each behind the name of the protocol.
+  std::istringstream lines{std::string(text)};
+  std::vector<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::vector<std::string> row;
+    for (std::string word; words >> word;) row.push_back(word);
+    if (row.empty() || row.front() != "Udp:") continue;
+    if (names.empty()) {
+      names = std::move(row);
+      continue;
+    }
+    const auto place = std::ranges::find(names, "RcvbufErrors") - names.begin();
+    if (static_cast<std::size_t>(place) >= row.size()) return 0;
+    return number<std::uint64_t>(row[static_cast<std::size_t>(place)], 10).value_or(0);
+  }
+  return 0;
 }
 
 std::vector<UdpSocket> udp_sockets(std::string_view text, std::uint32_t port) {

@@ -15,6 +15,10 @@ namespace bushctl::doctor {
 // longest prefix wins, then the lowest metric. `address`: "239.255.76.67".
 std::optional<std::string> route_to(std::string_view text, const std::string& address);
 
+// How many datagrams of all programs found no room since this network exists (Udp: RcvbufErrors),
+// of /proc/net/snmp. What a socket's own filter refuses is not among them.
+std::uint64_t datagrams_without_room(std::string_view text);
+
 // Sockets of /proc/net/udp at this port.
 std::vector<UdpSocket> udp_sockets(std::string_view text, std::uint32_t port);
 
