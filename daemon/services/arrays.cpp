@@ -356,9 +356,11 @@ std::string Arrays::text_of(const Job& job) const {
   const double time_s = static_cast<double>(array.rows.time_ns(finding.row)) * 1e-9;
   const std::string where = fmt::format("row {} ({:.6g} s): {}", finding.row + 1, time_s, name);
   if (finding.fault == TrajectoryCheck::Fault::kPosition) {
-    return fmt::format(
-        "{} would go to {}; allowed: {} to {}", where, part.coordinates.text(finding.steps),
-        part.coordinates.text(part.bounds.lowest), part.coordinates.text(part.bounds.highest));
+    const bool falls = part.coordinates.scale().negative;
+    return fmt::format("{} would go to {}; allowed: {} to {}", where,
+                       part.coordinates.text(finding.steps),
+                       part.coordinates.text(falls ? part.bounds.highest : part.bounds.lowest),
+                       part.coordinates.text(falls ? part.bounds.lowest : part.bounds.highest));
   }
   const double unit = std::abs(part.coordinates.user_of(1) - part.coordinates.user_of(0));
   const char* what = finding.fault == TrajectoryCheck::Fault::kSpeed     ? "is to move"

@@ -61,6 +61,9 @@ int rank(api::Trust trust) {
 }
 
 std::string text_of(const config::PseudoAxis& axis, double position) {
+  // Beyond what any axis has: with all its digits nobody could read it.
+  constexpr double kMost = 1e15;
+  if (std::abs(position) >= kMost) return fmt::format("{:g} {}", position, axis.unit);
   return fmt::format("{:.{}f} {}", position, axis.decimals, axis.unit);
 }
 

@@ -233,7 +233,7 @@ Result<PseudoLaw> read_curved(const TomlReader& reader, const Pseudo& pseudo,
     error.message += fmt::format(" (the calibration in {}:{})", user.file, user.line);
     return fail(std::move(error));
   };
-  const auto text = tables::read_text(path);
+  const auto text = tables::read_text(path, "a calibration needs a hundredth of that");
   if (!text) return told(text.error());
   const auto table = csv::parse_numbers(*text, path.string(), kMostPoints);
   if (!table) return told(table.error());

@@ -6,9 +6,12 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <unordered_set>
 #include <utility>
 
+#include "base/byte_order_mark.h"
 #include "base/printable.h"
+#include "base/shortened.h"
 
 namespace bushd::csv {
 namespace {
@@ -73,9 +76,9 @@ class Reader {
     for (const Field& field : fields) {
       const std::string name(field.text);
       if (name.empty()) return fail(error(field.column, "a column without a name"));
-      if (std::ranges::find(table_.columns, name, &NumberColumn::name) != table_.columns.end()) {
-        return fail(
-            error(field.column, fmt::format("the column \"{}\" is there twice", printable(name))));
+      if (!names_.insert(name).second) {
+        return fail(error(field.column, fmt::format("the column \"{}\" is there twice",
+                                                    printable(shortened(name)))));
       }
       table_.columns.push_back({.name = name, .numbers = {}});
     }
@@ -93,10 +96,10 @@ class Reader {
     for (std::size_t i = 0; i < fields.size(); ++i) {
       const auto number = number_of(fields[i].text);
       if (!number) {
-        return fail(
-            error(fields[i].column,
-                  fmt::format("\"{}\", as {}; allowed: a decimal number such as -12.5",
-                              printable(fields[i].text), printable(table_.columns[i].name))));
+        return fail(error(fields[i].column,
+                          fmt::format("\"{}\", as {}; allowed: a decimal number such as -12.5",
+                                      printable(shortened(fields[i].text)),
+                                      printable(shortened(table_.columns[i].name)))));
       }
       table_.columns[i].numbers.push_back(*number);
     }
@@ -110,6 +113,7 @@ class Reader {
 
   NumberTable table_;
   std::size_t most_rows_;
+  std::unordered_set<std::string> names_{};
   int line_ = 0;
 };
 
@@ -117,8 +121,7 @@ class Reader {
 
 Result<NumberTable> parse_numbers(std::string_view text, const std::string& file,
                                   std::size_t most_rows) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  text = without_byte_order_mark(text);
   Reader reader(file, most_rows);
   for (int line = 1; !text.empty(); ++line) {
     const std::size_t end = text.find('\n');

@@ -84,35 +84,10 @@ tl::unexpected<Error> fail_at(std::string_view text, std::size_t offset, const s
                     .column = 1 + static_cast<int>(characters)});
 }
 
-tl::unexpected<Error> unreadable(const std::filesystem::path& path, std::string why) {
-  return fail(Error{.message = "cannot be read: " + std::move(why), .file = path.string()});
-}
-
 }  // namespace
 
 Result<std::string> read_text(const std::filesystem::path& path, std::string_view largest) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    return unreadable(path, error ? error.message() : "no such file");
-  }
-  // A FIFO would block, a device may never end.
-  if (!std::filesystem::is_regular_file(status)) return unreadable(path, "not a regular file");
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return unreadable(path, std::strerror(errno));
-  // In pieces: files are mostly short, and the largest allowed is costly to make room for.
-  std::string text;
-  std::array<char, 16 * 1024> piece;
-  while (file && text.size() <= kMaxFileBytes) {
-    file.read(piece.data(), piece.size());
-    text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
-  }
-  if (file.bad()) return unreadable(path, std::strerror(errno));
-  if (text.size() > kMaxFileBytes) {
-    return unreadable(path, fmt::format("larger than {} bytes, and {}", kMaxFileBytes, largest));
-  }
-  return text;
+  return read_text(path, TextLimit{.bytes = kMaxFileBytes, .told = largest});
 }
 
 std::string text_sha256(std::string_view text) {

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "tables/text_file.h"
 
 namespace bushd::tables {
 

@@ -49,6 +49,29 @@ TEST(NumberCsv, WhatIsNoNumberIsToldWithItsPlace) {
   EXPECT_THAT(error_of("a\n\x1b[2J\n"), testing::Not(testing::HasSubstr("\x1b")));
 }
 
+TEST(NumberCsv, WhatNobodyCanReadIsShortened) {
+  EXPECT_EQ(error_of("a\n" + std::string(400, '1') + "x\n"),
+            "energy.csv:2:1: \"" + std::string(40, '1') +
+                "...\", as a; allowed: a decimal number such as -12.5");
+  EXPECT_LT(error_of(std::string(1000, 'a') + "\nx\n").size(), 200u);
+}
+
+// Each name is looked for once, not in all names before: with as many columns as a file may have
+// that would be 10^10 comparisons.
+TEST(NumberCsv, ManyColumns) {
+  constexpr int kColumns = 100'000;
+  std::string names;
+  std::string numbers;
+  for (int i = 0; i < kColumns; ++i) {
+    names += (i > 0 ? ",c" : "c") + std::to_string(i);
+    numbers += i > 0 ? ",1" : "1";
+  }
+  const auto table = parse(names + "\n" + numbers + "\n");
+  ASSERT_TRUE(table.has_value()) << table.error().text();
+  EXPECT_EQ(table->columns.size(), std::size_t{kColumns});
+  EXPECT_THAT(error_of(names + ",c7\n"), testing::HasSubstr("\"c7\" is there twice"));
+}
+
 TEST(NumberCsv, RowsAndNames) {
   EXPECT_EQ(error_of(""), "energy.csv: is empty; its first line names the columns: a,b");
   EXPECT_EQ(error_of("# nothing\n"),

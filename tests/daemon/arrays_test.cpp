@@ -55,6 +55,23 @@ struct UnderWay {
 class Arrays : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Format, Arrays, testing::Values("fine", "coarse"));
 
+TEST(ArraysAndLimits, AreToldFromTheLowestPositionToTheHighest) {
+  std::string toml = hall(1, 1);
+  const std::string name = "name = \"m01\"\n";
+  toml.insert(
+      toml.find(name) + name.size(),
+      "unit = \"mm\"\nsteps_per_unit = 10\ndirection = \"negative\"\nsoft_limits = [-5, 20]\n");
+  Lab lab(toml);
+  lab.connect();
+  const Answer refused = lab.wait(lab.send(api::Follow{.part = Part::kLastRows,
+                                                       .array = 1,
+                                                       .motors = {"m01"},
+                                                       .time_s = {0, 9},
+                                                       .positions = {0, 30}}));
+  EXPECT_THAT(refused.reason,
+              testing::HasSubstr("m01 would go to 30.0 mm; allowed: -20.0 mm to 5.0 mm"));
+}
+
 TEST_P(Arrays, AllMotorsAreWhereTheRowsSayAtAnyTime) {
   Lab lab(hall(2, 2, GetParam()));
   lab.connect();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <string>
 #include <vector>
@@ -279,6 +280,28 @@ TEST(TableLoad, FileBeyondTheCapIsRefused) {
   const TempDirectory directory;
   const auto path = directory.write("big.toml", std::string(kMaxFileBytes + 1, '\n'));
   EXPECT_THAT(load(path).error().message, HasSubstr("larger than"));
+}
+
+TEST(TextFile, FoldersAndDevicesAreRefusedAndPipesWhereTheyMayBe) {
+  const TempDirectory directory;
+  const auto refusal = [](const std::filesystem::path& path) {
+    const auto text = read_text(path, kNumbersLimit);
+    return text ? "none" : text.error().message;
+  };
+  EXPECT_THAT(refusal(directory.path()), HasSubstr("it is a folder"));
+  EXPECT_THAT(refusal("/dev/zero"), HasSubstr("not a regular file"));
+  // Both ends of a pipe are in this process: what is written fits into it.
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  ASSERT_EQ(write(ends[1], "a\n1\n", 4), 4);
+  close(ends[1]);
+  EXPECT_EQ(read_text("/dev/fd/" + std::to_string(ends[0]), kNumbersLimit).value_or("none"),
+            "a\n1\n");
+  close(ends[0]);
+  const auto longer = directory.write("rows.csv", std::string(kMaxFileBytes + 1, '\n'));
+  EXPECT_EQ(read_text(longer, kNumbersLimit).value_or("").size(), kMaxFileBytes + 1);
+  EXPECT_THAT(read_text(longer, TextLimit{.bytes = 10, .told = "ten do"}).error().message,
+              HasSubstr("larger than 10 bytes, and ten do"));
 }
 
 TEST(TableFind, FirstDirectoryWins) {

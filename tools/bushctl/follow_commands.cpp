@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <random>
 
@@ -12,6 +10,7 @@
 #include "commands.h"
 #include "csv/number_csv.h"
 #include "render.h"
+#include "tables/text_file.h"
 
 namespace bushctl {
 namespace {
@@ -24,10 +23,9 @@ using Part = api::Follow::Part;
 constexpr std::size_t kNumbersPerPart = 6000;
 
 bushd::Result<bushd::csv::NumberTable> read_rows(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return bushd::fail(path + ": cannot be read");
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  auto rows = bushd::csv::parse_numbers(text, path, api::Follow::kMostRows);
+  const auto text = bushd::tables::read_text(path, bushd::tables::kNumbersLimit);
+  if (!text) return bushd::fail(text.error());
+  auto rows = bushd::csv::parse_numbers(*text, path, api::Follow::kMostRows);
   if (!rows) return rows;
   if (rows->columns.front().name != "time_s" || rows->columns.size() < 2) {
     return bushd::fail(fmt::format(

@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "base/shortened.h"
+
 namespace bushctl {
 namespace {
 
@@ -40,10 +42,12 @@ std::optional<double> number(const std::string& word) {
 Result<api::Amount> amount_of(const std::string& motor, const std::string& word, Numbers numbers) {
   if (numbers == Numbers::kSteps) {
     if (const auto steps = whole_number(word)) return *steps;
-    return fail(fmt::format("{}: \"{}\" is not a whole number of steps", motor, word));
+    return fail(fmt::format("{}: \"{}\" is not a whole number of steps", bushd::shortened(motor),
+                            bushd::shortened(word)));
   }
   if (const auto user = number(word)) return api::UserUnits{*user};
-  return fail(fmt::format("{}: \"{}\" is not a number", motor, word));
+  return fail(
+      fmt::format("{}: \"{}\" is not a number", bushd::shortened(motor), bushd::shortened(word)));
 }
 
 }  // namespace
@@ -52,7 +56,7 @@ Result<std::optional<api::Speed>> parse_speed(const std::string& word, Numbers n
   if (word.empty()) return std::optional<api::Speed>();
   const auto per_s = number(word);
   if (!per_s || !(*per_s > 0)) {
-    return fail(fmt::format("--speed: \"{}\" is not a number above 0", word));
+    return fail(fmt::format("--speed: \"{}\" is not a number above 0", bushd::shortened(word)));
   }
   return std::optional(api::Speed{.per_s = *per_s, .in_steps = numbers == Numbers::kSteps});
 }

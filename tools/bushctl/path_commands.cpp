@@ -25,7 +25,7 @@ struct PathOptions {
 };
 
 bushd::Result<PathFile> read_path(const PathOptions& options) {
-  const auto text = bushd::tables::read_text(options.file);
+  const auto text = bushd::tables::read_text(options.file, bushd::tables::kNumbersLimit);
   if (!text) return bushd::fail(text.error());
   return parse_path(*text, options.file, options.corners, options.speed);
 }

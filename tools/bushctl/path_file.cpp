@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/shortened.h"
 #include "csv/number_csv.h"
 
 namespace bushctl {
@@ -62,7 +63,7 @@ Result<SpeedAt> speed_at(const std::string& word) {
   return fail(
       fmt::format("--speed-at: \"{}\" is not a position and a speed above 0; write "
                   "--speed-at POSITION:SPEED",
-                  word));
+                  bushd::shortened(word)));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <numbers>
 
+#include "base/byte_order_mark.h"
 #include "tables/toml_file.h"
 
 namespace bushd::tables::profiles {
@@ -57,6 +58,7 @@ TorqueCurve::const_iterator from(const TorqueCurve& curve, double speed_hz) {
 
 Result<TorqueCurve> parse_torque_csv(std::string_view text, double steps_per_turn,
                                      const std::string& path) {
+  text = without_byte_order_mark(text);
   TorqueCurve curve;
   std::optional<Columns> columns;
   int line = 0;

@@ -269,6 +269,12 @@ TEST(TorqueCsv, UnitsAreThoseOfTheHeader) {
   EXPECT_DOUBLE_EQ((*curve)[1].torque_nm, 0.205);
 }
 
+TEST(TorqueCsv, AsSpreadsheetsOfWindowsWriteIt) {
+  const auto curve = parse_torque_csv("\xEF\xBB\xBFspeed_hz,torque_nm\r\n0,0.5\r\n", 200, "m.csv");
+  ASSERT_TRUE(curve) << curve.error().text();
+  EXPECT_EQ(curve->size(), 1U);
+}
+
 TEST(TorqueCsv, EveryBadLineIsNamed) {
   const auto message = [](const char* text) {
     const auto curve = parse_torque_csv(text, 200, "m.csv");
