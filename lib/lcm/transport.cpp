@@ -10,6 +10,7 @@
 #include <set>
 
 #include "lcm/datagram_filter.h"
+#include "lcm/loopback_only.h"
 #include "lcm/receive_buffer.h"
 
 namespace bushd::lcm {
@@ -18,13 +19,10 @@ namespace {
 // Of LCM's wire format.
 constexpr std::size_t kMaxChannelName = LCM_MAX_CHANNEL_NAME_LENGTH;
 
-// The multicast address in "udpm://ADDRESS:PORT?..."; "" for other URLs.
+// "" for URLs that are none of multicast.
 std::string multicast_address(const std::string& url) {
-  constexpr std::string_view kScheme = "udpm://";
-  if (!url.starts_with(kScheme)) return {};
-  const std::string rest = url.substr(kScheme.size());
-  const std::string address = rest.substr(0, rest.find_first_of(":?"));
-  return address.empty() ? "239.255.76.67" : address;
+  const auto multicast = multicast_url(url);
+  return multicast ? multicast->address : "";
 }
 
 // Packets to this address have a way, as LCM finds by the same two calls. Where they have none it
@@ -107,6 +105,10 @@ Result<std::unique_ptr<Transport>> Transport::open(const std::string& url,
     if (others.contains(udp_socket)) continue;
     // Who gives a size gets that one.
     if (url.find("recv_buf_size=") == std::string::npos) enlarge_receive_buffer(udp_socket);
+    const auto multicast = multicast_url(url);
+    if (multicast && multicast->ttl == 0) {
+      if (auto kept = keep_on_loopback(udp_socket, *multicast); !kept) return fail(kept.error());
+    }
     if (auto filtered = accept_whole_messages_only(udp_socket, channels); !filtered)
       return fail(filtered.error());
   }
