@@ -101,6 +101,11 @@ class Client {
   // are in the former.
   Result<Status> next_state(std::chrono::milliseconds timeout);
   Result<Status> next_health(std::chrono::milliseconds timeout);
+  // The same; nothing as soon as `input_fd` is readable (-1: never).
+  Result<std::optional<Status>> next_state_or_input(std::chrono::milliseconds timeout,
+                                                    int input_fd);
+  Result<std::optional<Status>> next_health_or_input(std::chrono::milliseconds timeout,
+                                                     int input_fd);
 
   // The daemon has ended, or closed the connection: no call succeeds any more.
   bool ended() const { return ended_; }
@@ -135,8 +140,8 @@ class Client {
   Error no_answer(bool sent) const;
   Result<void> subscribe();
   Result<Status> incomplete_status();
-  Result<Status> wait_for(const bool& heard, bool (StatusCollector::*enough)() const,
-                          std::chrono::milliseconds timeout);
+  Result<std::optional<Status>> wait_for(bool& heard, bool (StatusCollector::*enough)() const,
+                                         std::chrono::milliseconds timeout, int input_fd);
   // A packet that is sent again until there is an answer.
   struct Repeated {
     lcm::Packet packet;

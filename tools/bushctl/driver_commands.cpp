@@ -13,7 +13,7 @@ template <class Request>
 void add(CommandLine& line, const char* name, const char* text) {
   const auto motors = std::make_shared<api::MotorNames>();
   line.add(name, text)
-      .words("NAME", motors.get(), "Motors (default: all)", Command::Needed::kNo)
+      .words("NAME", motors.get(), kMotorsOrAll, Command::Needed::kNo)
       .run([&line, motors] {
         return send(line.connection(), Request{*motors}, bushd::client::Client::Until::kResult,
                     Hope::kDone);

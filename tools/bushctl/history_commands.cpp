@@ -26,7 +26,7 @@ void add_confirm(CommandLine& line) {
       .footer(
           "Positions that are restored or uncertain ('bushctl where') are known then, and nothing "
           "moves. Where a motor stands elsewhere, use 'set' or 'home'.")
-      .words("NAME", motors.get(), "Motors", Command::Needed::kYes)
+      .words("NAME", motors.get(), kMotors, Command::Needed::kYes)
       .run([&line, motors] {
         return send(line.connection(), api::Confirm{*motors}, Client::Until::kResult, Hope::kDone);
       });

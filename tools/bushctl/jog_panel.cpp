@@ -13,6 +13,7 @@
 
 #include "base/printable.h"
 #include "commands.h"
+#include "named_motors.h"
 #include "progress.h"
 #include "render.h"
 
@@ -89,9 +90,7 @@ bool JogPanel::find_motor() {
       if (motor.name == options_.motor) return find_amounts(motor);
     }
   }
-  failed({.message = fmt::format("no motor \"{}\" in bushd's configuration; 'bushctl where' lists "
-                                 "them",
-                                 options_.motor)});
+  failed({.message = no_such_motor(*status, options_.motor)});
   return false;
 }
 

@@ -14,7 +14,7 @@ void add(CommandLine& line, const std::string& name, const std::string& text,
   const auto names = std::make_shared<api::MotorNames>();
   line.add(name, text)
       .footer(footer)
-      .words("NAME", names.get(), "Motors or groups (default: all)", Command::Needed::kNo)
+      .words("NAME", names.get(), kMotorsOrAll, Command::Needed::kNo)
       .run([&line, names] {
         return send(line.connection(), Request{*names}, bushd::client::Client::Until::kResult,
                     Hope::kDone);

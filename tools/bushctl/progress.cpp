@@ -11,7 +11,9 @@
 #include <limits>
 #include <string_view>
 
+#include "api/name_pattern.h"
 #include "base/printable.h"
+#include "motor_cells.h"
 #include "render.h"
 
 namespace bushctl {
@@ -51,9 +53,7 @@ std::size_t columns_of_terminal(int fd) {
 }
 
 Progress::Progress(const api::MotorNames& motors)
-    : terminal_(is_terminal()), next_line_(Clock::now() + kBetweenLines) {
-  for (const std::string& motor : motors) from_steps_.emplace(motor, std::nullopt);
-}
+    : asked_(motors), terminal_(is_terminal()), next_line_(Clock::now() + kBetweenLines) {}
 
 std::string Progress::text(const Status& status, std::size_t columns) {
   std::string longest;
@@ -62,16 +62,18 @@ std::string Progress::text(const Status& status, std::size_t columns) {
     const auto& motors = status.states[i].snapshot.motors;
     for (std::size_t m = 0; m < motors.size(); ++m) {
       const api::MotorState& motor = motors[m];
-      const auto place = from_steps_.find(motor.name);
-      if (place == from_steps_.end() || motor.trust == api::Trust::kUnknown) continue;
-      if (!place->second) place->second = motor.position_steps;
+      const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
+      const bool asked = !asked_.empty() && api::names_motor(asked_, motor.name, description.group);
+      if (!asked || motor.trust == api::Trust::kUnknown) continue;
+      const std::int64_t from =
+          from_steps_.try_emplace(motor.name, motor.position_steps).first->second;
       if (!motor.moving || motor.position_steps == motor.target_steps) continue;
       const auto left_s = seconds_left(motor);
       const double order = left_s.value_or(std::numeric_limits<double>::max());
       if (order <= longest_s) continue;
       longest_s = order;
       const double whole =
-          std::abs(static_cast<double>(motor.target_steps) - static_cast<double>(*place->second));
+          std::abs(static_cast<double>(motor.target_steps) - static_cast<double>(from));
       const double rest = std::abs(static_cast<double>(motor.target_steps - motor.position_steps));
       const double part = whole > 0 ? std::clamp(1 - rest / whole, 0.0, 1.0) : 0;
       longest = fmt::format("{} {}{:.0f} %, {}{}", bushd::printable(motor.name),

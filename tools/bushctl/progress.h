@@ -32,7 +32,8 @@ class Progress {
   void clear();
 
  private:
-  std::map<std::string, std::optional<std::int64_t>> from_steps_;  // as seen first
+  bushd::api::MotorNames asked_;                      // names and patterns
+  std::map<std::string, std::int64_t> from_steps_{};  // as seen first
   bool terminal_;
   bool shown_ = false;
   Clock::time_point next_line_;

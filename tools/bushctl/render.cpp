@@ -1,16 +1,15 @@
 #include "render.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "grid.h"
+#include "motor_cells.h"
 
 namespace bushctl {
 namespace {
@@ -23,113 +22,9 @@ using bushd::client::Status;
 constexpr const char* kRoom =
     "give datagrams more room ('sysctl net.core.rmem_max=4194304'), or use the control socket";
 
-std::string text_of(const api::TableRef& table) {
-  const std::string revision = table.revision > 0 ? fmt::format("@{}", table.revision) : "";
-  return bushd::printable(table.name) + revision;
-}
-
-std::string limit_text(const api::MotorState& motor) {
-  return motor.inhibited.any() ? fmt::format("limit {}", word(motor.inhibited)) : "";
-}
-
-// What it does, in a word for tables.
-const char* moving_word(const api::MotorState& motor, const char* moves, const char* rests) {
-  if (motor.activity == api::Activity::kArming) return "arming";
-  if (motor.activity == api::Activity::kArmed) return "armed";
-  if (motor.paused) return "paused";
-  if (motor.held && !motor.moving) return "held";
-  return motor.moving ? moves : rests;
-}
-
-// By itself, or as a move says.
-const char* moves_text(const api::MotorState& motor) {
-  if (motor.activity == api::Activity::kHoming) return "home";
-  return motor.activity == api::Activity::kLocal ? "local" : "yes";
-}
-
-bool has_position(const api::MotorState& motor) {
-  return motor.trust != api::Trust::kUnknown;
-}
-
 // In steps or units; null where nothing is known.
 nlohmann::json position_json(const api::MotorState& motor, auto position) {
   return has_position(motor) ? nlohmann::json(position) : nlohmann::json(nullptr);
-}
-
-// "heard 2026-01-31 14:03:22": old numbers are shown with their time.
-std::string heard_text(const api::MotorState& motor) {
-  if (!motor.heard_utime_us) return {};
-  const std::chrono::sys_seconds heard(std::chrono::seconds(*motor.heard_utime_us / 1'000'000));
-  return fmt::format("heard {:%F %T}", fmt::localtime(std::chrono::system_clock::to_time_t(heard)));
-}
-
-std::string notes_text(const api::MotorState& motor) {
-  const std::string heard = heard_text(motor);
-  const std::string limit = limit_text(motor);
-  const std::string armed =
-      motor.armed_by.empty() ? "" : "armed by " + bushd::printable(motor.armed_by);
-  std::string all;
-  for (const std::string& note : {heard, limit, armed}) {
-    all += (all.empty() || note.empty() ? "" : ", ") + note;
-  }
-  return all;
-}
-
-// Of the motor at this place in the state; another one's never, whatever the network says.
-api::MotorDescription description_of(const api::Description& mcu, std::size_t index,
-                                     const std::string& motor) {
-  if (index < mcu.motors.size() && mcu.motors[index].name == motor) return mcu.motors[index];
-  for (const api::MotorDescription& description : mcu.motors) {
-    if (description.name == motor) return description;
-  }
-  return {};
-}
-
-bool has_unit(const units::Scale& scale) {
-  return scale.unit != units::Coordinates::kSteps;
-}
-
-// "12.345 mm", and bare steps of a motor without a unit.
-std::string position_text(std::int64_t steps, double user, const units::Scale& scale) {
-  if (!has_unit(scale)) return fmt::to_string(steps);
-  return fmt::format("{:.{}f} {}", user, scale.decimals.value_or(0), bushd::printable(scale.unit));
-}
-
-std::string position_text(const api::MotorState& motor, std::int64_t steps, double user,
-                          const units::Scale& scale) {
-  return has_position(motor) ? position_text(steps, user, scale) : "-";
-}
-
-// In the motor's unit per second, with the sign of the user's scale.
-double user_speed(const api::MotorState& motor, const units::Coordinates& coordinates) {
-  const double per_s = motor.velocity_steps_per_s * coordinates.dial_of(1);
-  return coordinates.scale().negative ? -per_s : per_s;
-}
-
-// "1.250 mm/s", and bare steps per second of a motor without a unit.
-std::string speed_text(const api::MotorState& motor, const units::Scale& scale) {
-  const auto coordinates = units::Coordinates::make(scale);
-  if (!has_unit(scale) || !coordinates) return fmt::format("{:.1f}", motor.velocity_steps_per_s);
-  return fmt::format("{:.{}f} {}/s", user_speed(motor, *coordinates),
-                     scale.decimals.value_or(coordinates->precision()),
-                     bushd::printable(scale.unit));
-}
-
-// Where a motor stands between its soft limits: "-5 |----x---------| 25"; outside of them an arrow
-// points to where it is. "": it has none.
-std::string range_text(const api::MotorState& motor, const api::MotorDescription& description) {
-  constexpr std::size_t kColumns = 15;
-  const auto coordinates = units::Coordinates::make(description.scale);
-  if (!description.soft_limits || !coordinates) return {};
-  const units::SoftLimits limits = coordinates->on_user_scale(*description.soft_limits);
-  std::string bar(kColumns, '-');
-  const double place = (motor.user - limits.low) / (limits.high - limits.low);
-  if (has_position(motor) && place < 0) bar.front() = '<';
-  if (has_position(motor) && place > 1) bar.back() = '>';
-  if (has_position(motor) && place >= 0 && place <= 1) {
-    bar[static_cast<std::size_t>(std::lround(place * (kColumns - 1)))] = 'x';
-  }
-  return fmt::format("{:g} |{}| {:g}", limits.low, bar, limits.high);
 }
 
 nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,

@@ -5,11 +5,10 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <utility>
 
 namespace bushctl {
 
-Screen::Screen(std::string elsewhere) : elsewhere_(std::move(elsewhere)) {
+Screen::Screen() {
   fmt::print("\x1b[?1049h\x1b[?25l\x1b[?7l");
 }
 
@@ -18,29 +17,34 @@ Screen::~Screen() {
   std::fflush(stdout);
 }
 
-void Screen::show(std::vector<std::string> lines) {
-  lines_ = std::move(lines);
-  draw("");
-}
-
-void Screen::notice(const std::string& text) {
-  draw(text);
-}
-
-void Screen::draw(const std::string& notice) const {
+Screen::Size Screen::size() {
   winsize size{};
-  const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row > 3;
-  const std::size_t room = (known ? size.ws_row : 24u) - 2u;
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_row <= 3 || size.ws_col == 0)
+    return {};
+  return {.columns = size.ws_col, .rows = size.ws_row};
+}
+
+void Screen::show(const std::vector<std::string>& lines) const {
   // Overwritten from the top, not cleared first: that would flicker.
+  const std::size_t rows = size().rows;
   std::string screen = "\x1b[H";
-  for (std::size_t i = 0; i < lines_.size() && i < room; ++i) screen += lines_[i] + "\x1b[K\n";
-  screen += "\x1b[J";
-  if (lines_.size() > room) {
-    screen += fmt::format("... {} more lines; {}", lines_.size() - room, elsewhere_);
+  for (std::size_t i = 0; i < lines.size() && i < rows; ++i) {
+    screen += (i > 0 ? "\n" : "") + lines[i] + "\x1b[K";
   }
-  screen += "\n" + (notice.empty() ? std::string("Ctrl-C ends") : notice);
-  fmt::print("{}", screen);
+  fmt::print("{}\x1b[J", screen);
   std::fflush(stdout);
+}
+
+std::vector<std::string> cut(std::vector<std::string> lines, std::size_t rows,
+                             const std::string& elsewhere, const std::string& last) {
+  const std::size_t room = rows - 2;
+  if (lines.size() > room) {
+    const std::size_t more = lines.size() - room;
+    lines.resize(room);
+    lines.push_back(fmt::format("... {} more lines; {}", more, elsewhere));
+  }
+  lines.push_back(last);
+  return lines;
 }
 
 }  // namespace bushctl

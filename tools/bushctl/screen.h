@@ -1,8 +1,10 @@
 // Lines drawn anew again and again, on the terminal's second screen, so that the first is there
-// again afterwards. Keys have no meaning meanwhile, and nobody reads them later: what is typed here
-// is no command for the shell.
+// again afterwards. What is typed here is no command for the shell: who does not read the keys lets
+// them be lost.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,22 +14,30 @@ namespace bushctl {
 
 class Screen {
  public:
-  // `elsewhere`: where to look when there is not room for all lines.
-  explicit Screen(std::string elsewhere);
+  Screen();
   ~Screen();
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  void show(std::vector<std::string> lines);
-  // Below the lines shown last.
-  void notice(const std::string& text);
+  struct Size {
+    std::size_t columns = 80;
+    std::size_t rows = 24;
+  };
+  static Size size();
+
+  // From the top; those for which there is no room are not shown.
+  void show(const std::vector<std::string>& lines) const;
+
+  // Keys that have been pressed since; nothing once the terminal is gone.
+  std::optional<std::string> keys() { return terminal_.read_all(); }
 
  private:
-  void draw(const std::string& notice) const;
-
   RawTerminal terminal_;
-  std::string elsewhere_;
-  std::vector<std::string> lines_;
 };
+
+// For a screen of so many rows: these, as far as there is room, then that there are more and where
+// (`elsewhere`), and a last line.
+std::vector<std::string> cut(std::vector<std::string> lines, std::size_t rows,
+                             const std::string& elsewhere, const std::string& last);
 
 }  // namespace bushctl

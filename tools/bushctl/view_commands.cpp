@@ -6,8 +6,11 @@
 #include <memory>
 #include <optional>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "health_view.h"
+#include "live.h"
+#include "named_motors.h"
 #include "readiness.h"
 #include "render.h"
 #include "screen.h"
@@ -27,16 +30,25 @@ Command& add_timeout(Command& command, double* timeout_s) {
                         "Longest wait for the state of the daemon");
 }
 
-int show_status(Client& client, std::chrono::milliseconds timeout, bool as_json) {
-  const auto status = client.status(timeout);
+struct StatusOptions {
+  bushd::api::MotorNames motors;
+  bool json = false;
+  double timeout_s = 4;
+  double wait_s = 0;
+};
+
+int show_status(Client& client, const StatusOptions& options) {
+  auto status = client.status(milliseconds(options.timeout_s));
   if (!status) return failure(client, status.error());
   if (status->states.empty()) return complete(*status, status->missing_mcus, "MCUs");
-  if (as_json) {
-    fmt::print("{}\n", json(*status));
+  const auto chosen = only(std::move(*status), options.motors);
+  if (!chosen) return failure(client, chosen.error());
+  if (options.json) {
+    fmt::print("{}\n", json(*chosen));
   } else {
-    for (const std::string& line : table(*status)) fmt::print("{}\n", line);
+    for (const std::string& line : table(*chosen)) fmt::print("{}\n", line);
   }
-  return complete(*status, status->missing_mcus, "MCUs");
+  return complete(*chosen, chosen->missing_mcus, "MCUs");
 }
 
 struct HealthOptions {
@@ -56,38 +68,49 @@ void print(const Status& status, bool as_json) {
 }
 
 int show_health(Client& client, const HealthOptions& options) {
-  auto health = client.status(milliseconds(options.timeout_s));
+  const auto health = client.status(milliseconds(options.timeout_s));
   if (!health) return failure(client, health.error());
   if (health->healths.empty()) return complete(*health, health->missing_buses, "buses");
-  if (!options.watch) {
-    print(*health, options.json);
-    return complete(*health, health->missing_buses, "buses");
-  }
+  print(*health, options.json);
+  return complete(*health, health->missing_buses, "buses");
+}
+
+int watch_health(const Connection& connection, const HealthOptions& options) {
+  const bool in_terminal = !options.json && isatty(STDOUT_FILENO) != 0;
   std::optional<Screen> screen;
-  if (!options.json && isatty(STDOUT_FILENO) != 0) screen.emplace("'bushctl health' shows all");
-  for (unsigned shown = 0;;) {
-    if (health && screen) screen->show(health_table(*health));
-    if (health && !screen) print(*health, options.json);
-    if (health && options.count > 0 && ++shown >= options.count) return kDone;
-    if (!health && client.interrupted()) return kDone;
-    if (!health && (client.ended() || !screen)) {
-      screen.reset();
-      return failure(client, health.error());
-    }
-    if (!health) screen->notice("no health from bushd; what is shown is old");
-    health = client.next_health(milliseconds(options.timeout_s));
-  }
+  std::vector<std::string> lines;
+  unsigned shown = 0;
+  const auto draw = [&](const std::string& last) {
+    screen->show(cut(lines, Screen::size().rows, "'bushctl health' shows all", last));
+  };
+  return follow_live(connection, {.timeout = milliseconds(options.timeout_s),
+                                  .for_ever = in_terminal,
+                                  .next = &Client::next_health_or_input,
+                                  .show =
+                                      [&](const Status& health) {
+                                        if (in_terminal) {
+                                          if (!screen) screen.emplace();
+                                          lines = health_table(health);
+                                          draw("Ctrl-C ends");
+                                        } else {
+                                          print(health, options.json);
+                                        }
+                                        return options.count == 0 || ++shown < options.count;
+                                      },
+                                  .on_input = [] { return true; },
+                                  .on_trouble =
+                                      [&](const std::string& why) {
+                                        if (screen)
+                                          draw("what is shown is old: " + bushd::printable(why));
+                                      },
+                                  .close = [&] { screen.reset(); }});
 }
 
 void add_status(CommandLine& line) {
-  struct Options {
-    bool json = false;
-    double timeout_s = 4;
-    double wait_s = 0;
-  };
-  const auto options = std::make_shared<Options>();
-  Command command = line.add("status", "Show all motors and MCUs");
-  command.flag("--json", &options->json, "Print JSON")
+  const auto options = std::make_shared<StatusOptions>();
+  Command command = line.add("status", "Show motors and MCUs");
+  command.words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
+      .flag("--json", &options->json, "Print JSON")
       .number("--wait-s", &options->wait_s, 0.01, 3600.0,
               "First wait so long at most until the daemon answers and all MCUs take moves");
   add_timeout(command, &options->timeout_s).run([&line, options] {
@@ -95,25 +118,34 @@ void add_status(CommandLine& line) {
       const int code = wait_until_ready(line.connection(), milliseconds(options->wait_s));
       if (code != kDone) return code;
     }
-    return with_client(line.connection(), [&](Client& client) {
-      return show_status(client, milliseconds(options->timeout_s), options->json);
-    });
+    return with_client(line.connection(),
+                       [&](Client& client) { return show_status(client, *options); });
   });
 }
 
 void add_watch(CommandLine& line) {
   struct Options {
+    bushd::api::MotorNames motors;
     std::uint32_t count = 0;
     double timeout_s = 4;
   };
   const auto options = std::make_shared<Options>();
   Command command = line.add("watch", "Show a live table; in a pipe: lines of what changes");
-  command.number<std::uint32_t>("--count", &options->count, 1, kMany,
-                                "Exit after so many snapshots");
+  command
+      .footer(
+          "Motors that move come first, then those with which something is wrong, then the others; "
+          "above them stand MCUs that do not work. Keys: n and p, or Page Down and Page Up, turn "
+          "pages, g is the first one; o is the order of the configuration; / takes a filter: part "
+          "of the name of a motor, group or MCU, slit*, or @GROUP, up to Enter, and Esc drops it; "
+          "q "
+          "ends. When the daemon ends, watch waits until it is there again; in a pipe as long as "
+          "--timeout-s.")
+      .words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
+      .number<std::uint32_t>("--count", &options->count, 1, kMany, "Exit after so many snapshots");
   add_timeout(command, &options->timeout_s).run([&line, options] {
-    return with_client(line.connection(), [&](Client& client) {
-      return watch(client, {.timeout = milliseconds(options->timeout_s), .count = options->count});
-    });
+    return watch(line.connection(), {.names = options->motors,
+                                     .timeout = milliseconds(options->timeout_s),
+                                     .count = options->count});
   });
 }
 
@@ -125,6 +157,7 @@ void add_health(CommandLine& line) {
       .number<std::uint32_t>("--count", &options->count, 1, kMany,
                              "With --watch: exit after so many");
   add_timeout(command, &options->timeout_s).run([&line, options] {
+    if (options->watch) return watch_health(line.connection(), *options);
     return with_client(line.connection(),
                        [&](Client& client) { return show_health(client, *options); });
   });
@@ -152,7 +185,7 @@ void add_where(CommandLine& line) {
   };
   const auto options = std::make_shared<Options>();
   Command command = line.add("where", "Show where motors stand: user, dial and steps");
-  command.words("NAME", &options->motors, "Motors; none: all", Command::Needed::kNo)
+  command.words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .flag("--json", &options->json, "As JSON");
   add_timeout(command, &options->timeout_s).run([&line, options] {
     return with_client(line.connection(), [&](Client& client) {

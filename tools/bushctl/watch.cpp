@@ -3,50 +3,65 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <map>
-#include <memory>
+#include <optional>
 #include <string>
-#include <vector>
 
+#include "api/name_pattern.h"
 #include "base/printable.h"
 #include "commands.h"
+#include "live.h"
+#include "motor_cells.h"
 #include "render.h"
 #include "screen.h"
+#include "watch_table.h"
 
 namespace bushctl {
 namespace {
 
+using bushd::client::Client;
 using bushd::client::Status;
 
-class View {
+// What has been shown is not all that there was to show; "": it is.
+class Losses {
  public:
-  virtual ~View() = default;
-  virtual void show(const Status& status) = 0;
-  // No snapshot came in time. Whether to go on waiting.
-  virtual bool silent() = 0;
-  // What has been shown is not all that there was to show.
-  virtual void warn(const std::string& text) = 0;
+  std::string text_of(const Status& status) {
+    const std::uint64_t lost = status.lost - std::min(status.lost, lost_);
+    lost_ = status.lost;
+    if (status.missing_mcus.count > 0) {
+      return missing_text(status.answered, status.missing_mcus, "MCUs");
+    }
+    return lost > 0 ? lost_text(lost) : "";
+  }
+
+ private:
+  std::uint64_t lost_ = 0;
 };
 
-class ChangesView : public View {
+class Changes {
  public:
-  void show(const Status& status) override {
+  explicit Changes(const std::vector<std::string>& names) : names_(names) {}
+
+  void show(const Status& status) {
     for (std::size_t i = 0; i < status.states.size(); ++i) {
       const bushd::api::StateSnapshot& mcu = status.states[i].snapshot;
-      if (status.descriptions.at(i).snapshot.is_mcu()) {
+      const bushd::api::Description& description = status.descriptions.at(i).snapshot;
+      if (description.is_mcu()) {
         line(mcu.mcu,
              fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu), word(mcu.state), mcu.boot,
                          mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
       }
       for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
-        line(mcu.motors[m].name, motor_line(status, i, m));
+        const std::string& name = mcu.motors[m].name;
+        if (!bushd::api::names_motor(names_, name, description_of(description, m, name).group))
+          continue;
+        line(name, motor_line(status, i, m));
       }
     }
     std::fflush(stdout);
   }
-  bool silent() override { return false; }
-  void warn(const std::string& text) override { fmt::print(stderr, "bushctl: {}\n", text); }
 
  private:
   void line(const std::string& about, const std::string& text) {
@@ -56,52 +71,72 @@ class ChangesView : public View {
     fmt::print("{}\n", text);
   }
 
+  const std::vector<std::string>& names_;
   std::map<std::string, std::string> shown_;  // last line by motor or MCU
 };
 
-class TerminalView : public View {
- public:
-  void show(const Status& status) override { screen_.show(table(status)); }
-  bool silent() override {
-    screen_.notice("no state from bushd; what is shown is old");
-    return true;
-  }
-  void warn(const std::string& text) override { screen_.notice(text); }
+int watch_changes(const Connection& connection, const WatchOptions& options) {
+  Changes changes(options.names);
+  Losses losses;
+  unsigned shown = 0;
+  std::string trouble;
+  const auto tell = [&](const std::string& text) {
+    if (!text.empty() && text != trouble)
+      fmt::print(stderr, "bushctl: {}\n", bushd::printable(text));
+    trouble = text;
+  };
+  return follow_live(connection, {.timeout = options.timeout,
+                                  .next = &Client::next_state_or_input,
+                                  .show =
+                                      [&](const Status& status) {
+                                        changes.show(status);
+                                        tell(losses.text_of(status));
+                                        return options.count == 0 || ++shown < options.count;
+                                      },
+                                  .on_input = [] { return true; },
+                                  .on_trouble = tell,
+                                  .close = [] {}});
+}
 
- private:
-  Screen screen_{"'bushctl status' shows all"};
-};
+int watch_screen(const Connection& connection, const WatchOptions& options) {
+  std::optional<Screen> screen;
+  WatchTable table(options.names);
+  Status newest;
+  Losses losses;
+  unsigned shown = 0;
+  const auto draw = [&](const std::string& notice) {
+    const Screen::Size size = Screen::size();
+    screen->show(table.lines(newest, size.columns, size.rows, notice));
+  };
+  return follow_live(
+      connection,
+      {.timeout = options.timeout,
+       .for_ever = true,
+       .next = &Client::next_state_or_input,
+       .show =
+           [&](const Status& status) {
+             if (!screen) screen.emplace();
+             newest = status;
+             draw(losses.text_of(status));
+             return options.count == 0 || ++shown < options.count;
+           },
+       .on_input =
+           [&] {
+             const auto keys = screen ? screen->keys() : "";
+             const bool goes_on = keys && table.take_keys(*keys);
+             if (screen && goes_on) draw("");
+             return goes_on;
+           },
+       .input_fd = isatty(RawTerminal::fd()) != 0 ? RawTerminal::fd() : -1,
+       .on_trouble =
+           [&](const std::string& why) { draw("what is shown is old: " + bushd::printable(why)); },
+       .close = [&] { screen.reset(); }});
+}
 
 }  // namespace
 
-int watch(bushd::client::Client& client, const WatchOptions& options) {
-  // Before the terminal is touched: without a daemon the message belongs on the first screen.
-  auto status = client.status(options.timeout);
-  if (!status) return failure(client, status.error());
-  std::unique_ptr<View> view;
-  if (isatty(STDOUT_FILENO) != 0) {
-    view = std::make_unique<TerminalView>();
-  } else {
-    view = std::make_unique<ChangesView>();
-  }
-  std::uint64_t lost = 0;
-  for (unsigned shown = 0;;) {
-    if (status) {
-      view->show(*status);
-      if (status->missing_mcus.count > 0) {
-        view->warn(missing_text(status->answered, status->missing_mcus, "MCUs"));
-      }
-      if (status->lost > lost) view->warn(lost_text(status->lost - lost));
-      lost = status->lost;
-      if (options.count > 0 && ++shown >= options.count) return kDone;
-    } else if (client.interrupted()) {
-      return kDone;
-    } else if (client.ended() || !view->silent()) {
-      view.reset();
-      return failure(client, status.error());
-    }
-    status = client.next_state(options.timeout);
-  }
+int watch(const Connection& connection, const WatchOptions& options) {
+  return (isatty(STDOUT_FILENO) != 0 ? watch_screen : watch_changes)(connection, options);
 }
 
 }  // namespace bushctl

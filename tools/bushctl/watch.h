@@ -3,17 +3,20 @@
 #pragma once
 
 #include <chrono>
+#include <string>
+#include <vector>
 
-#include "client/client.h"
+#include "command_line.h"
 
 namespace bushctl {
 
 struct WatchOptions {
+  std::vector<std::string> names{};   // of motors, or patterns; none: all
   std::chrono::milliseconds timeout;  // without a snapshot
   unsigned count = 0;                 // snapshots to show; 0: until interrupted
 };
 
 // The exit code.
-int watch(bushd::client::Client& client, const WatchOptions& options);
+int watch(const Connection& connection, const WatchOptions& options);
 
 }  // namespace bushctl

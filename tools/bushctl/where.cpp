@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "api/name_pattern.h"
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "grid.h"
+#include "named_motors.h"
 
 namespace bushctl {
 namespace {
@@ -52,12 +54,13 @@ Result<std::vector<Whereabouts>> where(const bushd::client::Status& status,
   if (names.empty()) return all;
   std::vector<Whereabouts> chosen;
   for (const std::string& name : names) {
-    const auto found =
-        std::ranges::find(all, name, [](const auto& motor) { return motor.state.name; });
-    if (found == all.end()) {
-      return fail(fmt::format("there is no motor \"{}\"; 'bushctl where' lists them", name));
+    bool found = false;
+    for (const Whereabouts& motor : all) {
+      if (!bushd::api::names_motor(name, motor.state.name, motor.description.group)) continue;
+      found = true;
+      chosen.push_back(motor);
     }
-    chosen.push_back(*found);
+    if (!found) return fail(no_such_motor(status, name));
   }
   return chosen;
 }
