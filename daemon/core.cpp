@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/overloaded.h"
+#include "daemon/name_patterns.h"
 #include "daemon/request_log.h"
 
 namespace bushd::daemon {
@@ -42,7 +43,8 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
             carry_out(now_us, asker, request);
           },
-          [this] { return moves_.begins(); }),
+          [this] { return moves_.begins(); },
+          [this](const api::Move& move) { return moves_.would_take(move); }),
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
@@ -134,7 +136,9 @@ void Core::pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus&
   supervisor_.handle_events(now_us, installation_[bus]);
 }
 
-void Core::request(std::int64_t now, const api::Asker& who, const api::Request& as_asked) {
+void Core::request(std::int64_t now, const api::Asker& who, const api::Request& as_written) {
+  const auto of_patterns = with_motors_of_patterns(installation_, as_written);
+  const api::Request& as_asked = of_patterns ? *of_patterns : as_written;
   // Where a computed axis would go is asked where its motors stand: after a stop, elsewhere.
   const auto* move = std::get_if<api::Move>(&as_asked);
   const api::Asker as_counted = move != nullptr ? pseudo_axes_.told_of_axes(who, *move) : who;

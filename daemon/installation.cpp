@@ -5,14 +5,13 @@
 #include <set>
 #include <utility>
 
+#include "base/nearest_name.h"
+#include "base/shortened.h"
+
 namespace bushd::daemon {
 namespace {
 
 constexpr std::size_t kMostUnknownNames = 4;  // that an answer tells; there may be any number
-
-std::string shortened(const std::string& text) {
-  return text.substr(0, 64);
-}
 
 }  // namespace
 
@@ -198,10 +197,22 @@ bool Installation::by_table(const Mcu& mcu, std::int64_t steps, bushd_delay floo
          std::abs(steps) <= motion::Motor::kMaxPosition;
 }
 
+std::vector<std::string_view> Installation::names(bool of_groups) const {
+  std::vector<std::string_view> all;
+  for (const config::Motor& motor : config_.motors) all.emplace_back(motor.name);
+  for (const config::Pseudo& pseudo : config_.pseudos) {
+    for (const config::PseudoAxis& axis : pseudo.axes) all.emplace_back(axis.name);
+  }
+  if (!of_groups) return all;
+  for (const config::Group& group : config_.groups) all.emplace_back(group.name);
+  return all;
+}
+
 Result<MotorId> Installation::find(const std::string& name) const {
   const auto found = motor_by_name_.find(name);
   if (found != motor_by_name_.end()) return found->second;
-  return fail("there is no motor \"" + shortened(name) + "\"; 'bushctl status' lists them");
+  return fail("there is no motor \"" + shortened(name, 64) + "\"" +
+              did_you_mean(name, this->names(false)) + "; 'bushctl status' lists them");
 }
 
 Result<std::vector<MotorId>> Installation::find(const api::MotorNames& names) const {
@@ -241,8 +252,8 @@ Result<std::vector<MotorId>> Installation::find_with_groups(const api::MotorName
     }
     const auto group = std::ranges::find(config_.groups, name, &config::Group::name);
     if (group == config_.groups.end()) {
-      return fail("there is no motor or group \"" + shortened(name) +
-                  "\"; 'bushctl status' lists them");
+      return fail("there is no motor or group \"" + shortened(name, 64) + "\"" +
+                  did_you_mean(name, this->names(true)) + "; 'bushctl status' lists them");
     }
     const GroupId id{static_cast<std::size_t>(group - config_.groups.begin())};
     for (const MotorId of_group : motors()) {

@@ -229,6 +229,8 @@ class Installation {
 
   // By the names that clients use; none of them twice.
   Result<MotorId> find(const std::string& name) const;
+  // Of motors and computed axes, and of groups.
+  std::vector<std::string_view> names(bool of_groups) const;
   Result<std::vector<MotorId>> find(const api::MotorNames& names) const;
   Result<std::vector<MotorId>> find(const std::vector<api::MotorAmount>& motors) const;
   Result<std::vector<MotorId>> find_or_all(const api::MotorNames& names) const;  // none named: all

@@ -64,6 +64,14 @@ bool Departures::any_held(const std::vector<MotorId>& motors) const {
                              [&](const Held& held) { return has_common(held.motors, motors); });
 }
 
+bool Departures::is_refused_anyway(const api::Request& request,
+                                   const std::vector<MotorId>& motors) const {
+  const auto* move = std::get_if<api::Move>(&request);
+  const auto changes = [this](MotorId motor) { return kept_.being_restored(motor); };
+  return move != nullptr && !any_held(motors) && std::ranges::none_of(motors, changes) &&
+         !may_begin_(*move);
+}
+
 Result<bool> Departures::make_ready(std::int64_t now_us, Held& held) {
   bool ready = true;
   const bool moves = !std::holds_alternative<api::SetPosition>(held.request);
@@ -82,7 +90,7 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
   const bool may_wait = kept_.keeps() || !idle_drivers_.none() || LineTables::concerns(request);
   if (!may_wait && held_.empty()) return false;
   auto motors = motors_of(request);
-  if (!motors) return false;
+  if (!motors || is_refused_anyway(request, *motors)) return false;
   Held held{.asker = asker, .request = request, .motors = std::move(*motors), .since_us = now_us};
   if (held_.size() >= kMostHeld) {
     asker.answer(api::Refused{"too many requests wait for the disk; try again in a moment"});

@@ -23,9 +23,11 @@ class Departures final : public Service {
  public:
   using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
   // `busy`: what was carried out before is still being begun; all that is held waits for it.
+  // `may_begin`: whether a move would be taken as things stand.
   Departures(const Installation& installation, const Interlocks& interlocks,
              const OpenMoves& open_moves, KeptPositions& kept, IdleDrivers& idle_drivers,
-             LineTables& line_tables, CarryOut carry_out, std::function<bool()> busy)
+             LineTables& line_tables, CarryOut carry_out, std::function<bool()> busy,
+             std::function<bool(const api::Move&)> may_begin)
       : installation_(installation),
         interlocks_(interlocks),
         open_moves_(open_moves),
@@ -33,7 +35,8 @@ class Departures final : public Service {
         idle_drivers_(idle_drivers),
         line_tables_(line_tables),
         carry_out_(std::move(carry_out)),
-        busy_(std::move(busy)) {}
+        busy_(std::move(busy)),
+        may_begin_(std::move(may_begin)) {}
 
   // Whether the request is kept here. It is carried out, or refused, in a later step.
   bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
@@ -58,6 +61,9 @@ class Departures final : public Service {
   // Nothing: the request changes no position, or is refused anyway by who carries it out.
   std::optional<std::vector<MotorId>> motors_of(const api::Request& request) const;
   bool any_held(const std::vector<MotorId>& motors) const;
+  // Whatever the disk says: its target is beyond a limit, or its speed beyond its table. Not while
+  // something that comes before it may change that.
+  bool is_refused_anyway(const api::Request& request, const std::vector<MotorId>& motors) const;
   Result<bool> make_ready(std::int64_t now_us, Held& held);
   void waits_no_more(Held& held);
   void refuse(Held& held, const std::string& reason);
@@ -70,6 +76,7 @@ class Departures final : public Service {
   LineTables& line_tables_;
   CarryOut carry_out_;
   std::function<bool()> busy_;
+  std::function<bool(const api::Move&)> may_begin_;
   std::list<Held> held_;
 };
 

@@ -68,7 +68,7 @@ void Drivers::begin(std::int64_t now_us, const api::Asker& asker, const api::Mot
                                      " requests about drivers and faults wait for their MCUs "
                                      "already; try again in a moment"});
   }
-  std::string done = "done";
+  std::string done = "done" + also_meant(names, targets->mcus);
   if (!targets->out_of_reach.empty()) done += "; not online, so not done there:";
   for (const McuId mcu : targets->out_of_reach) done += " " + installation_[mcu].name();
   open_.push_back({Confirmation(asker, targets->mcus, now_us), action, std::move(done)});
@@ -91,6 +91,24 @@ Result<Drivers::Targets> Drivers::targets_of(const api::MotorNames& names) const
     return fail(installation_[targets.out_of_reach.front()].must_be_online().error());
   }
   return targets;
+}
+
+// Drivers and faults are of an MCU: who names some of its motors hears which others it concerns.
+std::string Drivers::also_meant(const api::MotorNames& names,
+                                const std::vector<McuId>& mcus) const {
+  if (names.empty()) return {};
+  std::string others;
+  for (const McuId id : mcus) {
+    std::string at;
+    for (const MotorId motor : installation_[id].motors()) {
+      const std::string& name = installation_[motor].name();
+      if (std::ranges::find(names, name) != names.end()) continue;
+      at += (at.empty() ? "" : ", ") + name;
+    }
+    if (!at.empty())
+      others += "; of the whole MCU " + installation_[id].name() + ", so of " + at + " too";
+  }
+  return others;
 }
 
 // Who clears what has stopped some motors does not mean the others, which go on. Where nothing is

@@ -42,6 +42,7 @@ class Drivers final : public Service {
   void begin(std::int64_t now_us, const api::Asker& asker, const api::MotorNames& names,
              std::uint8_t action);
   Result<Targets> targets_of(const api::MotorNames& names) const;
+  std::string also_meant(const api::MotorNames& names, const std::vector<McuId>& mcus) const;
   void leave_out_what_is_well(Targets& targets) const;
   Result<void> may(std::uint8_t action, const std::vector<McuId>& mcus) const;
   bool being_disabled(McuId mcu) const;

@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "base/nearest_name.h"
 #include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
@@ -73,8 +74,11 @@ Result<MotorSettings::Plan> MotorSettings::plan_of(
     if (!id) return fail(id.error());
     const auto key = config::setting_key_of(word);
     if (!key) {
-      return fail(name + ": \"" + word +
-                  "\" cannot be changed in operation; allowed: offset, direction, soft_limits, "
+      std::vector<std::string_view> known;
+      for (const config::SettingKey each : config::kSettingKeys) known.push_back(name_of(each));
+      return fail(name + ": \"" + word + "\" cannot be changed in operation" +
+                  did_you_mean(word, known) +
+                  "; allowed: offset, direction, soft_limits, "
                   "input_active, local, keypad, velocity, currents. Edit bushd.toml and restart "
                   "bushd for other keys");
     }

@@ -91,6 +91,9 @@ class Moves final : public Service {
   void end_overtaken(std::int64_t now_us) override;
   void step(std::int64_t now_us) override;
 
+  // Whether it would be taken, as its motors stand now.
+  bool would_take(const api::Move& move) const { return parts_of(move).has_value(); }
+
  private:
   struct Part {
     MotorId motor;

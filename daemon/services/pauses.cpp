@@ -150,9 +150,12 @@ void Pauses::request(std::int64_t, const api::Asker& asker, const api::Release& 
   const auto motors = installation_.find_with_groups(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
+  const auto held = std::ranges::count_if(
+      *motors, [this](MotorId motor) { return installation_[motor].is_held(); });
   for (const MotorId motor : *motors) installation_[motor].hold(false);
   installation_.changed = true;
-  asker.answer(api::done("released: " + count_text(motors->size())));
+  asker.answer(api::done(held == 0 ? "done; none of them was held"
+                                   : "released: " + count_text(static_cast<std::size_t>(held))));
 }
 
 void Pauses::Pausing::not_done(api::Outcome how, const std::string& what) {

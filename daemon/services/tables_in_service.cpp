@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "base/nearest_name.h"
 #include "daemon/confirmation.h"
 #include "daemon/services/open_moves.h"
 #include "tables/profiles/diagnostics.h"
@@ -80,8 +81,11 @@ void TablesInService::request(const api::Asker& asker, const api::UseTable& requ
   if (installation_.shutting_down) {
     asker.answer(api::Refused{"the daemon is shutting down"});
   } else if (!group) {
-    asker.answer(api::Refused{"there is no group \"" + request.group.substr(0, 64) +
-                              "\"; 'bushctl status' lists them"});
+    std::vector<std::string> groups;
+    for (const config::Group& known : installation_.config().groups) groups.push_back(known.name);
+    asker.answer(api::Refused{"there is no group \"" + request.group.substr(0, 64) + "\"" +
+                              did_you_mean(request.group, groups) +
+                              "; 'bushctl status' lists them"});
   } else if (request.table.empty()) {
     asker.answer(api::Refused{"no table is named"});
   } else {

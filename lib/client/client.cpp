@@ -153,8 +153,13 @@ Error Client::no_answer(bool sent) const {
   if (hears_two()) return two_daemons();
   const double seconds = std::chrono::duration<double>(options_.answer_within).count();
   if (link_->loses() && state_heard_at_ >= asked_at_) {
-    return {fmt::format("bushd sends its state but has not answered for {:g} s{}", seconds,
-                        sent ? perhaps : "; nothing was asked of it")};
+    // Who has a session has been heard before.
+    const char* rest = session_ != 0 ? "; it may still carry this out"
+                       : sent ? ": with [lcm] commands = false it hears the control socket only; "
+                                "else it may still carry this out"
+                              : "; nothing was asked of it. With [lcm] commands = false it hears "
+                                "the control socket only";
+    return {fmt::format("bushd sends its state but has not answered for {:g} s{}", seconds, rest)};
   }
   return {link_->remedy() + (link_->loses() ? "" : perhaps)};
 }
@@ -375,15 +380,18 @@ Result<api::Reply> Client::await_reply(Repeated request, Until until, const Mean
   }
 }
 
-Result<Status> Client::wait_for(const bool& heard, bool (StatusCollector::*enough)() const,
-                                std::chrono::milliseconds timeout) {
+Result<std::optional<Status>> Client::wait_for(bool& heard, bool (StatusCollector::*enough)() const,
+                                               std::chrono::milliseconds timeout, int input_fd) {
+  if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error());
   const Clock::time_point deadline = Clock::now() + timeout;
   while (!heard || !(collector_.*enough)()) {
-    if (auto waited = wait(deadline); !waited) return fail(waited.error());
+    if (auto waited = wait(deadline, input_fd); !waited) return fail(waited.error());
     if (heard && (collector_.*enough)()) break;
+    if (is_readable(input_fd)) return std::optional<Status>();
     if (Clock::now() >= deadline) return fail(link_->remedy());
   }
-  return collector_.status();
+  heard = false;
+  return std::optional(collector_.status());
 }
 
 Result<Status> Client::status(std::chrono::milliseconds timeout) {
@@ -429,18 +437,26 @@ Result<void> Client::subscribe() {
   return link_->send(*packet);
 }
 
+Result<std::optional<Status>> Client::next_state_or_input(std::chrono::milliseconds timeout,
+                                                          int input_fd) {
+  return wait_for(state_heard_, &StatusCollector::has_motors, timeout, input_fd);
+}
+
+Result<std::optional<Status>> Client::next_health_or_input(std::chrono::milliseconds timeout,
+                                                           int input_fd) {
+  return wait_for(health_heard_, &StatusCollector::has_health, timeout, input_fd);
+}
+
 Result<Status> Client::next_state(std::chrono::milliseconds timeout) {
-  if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error());
-  auto status = wait_for(state_heard_, &StatusCollector::has_motors, timeout);
-  state_heard_ = false;
-  return status;
+  auto status = next_state_or_input(timeout, -1);
+  if (!status) return fail(status.error());
+  return std::move(**status);
 }
 
 Result<Status> Client::next_health(std::chrono::milliseconds timeout) {
-  if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error());
-  auto status = wait_for(health_heard_, &StatusCollector::has_health, timeout);
-  health_heard_ = false;
-  return status;
+  auto status = next_health_or_input(timeout, -1);
+  if (!status) return fail(status.error());
+  return std::move(**status);
 }
 
 }  // namespace bushd::client

@@ -183,6 +183,8 @@ Result<void> VcdWriter::close(TimeNs end_ns) {
   assert(file_);
   write_pending(end_ns + 1);
   write_time(end_ns);
+  // Without it a reader knows that there is more to come, or that the program was killed.
+  text_ += "$comment end of trace $end\n";
   flush_text();
   if (std::fclose(file_.release()) != 0) fail_with(errno);
   if (error_) return fail(*error_);

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <system_error>
 
+#include "base/nearest_name.h"
 #include "tables/table_file.h"
 
 namespace bushd::tables {
@@ -30,6 +31,19 @@ Result<bool> is_there(const fs::path& path) {
       Error{.message = "is a link to nothing; make what it leads to, or remove it", .file = path});
 }
 
+// As far as they can be seen: a hint needs no more.
+std::vector<std::string> names_in(std::span<const std::filesystem::path> directories) {
+  std::vector<std::string> names;
+  for (const fs::path& directory : directories) {
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(directory, error)) {
+      if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+    }
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
 }  // namespace
 
 Result<std::filesystem::path> find(std::string_view name,
@@ -54,8 +68,8 @@ Result<std::filesystem::path> find(std::string_view name,
     if (*found) return path;
     looked_in += (looked_in.empty() ? "" : ", ") + directory.string();
   }
-  return fail(
-      fmt::format("there is no table \"{}\": no file {}.toml in {}", name, name, looked_in));
+  return fail(fmt::format("there is no table \"{}\": no file {}.toml in {}{}", name, name,
+                          looked_in, did_you_mean(name, names_in(directories))));
 }
 
 std::vector<std::filesystem::path> shipped_directories() {

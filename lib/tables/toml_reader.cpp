@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/nearest_name.h"
+
 namespace bushd::tables {
 namespace {
 
@@ -88,7 +90,8 @@ Result<void> TomlReader::only(std::initializer_list<std::string_view> keys) cons
     if (unknown == nullptr || key.source().begin < unknown->source().begin) unknown = &key;
   }
   if (unknown == nullptr) return {};
-  Error unknown_key{.message = fmt::format("unknown key; allowed here: {}", fmt::join(keys, ", ")),
+  Error unknown_key{.message = fmt::format("unknown key; allowed here: {}{}", fmt::join(keys, ", "),
+                                           did_you_mean(unknown->str(), keys)),
                     .file = file_,
                     .line = line_of(unknown->source()),
                     .key = full(unknown->str()),

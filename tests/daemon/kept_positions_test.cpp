@@ -156,6 +156,17 @@ TEST(KeptPositions, TheDiskKnowsOfAMotionBeforeTheLineDoes) {
   EXPECT_EQ(lab.wait(number).result, "reached");
 }
 
+// A power cut behind a mark makes a motor uncertain, though it has not moved.
+TEST(KeptPositions, WhatIsRefusedWhateverTheDiskSaysLeavesNoMarkThere) {
+  KeptLab lab;
+  lab.run_for(0.5);
+  lab.disk_us = 50'000;
+  const auto number = lab.send(Ask::kMoveBy, {"m01"}, {3'000'000'000});
+  ASSERT_FALSE(lab.replies(number).empty()) << "it waits for no disk";
+  EXPECT_THAT(lab.last_reply(number).reason, HasSubstr("is beyond +-2147483647 steps"));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+}
+
 TEST(KeptPositions, WhatIsStoppedBeforeItBeginsDoesNotBegin) {
   KeptLab lab;
   lab.run_for(0.5);

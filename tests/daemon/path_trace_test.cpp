@@ -1,4 +1,6 @@
 // What comes out of the pins on a path, judged by tools/check-trace from the file of its points.
+#include <gmock/gmock.h>
+
 #include <cmath>
 #include <fstream>
 #include <string>
@@ -55,6 +57,37 @@ TEST_P(PathTrace, EveryEdgeIsOnThePath) {
   other[3 * 20 + 1] += 40;
   write_points(other);
   EXPECT_EQ(check(lab), 1) << said();
+}
+
+TEST_P(PathTrace, OfALogOfSeveralPathsEachIsJudgedByItsPoints) {
+  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
+  lab.connect();
+  const auto move = lab.send(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()});
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  // Back by another way, and without one of the motors.
+  const auto back =
+      lab.send(api::MovePath{.motors = {"m03", "m01"}, .rows = 2, .positions = {100, -50, 7, 9}});
+  EXPECT_EQ(lab.wait(back).result, "reached");
+  lab.run_for(0.1);
+  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  write_points(points());
+  std::ofstream(path("back.csv")) << "m03,m01\n100,-50\n7,9\n";
+  const std::string both = "--path " + path("path.csv") + " --path " + path("back.csv");
+  EXPECT_EQ(Traced::check(lab, both), 0) << said();
+  EXPECT_EQ(check(lab), 2);
+  EXPECT_THAT(said(), testing::HasSubstr("it has 2 paths, and --path names 1"));
+  std::ofstream(path("back.csv")) << "m03,m01\n100,-90\n7,9\n";
+  EXPECT_EQ(Traced::check(lab, both), 1) << said();
+}
+
+TEST_P(PathTrace, ATraceThatIsStillWrittenIsToldAsThat) {
+  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(api::Move{.motors = {{"m01", 20}}})).result, "reached");
+  EXPECT_EQ(Traced::check(lab, ""), 2);
+  EXPECT_THAT(said(), testing::HasSubstr("the trace is unfinished: bushsim still writes it"));
+  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  EXPECT_EQ(Traced::check(lab, ""), 0) << said();
 }
 
 }  // namespace

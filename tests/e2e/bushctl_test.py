@@ -2,6 +2,7 @@
 
 import json
 import math
+import pathlib
 import re
 import signal
 import sys
@@ -207,26 +208,68 @@ class Bushctl(EndToEndTest):
         # The table's cruise: 10 time units of 40 us a step.
         self.assertAlmostEqual(motor["velocity_steps_per_s"], -2500, delta=1)
 
-    def test_watch_and_health_end_with_the_daemon(self):
+    def test_watch_and_health_wait_for_a_daemon_that_begins_anew(self):
         self.bring_up()
-        terminals = [self.enterContext(Terminal([program("BUSHCTL"), *words.split()])) for words in ("watch", "health --watch")]
-        for terminal in terminals:
-            terminal.wait_for("hall", "Ctrl-C ends")
+        watch, health = (self.enterContext(Terminal([program("BUSHCTL"), *words.split()])) for words in ("watch", "health --watch"))
+        for terminal in (watch, health):
+            terminal.wait_for("Ctrl-C")
         self.bushd.end(signal.SIGKILL)
-        for terminal in terminals:
-            self.assertEqual(terminal.end(), 1)
-            self.assertFalse(terminal.screen.alternate)
-            self.assertIn("the daemon has ended", terminal.screen.text())
+        for terminal in (watch, health):
+            terminal.wait_for("what is shown is old: ")
+        self.start_bushd()
+        for terminal in (watch, health):
+            terminal.wait(lambda text: "what is shown is old" not in text)
+        watch.wait_for("all work")
+        watch.send("q")
+        self.assertEqual(watch.end(), 0)
+        self.assertFalse(watch.screen.alternate)
+        health.send("\x03")
+        self.assertEqual(health.end(), 0)
+
+    def test_watch_in_a_pipe_waits_as_long_as_it_is_told(self):
+        self.bring_up()
+        watch = self.start_bushctl("watch", "--timeout-s", GIVE_UP_S)
+        short = self.start_bushctl("watch", "--timeout-s", "0.1")
+        self.wait_until("both to show the motors", lambda: all("b1 position" in each.said() for each in (watch, short)))
+        self.bushd.end(signal.SIGKILL)
+        self.assertEqual(short.process.wait(GIVE_UP_S), 1)
+        self.start_bushd()
+        self.wait_until("the new daemon's MCUs", lambda: watch.said().count("READY boot") >= 4)
+        watch.process.send_signal(signal.SIGINT)
+        self.assertEqual(watch.process.wait(GIVE_UP_S), 0)
+
+    def test_status_where_and_watch_show_who_is_named(self):
+        self.bring_up()
+        self.assertEqual([motor["name"] for motor in json.loads(self.command("status", "--json", "b*").stdout)["motors"]], ["b0", "b1", "b2", "b3"])
+        self.assertEqual([motor["name"] for motor in json.loads(self.command("where", "--json", "*1", "a0").stdout)["motors"]], ["a1", "b1", "a0"])
+        self.assertNotIn("a0 ", self.command("watch", "--count", "1", "a1").stdout)
+        self.assertIn('there is no motor "c*"', self.bushctl("status", "c*").stderr)
+        self.command("move", "a*", "10", "--wait")
+        self.assertEqual([motor["position_steps"] for motor in json.loads(self.command("status", "--json").stdout)["motors"]], [10] * 4 + [0] * 4)
 
     def test_what_is_typed_into_watch_is_no_command(self):
         self.bring_up()
         shell = self.enterContext(Terminal(["sh", "-c", f"{program('BUSHCTL')} watch; read -r typed; echo got: $typed"]))
-        shell.wait_for("hall", "Ctrl-C ends")
+        shell.wait_for("a0", "Ctrl-C")
         shell.send("bushctl move a0 1000\r")
-        self.bushd.end(signal.SIGKILL)
-        shell.wait_for("the daemon has ended")
+        shell.send("q")
+        shell.wait(lambda _: not shell.screen.alternate)
         shell.send("that\r")
         shell.wait_for("got: that")
+
+    def test_files_of_numbers_are_read_alike(self):
+        self.bring_up()
+        for words in (["follow"], ["path", "run"]):
+            self.assertIn("it is a folder", self.bushctl(*words, TOP).stderr)
+            self.assertIn("not a regular file", self.bushctl(*words, "/dev/zero").stderr)
+        # A path of as many points as it may have is longer than any table.
+        rows = "".join(f"{row % 7}.000000000000000000,{row % 5}.000000000000000000\n" for row in range(100_000))
+        path = pathlib.Path(self.file("path.csv"))
+        path.write_text("\ufeffa0,a1\n" + rows)
+        self.assertGreater(path.stat().st_size, 2 << 20)
+        self.assertEqual(json.loads(self.command("path", "run", "--dry-run", "--json", path).stdout)["motors"][0]["name"], "a0")
+        path.write_text("a0,a1\n" + "1" * 400 + "x,2\n")
+        self.assertLess(len(self.bushctl("path", "run", path).stderr), 200)
 
     def test_status_waits_for_programs_that_start(self):
         self.write_config()

@@ -179,6 +179,7 @@ class ControlSocket(EndToEndTest):
         refused = self.bushctl("move", "--lcm", "a0", 5)
         self.assertEqual(refused.returncode, 1)
         self.assertIn("bushd sends its state but has not answered for 3 s; nothing was asked of it", refused.stderr)
+        self.assertIn("with [lcm] commands = false it hears the control socket only; else", self.bushctl("stop", "--lcm").stderr)
         self.command("status", "--lcm")
         self.command("move", "--wait", "a0", 5)
         self.assertEqual(self.positions()["a0"], 5)

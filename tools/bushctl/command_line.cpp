@@ -5,16 +5,34 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <type_traits>
 #include <utility>
 
+#include "base/nearest_name.h"
 #include "base/parse_error.h"
 #include "commands.h"
 
 namespace bushctl {
+
+namespace {
+
+// Says how the words are called that a command sorts by itself.
+class NamesWords : public CLI::Formatter {
+ public:
+  explicit NamesWords(std::string words) : words_(std::move(words)) {}
+  std::string make_usage(const CLI::App* app, std::string name) const override {
+    std::string usage = CLI::Formatter::make_usage(app, std::move(name));
+    while (usage.ends_with('\n')) usage.pop_back();
+    return usage + " " + words_ + "\n";
+  }
+
+ private:
+  std::string words_;
+};
+
+}  // namespace
 
 bushd::client::ClientOptions Connection::options() const {
   using Way = bushd::client::ClientOptions::Way;
@@ -107,8 +125,12 @@ Command& Command::words(const std::string& name, std::vector<std::string>* value
   return *this;
 }
 
-Command& Command::raw_words(std::vector<std::string>* value) {
+Command& Command::raw_words(std::vector<std::string>* value, const std::string& usage) {
   app_->allow_extras();
+  auto formatter = std::make_shared<NamesWords>(usage);
+  // As of all other commands.
+  formatter->column_width(app_->get_formatter()->get_column_width());
+  app_->formatter(std::move(formatter));
   raw_words_ = value;
   return *this;
 }
@@ -171,26 +193,10 @@ Command CommandLine::add_local(const std::string& name, const std::string& text)
 
 namespace {
 
-// Insertions, deletions and exchanges of letters from one word to the other.
-std::size_t distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t corner = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t exchanged = corner + (a[i] == b[j] ? 0 : 1);
-      corner = row[j + 1];
-      row[j + 1] = std::min({exchanged, row[j] + 1, corner + 1});
-    }
-  }
-  return row.back();
-}
-
 // What is wrong if the word that stands where a command of `app` should is none. `called`: the
 // words up to there.
 std::optional<std::string> no_command(const CLI::App& app, const std::string& called,
                                       std::span<const std::string> arguments) {
-  constexpr std::size_t kAlike = 2;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string& word = arguments[i];
     if (word.starts_with("-")) {
@@ -198,17 +204,15 @@ std::optional<std::string> no_command(const CLI::App& app, const std::string& ca
       if (option != nullptr && option->get_items_expected_max() > 0) ++i;
       continue;
     }
-    const CLI::App* nearest = nullptr;
+    std::vector<std::string> names;
     for (const CLI::App* command : app.get_subcommands({})) {
-      const std::size_t away = distance(word, command->get_name());
-      if (away == 0 && command->get_subcommands({}).empty()) return std::nullopt;
-      if (away == 0) return no_command(*command, called + " " + word, arguments.subspan(i + 1));
-      if (away > kAlike || away >= word.size()) continue;
-      if (nearest == nullptr || away < distance(word, nearest->get_name())) nearest = command;
+      const bool same = command->get_name() == word;
+      if (same && command->get_subcommands({}).empty()) return std::nullopt;
+      if (same) return no_command(*command, called + " " + word, arguments.subspan(i + 1));
+      names.push_back(command->get_name());
     }
-    const std::string hint =
-        nearest == nullptr ? "" : fmt::format("; is \"{}\" meant?", nearest->get_name());
-    return fmt::format("there is no command \"{}\"{} ('{} --help' lists them)", word, hint, called);
+    return fmt::format("there is no command \"{}\"{} ('{} --help' lists them)", word,
+                       bushd::did_you_mean(word, names), called);
   }
   return std::nullopt;
 }
@@ -222,10 +226,26 @@ bool sorts_its_words(const CLI::App& app, std::span<const std::string> arguments
   });
 }
 
+// Behind the name of a motor, where a command sorts its words by itself, a position follows "--to",
+// which is no option of CLI11's.
+bool takes_to(const CLI::App& app, const std::vector<std::string>& words) {
+  if (words.size() < 2 || !std::string_view("--to").starts_with(words.back())) return false;
+  const std::string& before = words[words.size() - 2];
+  const auto is_before = [&](const CLI::App* command) { return command->get_name() == before; };
+  const bool is_name = !before.starts_with('-') &&
+                       std::ranges::none_of(app.get_subcommands({}), is_before) &&
+                       before.find_first_not_of("0123456789.+-") != std::string::npos;
+  return is_name && sorts_its_words(app, words);
+}
+
 }  // namespace
 
 bushd::Completion CommandLine::complete(const std::vector<std::string>& words) {
   bushd::Completion completion = bushd::complete(*app_, words);
+  if (takes_to(*app_, words)) {
+    completion.words.emplace("--to");
+    completion.value.clear();
+  }
   for (const auto& [option, value] : completion.given) {
     if (option == "--socket") connection_.socket = value;
     if (option == "--url") connection_.url = value;

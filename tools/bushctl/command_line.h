@@ -55,7 +55,8 @@ class Command {
   Command& words(const std::string& name, std::vector<std::string>* value, const std::string& text,
                  Needed needed);
   // The same, with options of their own among them.
-  Command& raw_words(std::vector<std::string>* value);
+  // `usage`: how --help names them.
+  Command& raw_words(std::vector<std::string>* value, const std::string& usage);
 
   void run(std::function<int()> action);
 

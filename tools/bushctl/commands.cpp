@@ -61,8 +61,9 @@ std::optional<api::Request> stop_on_interrupt(const api::MotorNames& motors) {
 bool as_hoped(const api::Reply& reply, Hope hope) {
   const auto* completed = std::get_if<api::Completed>(&reply);
   if (completed == nullptr) return std::holds_alternative<api::Accepted>(reply);
-  return completed->outcome ==
-         (hope == Hope::kReached ? api::Outcome::kReached : api::Outcome::kDone);
+  if (hope == Hope::kReached) return completed->outcome == api::Outcome::kReached;
+  const bool done = completed->outcome == api::Outcome::kDone;
+  return done && (hope == Hope::kDone || completed->reason == word(api::Outcome::kDone));
 }
 
 }  // namespace

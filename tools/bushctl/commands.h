@@ -50,6 +50,11 @@ void add_doctor_command(CommandLine& line);
 // Where the service has its configuration.
 inline constexpr const char* kSystemConfig = "/etc/bushd/bushd.toml";
 
+// What NAME is, for --help.
+inline constexpr const char* kMotors = "Motors; 'slit*' and @GROUP stand for several";
+inline constexpr const char* kMotorsOrAll =
+    "Motors; 'slit*' and @GROUP stand for several (default: all)";
+
 // What may follow these words (base/completion.h), with names that the daemon knows.
 int complete(CommandLine& line, const std::vector<std::string>& words);
 
@@ -65,7 +70,9 @@ bool take_interrupt();
 // From now on SIGHUP is one of these.
 void take_hangup_too();
 
-enum class Hope { kReached, kDone };  // what the result is when all is well
+// What the result is when all is well. kDoneEverywhere: done, and the reason names no MCU that
+// could not be reached.
+enum class Hope { kReached, kDone, kDoneEverywhere };
 
 // kAnswered: done when accepted. kResult: done when the result is as hoped for. All returns are
 // exit codes.

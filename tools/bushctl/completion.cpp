@@ -1,7 +1,9 @@
 // Names that may follow on a command line.
+#include <algorithm>
 #include <set>
 
 #include "commands.h"
+#include "config/setting.h"
 
 namespace bushctl {
 namespace {
@@ -43,11 +45,27 @@ std::set<std::string> known_names(const Connection& connection, const std::strin
   return names;
 }
 
+// Behind the motor of `config` its keys follow.
+bool wants_keys(const std::vector<std::string>& words) {
+  const auto config = std::ranges::find(words, "config");
+  if (config == words.end() || words.back().starts_with('-')) return false;
+  return std::any_of(config + 1, words.end() - 1,
+                     [](const std::string& word) { return !word.starts_with('-'); });
+}
+
+std::set<std::string> keys() {
+  std::set<std::string> names;
+  for (const auto key : bushd::config::kSettingKeys) {
+    names.insert(std::string(bushd::config::name_of(key)) + "=");
+  }
+  return names;
+}
+
 }  // namespace
 
 int complete(CommandLine& line, const std::vector<std::string>& words) {
   bushd::Completion completion = line.complete(words);
-  const auto names = known_names(line.connection(), completion.value);
+  const auto names = wants_keys(words) ? keys() : known_names(line.connection(), completion.value);
   completion.value.clear();
   bushd::print_completion(completion, words.back(), {names.begin(), names.end()});
   return kDone;

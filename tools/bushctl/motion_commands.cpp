@@ -70,7 +70,8 @@ void add_move(CommandLine& line) {
           "bushctl move [--wait] NAME --to POSITION [NAME --to POSITION...]  to these positions\n"
           "Both are in the motor's unit, or in steps of a motor without one, and may be negative; "
           "the nearest step counts. A motor that moves is given a new target; a distance then "
-          "counts from its present one. With --wait the exit code is 0 only if every motor reached "
+          "counts from its present one. 'slit*' and @GROUP stand for several motors. With --wait "
+          "the exit code is 0 only if every motor reached "
           "its target.\n"
           "With --line motors of one bus move along a straight line: at any moment each of them "
           "has made the same share of its way. Stops, pauses and limits of one act on all.\n"
@@ -87,7 +88,7 @@ void add_move(CommandLine& line) {
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
-      .raw_words(&options->words)
+      .raw_words(&options->words, "NAME DISTANCE|NAME --to POSITION...")
       .run([&line, carry_out, options] {
         const Numbers as = numbers(options->steps);
         const auto profile = parse_speed_profile(options->words, as, options->speed);
@@ -158,7 +159,7 @@ void add_arm(CommandLine& line) {
       .flag("--wait", &options->wait, "Wait for the result")
       .flag("--while-connected", &options->while_connected,
             "Wait for the result, and disarm them if this program ends before")
-      .raw_words(&options->words)
+      .raw_words(&options->words, "NAME DISTANCE|NAME --to POSITION...")
       .run([carry_out, options] {
         const Numbers as = numbers(options->steps);
         if (options->line) {
@@ -173,7 +174,7 @@ void add_disarm(CommandLine& line) {
   const auto motors = std::make_shared<api::MotorNames>();
   line.add("disarm", "Cancel moves that wait for the trigger")
       .footer("What waits for the same trigger, or was armed together, is disarmed together.")
-      .words("NAME", motors.get(), "Motors (default: all)", Command::Needed::kNo)
+      .words("NAME", motors.get(), kMotorsOrAll, Command::Needed::kNo)
       .run([&line, motors] {
         return send(line.connection(), api::Disarm{*motors}, Client::Until::kResult, Hope::kDone);
       });
@@ -212,7 +213,7 @@ void add_stop(CommandLine& line) {
   };
   const auto options = std::make_shared<Options>();
   line.add("stop", "Ramp motors down")
-      .words("NAME", &options->motors, "Motors (default: all)", Command::Needed::kNo)
+      .words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .flag("--wait", &options->wait, "Wait until the motors stand")
       .run([&line, options] {
         return send(line.connection(), api::Stop{options->motors}, until(options->wait),
@@ -221,9 +222,15 @@ void add_stop(CommandLine& line) {
 }
 
 void add_estop(CommandLine& line) {
-  line.add("estop", "Stop all motors of all buses at once, until 'clear'").run([&line] {
-    return send(line.connection(), api::EmergencyStop{}, Client::Until::kResult, Hope::kDone);
-  });
+  line.add("estop", "Stop all motors of all buses at once, until 'clear'")
+      .footer(
+          "The exit code is 0 only if all MCUs have confirmed it and stand. One that cannot be "
+          "reached "
+          "is named, and stopped as soon as it comes.")
+      .run([&line] {
+        return send(line.connection(), api::EmergencyStop{}, Client::Until::kResult,
+                    Hope::kDoneEverywhere);
+      });
 }
 
 void add_home(CommandLine& line) {
@@ -242,7 +249,7 @@ void add_home(CommandLine& line) {
           "not found ends the others. With --wait the exit code is 0 only if every motor has found "
           "its switch; 'bushctl stop' ends it, and with --wait Ctrl-C (with --all it stops all "
           "motors).")
-      .words("NAME", &options->motors, "Motors", Command::Needed::kNo)
+      .words("NAME", &options->motors, kMotors, Command::Needed::kNo)
       .flag("--all", &options->all, "All motors with a home switch, by their order")
       .option("--speed", &options->speed, kSpeed)
       .flag("--steps", &options->steps, "--speed is in steps per second")

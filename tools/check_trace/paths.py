@@ -15,6 +15,7 @@ A run may be paused and go on anywhere, and end anywhere.
 """
 
 import csv
+from copy import copy
 from fractions import Fraction
 from itertools import accumulate
 
@@ -81,6 +82,29 @@ def matched(steps, edges, turns):
         made.append((steps[i], edge))
         i += 1
     return made
+
+
+def of_each_path(motors, ways, tick_ns):
+    """The motors of each path, with its edges: those from its start on and before the next one's.
+
+    Between two paths all motors stand, for longer than the clocks of an MCU and of the trace drift apart; so one place
+    where both are known tells the others, the first edge of all behind the first tick of all."""
+    moves = {way: [(motor, move) for motor in motors for move in motor.moves if move.way == way] for way in ways}
+    starts = [min(move.start_tick for _, move in moves[way]) * tick_ns for way in ways]
+    first_ns = min((motor.edges[0].time_ns for motor in motors if motor.edges), default=0)
+    # The first step comes within the first delay of a table after the first tick.
+    begins = [first_ns + start - starts[0] - tick_ns for start in starts]
+    begins[0] = float("-inf")
+    for index, way in enumerate(ways):
+        until = begins[index + 1] if index + 1 < len(ways) else float("inf")
+        parts = []
+        for motor, move in moves[way]:
+            part = copy(motor)
+            part.moves = [move]
+            part.from_steps = move.from_steps
+            part.edges = [edge for edge in motor.edges if begins[index] <= edge.time_ns < until]
+            parts.append(part)
+        yield parts
 
 
 class PathCheck:

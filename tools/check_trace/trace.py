@@ -31,6 +31,8 @@ class Trace:
         self._common_dirs = common_dirs
         self._phases = phases or {}
         self._levels = levels or {}
+        self._ends = False  # whoever has written it says so at its end
+        self._ended = False
         self.torn = []  # (place, time): phases that do not follow each other
         self.edges = defaultdict(list)  # rising STEP edges, with DIR and EN as they were
         self.pulses = defaultdict(list)  # of STEP: (begin, width)
@@ -40,6 +42,8 @@ class Trace:
             with open(path, encoding="ascii") as file:
                 tokens = (token for line in file for token in line.split())
                 self._read_changes(tokens, self._read_head(tokens))
+                if self._ends and not self._ended:
+                    raise InputError(f"{path}: the trace is unfinished: bushsim still writes it, or was killed; end it by SIGTERM, then check")
         except OSError as error:
             raise InputError(f"{path}: {error.strerror}") from None
         except (ValueError, IndexError, StopIteration) as error:
@@ -52,8 +56,7 @@ class Trace:
             return levels.enable_low
         return output in (levels.step_low if kind == "step" else levels.direction_low)
 
-    @staticmethod
-    def _read_head(tokens):
+    def _read_head(self, tokens):
         """Wires by their code: (address, kind, output)."""
         wires = {}
         scopes = []
@@ -64,7 +67,9 @@ class Trace:
                 if word == "$end":
                     break
                 section.append(word)
-            if keyword == "$timescale":
+            if keyword == "$version":
+                self._ends = section == ["bushd", "virtual", "bus"]
+            elif keyword == "$timescale":
                 timescale = "".join(section)
             elif keyword == "$scope":
                 scopes.append(section[1])
@@ -96,6 +101,9 @@ class Trace:
                 time = int(token[1:])
                 went_back = time < now
                 now = time
+                continue
+            if token == "$comment":
+                self._ended = [*iter(lambda: next(tokens), "$end")] == ["end", "of", "trace"]
                 continue
             if token[0] in "bBrR":
                 next(tokens)  # a vector's or a real's code stands apart

@@ -21,6 +21,8 @@ MAX_CHANNEL = 63  # on the control socket
 PACKETS_AT_ONCE = 256
 CONNECT_WITHIN_S = 3
 ENDS_WITHIN_MS = 200
+IP_MULTICAST_ALL = 49  # of Linux; the module socket does not name it
+MUCH = 128 * 1024  # bytes; more than any answer but a state
 
 
 class LinkEnded(Exception):
@@ -48,6 +50,7 @@ class SocketLink:
 
     def __init__(self, path: str) -> None:
         self._path = path
+        self._received = 0  # bytes, since something was asked for
         self.remedy = f"bushd does not answer at {path}; its log may tell why"
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # connect() waits for room among those that a daemon has not taken yet.
@@ -65,6 +68,7 @@ class SocketLink:
         return self._socket.fileno()
 
     def send(self, channel: str, payload: bytes) -> None:
+        self._received = 0
         try:
             self._socket.send(channel.encode("ascii") + b"\0" + payload)
         except (BlockingIOError, InterruptedError):
@@ -81,7 +85,8 @@ class SocketLink:
             except OSError:
                 packet, flags = b"", 0
             if not packet:
-                raise LinkEnded(why_closed(self._path))
+                raise LinkEnded(why_closed(self._path, self._received))
+            self._received += len(packet)
             name, nul, payload = packet.partition(b"\0")
             if nul and 0 < len(name) <= MAX_CHANNEL and name.isascii() and not flags & socket.MSG_TRUNC:
                 yield name.decode("ascii"), payload
@@ -90,8 +95,10 @@ class SocketLink:
         self._socket.close()
 
 
-def why_closed(path: str) -> str:
+def why_closed(path: str, received: int = 0) -> str:
     """The connection is over; whether somebody listens there still, and goes on, tells why.
+
+    `received`: so many bytes have come since something was asked for.
 
     A process that ends closes its descriptors one after the other, and what waits at the socket with it.
     """
@@ -104,6 +111,11 @@ def why_closed(path: str) -> str:
             ended = any(event & select.POLLHUP for _, event in poll.poll(ENDS_WITHIN_MS))
         if ended:
             return f"the daemon has ended; it was at {path}"
+    if received >= MUCH:
+        return (
+            f"bushd has closed this connection at {path} behind {received >> 10} KB of its answer: the rest was more than it "
+            "keeps for a client, as the state of some thousands of motors is. LCM has no such bound"
+        )
     return (
         f"bushd has closed this connection at {path}: too many clients are connected, this one did not read what it "
         "was sent, or the daemon has restarted; its log tells why"
@@ -141,6 +153,12 @@ class LcmLink:
         self._out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
         try:
             group = struct.pack("4sI", socket.inet_aton(address), socket.INADDR_ANY)
+            if self._url.ttl == 0:
+                # Whatever the route is, now and later: a TTL of 0 keeps no packet on this PC by itself (lib/lcm/loopback_only.h).
+                loopback = socket.inet_aton("127.0.0.1")
+                group = socket.inet_aton(address) + loopback
+                self._in.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+                self._out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, loopback)
             self._in.bind((address, self._url.port))
             self._in.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
             self._out.connect((address, self._url.port))

@@ -413,8 +413,15 @@ class Session:
         perhaps = "; it may still carry this out" if exchange.sent else ""
         if self.loses and self._state_heard_at >= exchange.asked_at:
             seconds = f"{self._timing.answer_within_s:g}"
-            nothing = perhaps or "; nothing was asked of it"
-            return NoDaemon(f"bushd sends its state but has not answered for {seconds} s{nothing}")
+            # Who has a session has been heard before.
+            only = "with [lcm] commands = false it hears the control socket only"
+            if self._session:
+                rest = perhaps
+            elif exchange.sent:
+                rest = f": {only}; else it may still carry this out"
+            else:
+                rest = f"; nothing was asked of it. W{only[1:]}"
+            return NoDaemon(f"bushd sends its state but has not answered for {seconds} s{rest}")
         return NoDaemon(self._remedy + perhaps)
 
     def _no_status(self, query: StatusQuery, now: float) -> BushdError:

@@ -56,7 +56,9 @@ TEST(Drivers, AreDisabledAndEnabledByMcu) {
   DriversBench bench;
   ASSERT_TRUE(bench.enabled("m01"));
   bench.drivers.request(bench.now_us(), bench.asker(1), api::Disable{{"m02"}});
-  EXPECT_EQ(bench.result(1).outcome, api::Outcome::kDone);
+  const api::Completed disabled = bench.result(1);
+  EXPECT_EQ(disabled.outcome, api::Outcome::kDone);
+  EXPECT_EQ(disabled.reason, "done; of the whole MCU hall:1, so of m01 too");
   EXPECT_FALSE(bench.enabled("m01")) << "the MCU has one output for all of them";
   EXPECT_TRUE(bench.enabled("m03"));
   bench.drivers.request(bench.now_us(), bench.asker(2), api::Enable{});

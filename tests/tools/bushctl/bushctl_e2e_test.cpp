@@ -76,6 +76,38 @@ TEST(Bushctl, StatusThatIsNotCompleteSaysSo) {
   EXPECT_EQ(bushctl({"status", "--json", "--timeout-s", "1"}).code, 1);
 }
 
+// Linux holds packets with a TTL of 0 back only at devices where the group was joined.
+TEST(Bushctl, WithATtlOf0NothingLeavesThisPcWhereverTheRouteLeads) {
+  const auto shell = [](const std::string& command) {
+    return std::system(("PATH=$PATH:/usr/sbin:/sbin; " + command).c_str());  // NOLINT: of ours
+  };
+  if (shell("ip link add leak0 type veth peer name leak1 && ip link set leak0 up && ip link set "
+            "leak1 up && ip addr add 10.9.0.1/24 dev leak0") != 0) {
+    GTEST_SKIP() << "no veth here";
+  }
+  FakeDaemon daemon;
+  daemon.start();
+  ASSERT_EQ(bushctl({"status"}).code, 0);
+  ASSERT_EQ(shell("ip route del 239.255.76.67/32; ip route add 239.255.76.67/32 dev leak0"), 0);
+  const auto sent = [&] {
+    const std::string file = testing::TempDir() + "leak0";
+    shell(
+        "ip -s -j link show leak0 | grep -o '\"tx\":{[^}]*\"packets\":[0-9]*' | grep -o '[0-9]*$' "
+        ">" +
+        file);
+    long count = -1;
+    std::ifstream(file) >> count;
+    return count;
+  };
+  const long before = sent();
+  // 30 states of two MCUs.
+  const Ran watch = bushctl({"watch", "--count", "30"});
+  EXPECT_EQ(watch.code, 0) << watch.err;
+  // LCM itself tries its sockets by a packet, and Linux tells routers of who has joined.
+  EXPECT_LT(sent() - before, 15);
+  shell("ip link del leak0; ip route replace 239.255.76.67/32 dev lo");
+}
+
 TEST(Bushctl, WatchTellsOfLosses) {
   FakeDaemon daemon;
   daemon.start();
@@ -280,10 +312,10 @@ TEST(Bushctl, MixedMovesAndWrongWordsAreUsageErrors) {
 TEST(Bushctl, ACommandThatIsNoneIsNamedWithTheNearest) {
   const Ran ran = bushctl({"movee", "theta", "5"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("there is no command \"movee\"; is \"move\" meant?"));
+  EXPECT_THAT(ran.err, HasSubstr("there is no command \"movee\"; did you mean \"move\"?"));
   const Ran nested = bushctl({"--lcm", "table", "uze"});
   EXPECT_EQ(nested.code, 2);
-  EXPECT_THAT(nested.err, HasSubstr("there is no command \"uze\"; is \"use\" meant?"));
+  EXPECT_THAT(nested.err, HasSubstr("there is no command \"uze\"; did you mean \"use\"?"));
   const Ran far = bushctl({"--prefix", "move", "dance"});
   EXPECT_EQ(far.code, 2);
   EXPECT_THAT(far.err, HasSubstr("there is no command \"dance\" ('bushctl --help'"));

@@ -74,6 +74,11 @@ class Others(unittest.TestCase):
         self.assertEqual(complete_in_bash("bushctl", "table", ""), {"list", "show", "use", "reload"})
         self.assertEqual(complete_in_bash("bushctl", "arm", "--edge", ""), {"rising", "falling"})
         self.assertEqual(complete_in_bash("bushctl", "move", "--dry"), {"--dry-run"})
+        self.assertEqual(complete_in_bash("bushctl", "move", "theta", ""), {"--to"})
+        self.assertEqual(complete_in_bash("bushctl", "move", "theta", "--t"), {"--to"})
+        self.assertEqual(complete_in_bash("bushctl", "--socket", "/nowhere", "move", "theta", "5", ""), set())
+        self.assertIn("offset=", complete_in_bash("bushctl", "config", "theta", "o"))
+        self.assertEqual(complete_in_bash("bushctl", "--socket", "/nowhere", "config", "o"), set())
         self.assertEqual(complete_in_bash("bushctl", "--socket", "/nowhere", "stop", ""), set())
 
     def test_daemon_and_simulator(self):
