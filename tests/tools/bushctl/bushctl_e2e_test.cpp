@@ -312,10 +312,10 @@ TEST(Bushctl, MixedMovesAndWrongWordsAreUsageErrors) {
 TEST(Bushctl, ACommandThatIsNoneIsNamedWithTheNearest) {
   const Ran ran = bushctl({"movee", "theta", "5"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("there is no command \"movee\"; did you mean \"move\"?"));
+  EXPECT_THAT(ran.err, HasSubstr("there is no command \"movee\" (did you mean \"move\"?)"));
   const Ran nested = bushctl({"--lcm", "table", "uze"});
   EXPECT_EQ(nested.code, 2);
-  EXPECT_THAT(nested.err, HasSubstr("there is no command \"uze\"; did you mean \"use\"?"));
+  EXPECT_THAT(nested.err, HasSubstr("there is no command \"uze\" (did you mean \"use\"?)"));
   const Ran far = bushctl({"--prefix", "move", "dance"});
   EXPECT_EQ(far.code, 2);
   EXPECT_THAT(far.err, HasSubstr("there is no command \"dance\" ('bushctl --help'"));
