@@ -61,6 +61,7 @@ void CoreRig::boot() {
                              .enable_at_boot = enable_at_boot_,
                              .in_pieces = configuration_.in_pieces,
                              .keypad = true,
+                             .no_slow_runs = false,  // below
                              .queue = queue_.data(),
                              .queue_ticks = configuration_.queue_ticks,
                              .min_tick_ns = configuration_.min_tick_ns,

@@ -8,9 +8,9 @@
 #define __flash
 #define E2END 0xFFFu
 
-extern volatile uint8_t PORTA, PORTB, PORTC, PORTD, PORTE, PORTH, PORTJ, PORTK, PORTL;
+extern volatile uint8_t PORTA, PORTB, PORTC, PORTD, PORTE, PORTF, PORTH, PORTJ, PORTK, PORTL;
 extern volatile uint8_t DDRA, DDRB, DDRC, DDRE, DDRF, DDRG, DDRH, DDRL;
-extern volatile uint8_t GPIOR1, GPIOR2, OCR0A, OCR0B;
+extern volatile uint8_t GPIOR1, GPIOR2, OCR0A, OCR0B, OCR2A, OCR2B;
 extern volatile uint8_t GTCCR, TCCR3B, TCCR4B, TCCR5B, TIMSK3, TIFR3;
 extern volatile uint16_t TCNT3, OCR3A;
 extern volatile uint8_t UCSR0A, UCSR0B, UCSR0C, UBRR0H, UBRR0L;
