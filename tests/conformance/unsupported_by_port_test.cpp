@@ -50,6 +50,8 @@ const std::vector<Unsupported> kUnsupported = {
     {"CURRENTS", BUSHD_CAN_CURRENTS, kByCapability, "there is no chopper"},
     {"VELOCITY", BUSHD_CAN_VELOCITY, kByCapability, "nothing runs without the daemon"},
     {"LOCAL_keypad", BUSHD_CAN_KEYPAD, kByCapability, "RXD is not connected"},
+    {"OUTPUTS", BUSHD_CAN_OUTPUTS, kByCapability,
+     "`direction_line` of the bus has the level of DIR, and TXD is what it is"},
     {"volatile_table_slot", BUSHD_CAN_SCRATCH, kByCapability, "no table is uploaded to a port"},
 };
 

@@ -69,7 +69,7 @@ TEST(ArraysAndLimits, AreToldFromTheLowestPositionToTheHighest) {
                                                        .time_s = {0, 9},
                                                        .positions = {0, 30}}));
   EXPECT_THAT(refused.reason,
-              testing::HasSubstr("m01 would go to 30.0 mm; allowed: -20.0 mm to 5.0 mm"));
+              testing::HasSubstr("m01 would go to 30.000 mm; allowed: -20.000 mm to 5.000 mm"));
 }
 
 TEST_P(Arrays, AllMotorsAreWhereTheRowsSayAtAnyTime) {

@@ -63,7 +63,8 @@ TEST_F(LabWithPatterns, WhatStandsForNoMotorIsRefusedAndAStopStopsTheOthers) {
   lab.send(api::Move{.motors = {{"m01", 4000}}});
   lab.run_for(0.3);
   EXPECT_THAT(lab.wait(lab.send(api::Stop{{"slit*", "m0*"}})).reason, HasSubstr("slit*"));
-  EXPECT_FALSE(lab.motor("m01").moving);
+  EXPECT_TRUE(lab.run_until([this] { return !lab.motor("m01").moving; }, 5));
+  EXPECT_LT(lab.motor("m01").position_steps, 4000);
 }
 
 }  // namespace

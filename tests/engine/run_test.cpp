@@ -1,6 +1,7 @@
 #include "engine/run.h"
 
 #include <cstdint>
+#include <cstdlib>
 #include <vector>
 
 #include "engine/tables.h"
@@ -387,6 +388,11 @@ TEST(Run, TakeOverMakesAsManyStepsAsTheRunItselfRampingDown) {
     bushd_run_start(&run, table.view(), between<uint32_t>(1, 200), 1, 0);
     expand(&run, Format::kFine, tick_ns, between<size_t>(0, 60));
     RC_PRE(!bushd_run_done(&run));
+    // A step that is half a second away is not made: a fraction tells that to 1/256 of a step.
+    const int64_t unit_ns = table.view()->time_unit_ns;
+    const auto step_ns = static_cast<int64_t>(bushd_run_delay(&run)) * unit_ns;
+    const int64_t gone_ns = static_cast<int64_t>(run.since) * unit_ns + run.since_ns;
+    RC_PRE(std::abs(step_ns - gone_ns - int64_t{BUSHD_RUN_WAITS_NS}) > step_ns / 256);
     bushd_run taken;
     bushd_run_start_ramp_down(&taken, table.view(), bushd_run_delay(&run), run.fraction, 1);
     bushd_run_ramp_down(&run);

@@ -89,8 +89,10 @@ def of_each_path(motors, ways, tick_ns):
 
     Between two paths all motors stand, for longer than the clocks of an MCU and of the trace drift apart; so one place
     where both are known tells the others, the first edge of all behind the first tick of all."""
-    moves = {way: [(motor, move) for motor in motors for move in motor.moves if move.way == way] for way in ways}
-    starts = [min(move.start_tick for _, move in moves[way]) * tick_ns for way in ways]
+    def moves(motor, way):
+        return [move for move in motor.moves if move.way == way]
+
+    starts = [min(move.start_tick for motor in motors for move in moves(motor, way)) * tick_ns for way in ways]
     first_ns = min((motor.edges[0].time_ns for motor in motors if motor.edges), default=0)
     # The first step comes within the first delay of a table after the first tick.
     begins = [first_ns + start - starts[0] - tick_ns for start in starts]
@@ -98,10 +100,12 @@ def of_each_path(motors, ways, tick_ns):
     for index, way in enumerate(ways):
         until = begins[index + 1] if index + 1 < len(ways) else float("inf")
         parts = []
-        for motor, move in moves[way]:
+        for motor in motors:
             part = copy(motor)
-            part.moves = [move]
-            part.from_steps = move.from_steps
+            part.moves = moves(motor, way)
+            if not part.moves:
+                continue
+            part.from_steps = part.moves[0].from_steps
             part.edges = [edge for edge in motor.edges if begins[index] <= edge.time_ns < until]
             parts.append(part)
         yield parts

@@ -239,8 +239,9 @@ const std::vector<State>& states() {
        }},
       {"meets a limit", "a", true, "d",
        [](WatchedLab& lab) {
+         // Once: it is barred until it has moved away again. So it is given time to move.
          move(lab, {{"a", 2500}});
-         run_somewhere(lab);
+         lab.run(0.4 + lab.below(500) * 1e-3);
          lab.hold_input(8, true);
          lab.run(lab.below(150) * 1e-3);
        }},
