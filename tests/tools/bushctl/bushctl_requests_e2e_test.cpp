@@ -109,6 +109,15 @@ TEST(Bushctl, DoesNotRepeatAMoveToARestartedDaemon) {
   EXPECT_THAT(move.err(), HasSubstr("restarted"));
 }
 
+TEST(Bushctl, AnEmergencyStopSucceedsIfItIsDoneEverywhere) {
+  FakeDaemon daemon;
+  daemon.start([](const api::Request&, int) {
+    return Replies{api::Accepted{},
+                   api::Completed{.outcome = Outcome::kDone, .reason = "done", .detail = {}}};
+  });
+  EXPECT_EQ(bushctl({"estop"}).code, 0);
+}
+
 TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   FakeDaemon daemon;
   daemon.start(always(Outcome::kDone));
@@ -118,7 +127,7 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   EXPECT_EQ(bushctl({"disable"}).code, 0);
   EXPECT_EQ(bushctl({"set", "theta", "-100"}).code, 0);
   EXPECT_EQ(bushctl({"clear"}).code, 0);
-  EXPECT_EQ(bushctl({"estop"}).code, 0);
+  EXPECT_EQ(bushctl({"estop"}).code, 1) << "done for a reason: not everywhere";
   EXPECT_EQ(bushctl({"disarm", "theta"}).code, 0);
   EXPECT_EQ(bushctl({"compare", "theta", "-5", "--width-us", "7"}).code, 0);
   const auto requests = daemon.requests();
