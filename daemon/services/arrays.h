@@ -62,7 +62,7 @@ class Arrays final : public Service {
     bool spoilt = false;
     // As Asker::after_stops, of the part that was asked for first.
     std::uint64_t after_stops = api::Asker::kNotCounted;
-    bool dropped = false;           // a stop has ended it, and its last rows were told that
+    bool dropped = false;  // a stop has ended it, and its last rows were told that
     // From when it runs: the rows that have been checked.
     std::shared_ptr<motion::Trajectory> followed;
     Journal::LoggedArray logged{};
