@@ -123,7 +123,8 @@ TEST_P(SlowSpeeds, AStopWaitsForHalfASecondAtMost) {
 
 // Of what the MCU does by itself: in an emergency, and when nothing more comes.
 TEST_P(SlowSpeeds, AnEmergencyAndSilenceMakeNoStepThatIsFarAway) {
-  if (std::string(GetParam()).starts_with("coarse")) GTEST_SKIP() << "bytes tell no parts of steps";
+  // Bytes of a coarse stream tell no parts of a step: the MCU may make the one that it is in.
+  const int unseen = std::string(GetParam()) == "coarse" ? 1 : 0;
   for (const bool silence : {false, true}) {
     Lab lab(hall(1, 1, GetParam(), "glacier"), kNanoseconds);
     lab.connect();
@@ -136,7 +137,8 @@ TEST_P(SlowSpeeds, AnEmergencyAndSilenceMakeNoStepThatIsFarAway) {
       lab.send(Ask::kEmergencyStop, {});
     }
     lab.run_for(20);
-    EXPECT_EQ(lab.shaft_steps("m01"), 1) << (silence ? "silence" : "emergency");
+    EXPECT_GE(lab.shaft_steps("m01"), 1) << (silence ? "silence" : "emergency");
+    EXPECT_LE(lab.shaft_steps("m01"), 1 + unseen) << (silence ? "silence" : "emergency");
   }
 }
 
