@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,9 @@ constexpr double kNoise = 1e-6;
 constexpr double kPathNoise = 1e-9;  // of a step; a side's path is up to 131070 steps
 constexpr int kHalvings = 60;        // of a path that a double holds
 constexpr double kLongestCode = std::numeric_limits<std::uint16_t>::max();
+// Of a speed by rounding, beyond which a finer time unit is taken.
+constexpr double kMostShortfall = 0.01;
+constexpr double kLongestSide = std::numeric_limits<std::int32_t>::max();
 
 Result<TableContent> checked(TableContent content) {
   // A mirror image need not be written out.
@@ -51,13 +55,14 @@ Result<Codes*> editable(TableContent& content, SideKey side, std::size_t index, 
   return no_index(side, index, codes.size());
 }
 
-Result<std::uint16_t> rounded_up(double units) {
+Result<std::uint16_t> rounded_up(double units, std::uint32_t time_unit_ns) {
   const double code = rounded_up_units(units);
   if (code < 1 || units < 1 - kNoise) {
-    return fail(
-        fmt::format("a delay becomes {:.3g} time units; allowed: 1 or more, as nothing shorter can "
-                    "be said. Use a shorter time unit (\"bushtab resample --time-unit\")",
-                    units));
+    return fail(fmt::format(
+        "a delay becomes {:.3g} time units; allowed: 1 or more, as nothing shorter can be said. {}",
+        units,
+        time_unit_ns > 1 ? "Use a shorter time unit (\"bushtab resample --time-unit\")"
+                         : "No time unit is shorter than 1 ns: use a slower table"));
   }
   if (code <= kLongestCode) return static_cast<std::uint16_t>(code);
   return fail(
@@ -66,9 +71,10 @@ Result<std::uint16_t> rounded_up(double units) {
                   code));
 }
 
+// Precondition: the content's time unit is that of the new codes.
 Result<TableContent> with_all_codes(TableContent content, double factor) {
   const auto scale = [&](std::uint16_t& code) -> Result<void> {
-    const auto scaled = rounded_up(code * factor);
+    const auto scaled = rounded_up(code * factor, content.time_unit_ns);
     if (!scaled) return fail(scaled.error());
     code = *scaled;
     return {};
@@ -83,6 +89,82 @@ Result<TableContent> with_all_codes(TableContent content, double factor) {
     if (auto done = scale(*content.cruise); !done) return fail(done.error());
   }
   return checked(std::move(content));
+}
+
+// The longest and the shortest code, and what the longer side takes, in time units.
+struct Extent {
+  double slowest = 0;
+  double fastest = kLongestCode;
+  double side_sum = 0;
+  double side_codes = 0;
+};
+
+Extent extent_of(const TableContent& content) {
+  Extent extent;
+  const auto add_code = [&](std::uint16_t code) {
+    extent.slowest = std::max<double>(extent.slowest, code);
+    extent.fastest = std::min<double>(extent.fastest, code);
+  };
+  const auto add_side = [&](const Codes& side) {
+    double sum = 0;
+    for (const std::uint16_t code : side) {
+      add_code(code);
+      sum += code;
+    }
+    extent.side_sum = std::max(extent.side_sum, sum);
+    extent.side_codes = std::max(extent.side_codes, static_cast<double>(side.size()));
+  };
+  add_side(content.accel);
+  if (content.decel) add_side(*content.decel);
+  if (content.cruise) add_code(*content.cruise);
+  return extent;
+}
+
+// Whether codes times `factor` are not longer than a code and a side may be. Rounding up adds less
+// than one time unit a code.
+bool holds_long(const Extent& extent, double factor) {
+  return rounded_up_units(extent.slowest * factor) <= kLongestCode &&
+         extent.side_sum * factor + extent.side_codes <= kLongestSide;
+}
+
+// The finest unit in which delays times `factor` can be told.
+double finest_unit_ns(const TableContent& content, const Extent& extent, double factor) {
+  const double sums = kLongestSide - extent.side_codes;
+  const double share = std::max(extent.slowest / kLongestCode, extent.side_sum / sums);
+  double unit_ns = std::max(1.0, std::ceil(content.time_unit_ns * factor * share * (1 - 1e-12)));
+  while (unit_ns <= kMaxTimeUnitNs &&
+         !holds_long(extent, content.time_unit_ns * factor / unit_ns)) {
+    ++unit_ns;
+  }
+  return unit_ns;
+}
+
+Result<TableContent> in_unit(const TableContent& content, double factor, double unit_ns) {
+  TableContent scaled = content;
+  scaled.time_unit_ns = static_cast<std::uint32_t>(unit_ns);
+  return with_all_codes(std::move(scaled), content.time_unit_ns * factor / unit_ns);
+}
+
+// Delays times `factor` in the unit that costs least by rounding: the finest one, unless one of a
+// few next to it, or the old unit times the factor, in which codes stay as they are, hits them
+// better.
+Result<TableContent> in_best_unit(const TableContent& content, double factor, double finest_ns) {
+  constexpr int kTried = 64;
+  auto best = in_unit(content, factor, finest_ns);
+  if (!best) return best;
+  double least = greatest_shortfall(content, *best, 1 / factor);
+  const auto try_unit = [&](double unit_ns) {
+    if (least == 0 || unit_ns < finest_ns || unit_ns > kMaxTimeUnitNs) return;
+    auto scaled = in_unit(content, factor, unit_ns);
+    if (!scaled) return;
+    const double shortfall = greatest_shortfall(content, *scaled, 1 / factor);
+    if (shortfall >= least * (1 - kPathNoise)) return;  // the finer one
+    least = shortfall;
+    best = std::move(*scaled);
+  };
+  try_unit(std::round(content.time_unit_ns * factor));
+  for (int i = 1; i < kTried; ++i) try_unit(finest_ns + i);
+  return best;
 }
 
 // A side as a curve: the square of the speed over the path, straight between the nodes of its
@@ -238,7 +320,34 @@ Result<TableContent> delete_codes(TableContent content, SideKey side, std::size_
 
 Result<TableContent> scale_speed(TableContent content, double factor) {
   if (const auto good = check_factor(factor); !good) return fail(good.error());
-  return with_all_codes(std::move(content), 1 / factor);
+  const Extent extent = extent_of(content);
+  std::optional<TableContent> in_old_unit;
+  if (holds_long(extent, 1 / factor) && extent.fastest / factor >= 1 - kNoise) {
+    auto scaled = with_all_codes(content, 1 / factor);
+    if (!scaled) return scaled;
+    if (greatest_shortfall(content, *scaled, factor) <= kMostShortfall) return scaled;
+    in_old_unit = std::move(*scaled);
+  }
+  const double unit_ns = finest_unit_ns(content, extent, 1 / factor);
+  const double units = content.time_unit_ns / factor / unit_ns;
+  const bool too_short = extent.fastest * units < 1 - kNoise;
+  // No unit tells them better.
+  if (in_old_unit && (too_short || unit_ns >= content.time_unit_ns)) return *in_old_unit;
+  if (unit_ns > kMaxTimeUnitNs) {
+    return fail(
+        fmt::format("the slowest delay becomes {:.6g} s; allowed: up to {:.6g} s, 65535 time units "
+                    "of 1 s. Use a factor of {:.3g} or more",
+                    extent.slowest * content.time_unit_ns * 1e-9 / factor, kLongestCode,
+                    factor * unit_ns / kMaxTimeUnitNs * (1 + 1e-2)));
+  }
+  if (unit_ns > 1 && too_short) {
+    return fail(fmt::format(
+        "the slowest delay is {:.0f} times the fastest one, so no time unit tells both by codes of "
+        "1..65535 at this factor. Use one that is a whole number or 1 over a whole number, or "
+        "delete slow codes",
+        extent.slowest / extent.fastest));
+  }
+  return in_best_unit(content, 1 / factor, unit_ns);
 }
 
 Result<TableContent> scale_acceleration(TableContent content, double factor) {

@@ -22,7 +22,10 @@ Result<TableContent> insert_codes(TableContent content, SideKey side, std::size_
 Result<TableContent> delete_codes(TableContent content, SideKey side, std::size_t index,
                                   std::size_t count);
 
-// All speeds times `factor`, by new codes in the same time unit.
+// All speeds times `factor`, above 0. The codes are in the same time unit if that holds all of them
+// (1..65535) and the sums of the sides, and rounding costs no speed more than 1 %; else in the
+// one of the finest units that hold them whose rounding costs least. Refused beyond units of 1
+// ns..1 s.
 Result<TableContent> scale_speed(TableContent content, double factor);
 // The same speeds with `factor` times the acceleration: the square of the speed over the path,
 // which becomes 1 / factor as long. The greatest acceleration becomes at most `factor` times what

@@ -56,8 +56,62 @@ TEST(TableEdit, ReversedTwiceIsTheSame) {
 TEST(TableEdit, SpeedsAreScaledByTheCodes) {
   EXPECT_THAT(scale_speed(kMirrored, 2)->accel, ElementsAre(450, 350, 250));
   EXPECT_THAT(scale_speed(kMirrored, 3)->accel, ElementsAre(300, 234, 167));
-  EXPECT_THAT(scale_speed(kUneven, 0.01).error().text(), HasSubstr("a longer time unit"));
+  EXPECT_EQ(scale_speed(kMirrored, 3)->time_unit_ns, 1000U);
   EXPECT_FALSE(scale_speed(kUneven, 0));
+}
+
+TEST(TableEdit, SpeedsThatLeaveTheTimeUnitGetOneThatHoldsThem) {
+  // In 100 us the codes stay as they are, and nothing is rounded.
+  const auto slow = scale_speed(kUneven, 0.01);
+  ASSERT_TRUE(slow);
+  EXPECT_EQ(slow->time_unit_ns, 100'000U);
+  EXPECT_THAT(slow->accel, ElementsAre(900, 500));
+  EXPECT_THAT(*slow->decel, ElementsAre(400, 600, 800));
+  EXPECT_EQ(*slow->cruise, 400);
+  const auto back = scale_speed(*slow, 5000);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->time_unit_ns, 1U);
+  EXPECT_THAT(back->accel, ElementsAre(18000, 10000));
+}
+
+TEST(TableEdit, TheUnitIsOneThatRoundsLeast) {
+  // 60 us and 40 us over 0.7: 85714.286 and 57142.857 ns. The finest unit is 2 ns.
+  const TableContent content{.name = "t", .time_unit_ns = 1, .accel = {60000, 40000}};
+  const auto slow = scale_speed(content, 0.7);
+  ASSERT_TRUE(slow);
+  const double shortfall = greatest_shortfall(content, *slow, 0.7);
+  for (std::uint32_t unit_ns = 2; unit_ns < 60; ++unit_ns) {
+    const double slowest = std::ceil(60000 / 0.7 / unit_ns) * unit_ns;
+    const double fastest = std::ceil(40000 / 0.7 / unit_ns) * unit_ns;
+    EXPECT_LE(shortfall, std::max(1 - 60000 / 0.7 / slowest, 1 - 40000 / 0.7 / fastest) + 1e-15);
+  }
+}
+
+TEST(TableEdit, LongSideGetsALongerUnitBeforeItsSumLeaves31Bits) {
+  // 40000 codes of 30000 are 1.2e9 units; half as fast they would be 2.4e9.
+  const TableContent content{
+      .name = "t", .time_unit_ns = 1000, .accel = std::vector<std::uint16_t>(40000, 30000)};
+  const auto slow = scale_speed(content, 0.5);
+  ASSERT_TRUE(slow);
+  EXPECT_EQ(slow->time_unit_ns, 2000U);
+  EXPECT_EQ(slow->accel.front(), 30000);
+  EXPECT_FALSE(check(*slow));
+}
+
+TEST(TableEdit, ScaledSpeedsAreNeverFasterAndNearlyThose) {
+  EXPECT_TRUE(rc::check("by any factor, in the old unit or another", [] {
+    const TableContent content = random_case(1000).content;
+    const double factor = std::pow(10.0, random_in(-400, 400) / 100.0);
+    const auto scaled = scale_speed(content, factor);
+    if (!scaled) return;
+    RC_ASSERT(!check(*scaled));
+    for (std::size_t i = 0; i < content.accel.size(); ++i) {
+      const double wanted = content.accel[i] * (content.time_unit_ns / factor);
+      const double is = 1.0 * scaled->accel[i] * scaled->time_unit_ns;
+      RC_ASSERT(is >= wanted * (1 - 1e-12));
+      RC_ASSERT(is < wanted + scaled->time_unit_ns);
+    }
+  }));
 }
 
 TEST(TableEdit, AnotherUnitKeepsTheDelaysOrMakesThemLonger) {
@@ -192,11 +246,14 @@ TEST(TableEdit, SpeedsAreNotFasterThanAskedByTheLeastShare) {
 }
 
 TEST(TableEdit, DelaysShorterThanAUnitAreRefused) {
-  EXPECT_THAT(scale_speed(kMirrored, 1e9).error().text(), HasSubstr("a delay becomes 9e-07"));
-  EXPECT_THAT(scale_speed(kMirrored, 501).error().text(), HasSubstr("Use a shorter time unit"));
+  EXPECT_THAT(scale_speed(kMirrored, 1e9).error().text(),
+              HasSubstr("a delay becomes 0.0009 time units; allowed: 1 or more, as nothing shorter "
+                        "can be said. No time unit is shorter than 1 ns"));
+  EXPECT_THAT(scale_speed(kMirrored, 501)->accel, ElementsAre(1797, 1398, 999));
+  EXPECT_THAT(scale_speed(kMirrored, 1e-9).error().text(),
+              HasSubstr("the slowest delay becomes 900000 s; allowed: up to 65535 s"));
   EXPECT_THAT(resample_unit(kMirrored, 1'000'000'000).error().text(),
               HasSubstr("allowed: 1 or more"));
-  EXPECT_THAT(scale_speed(kMirrored, 500)->accel, ElementsAre(2, 2, 1));
 }
 
 TEST(TableEdit, ResampledSidesHaveTheNumberOfCodesAskedFor) {

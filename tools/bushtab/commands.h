@@ -19,10 +19,22 @@ namespace bushtab {
 inline constexpr int kDone = 0;
 inline constexpr int kRefused = 1;
 
+// What the motor moves, if it is told apart from the inertia of the rotor.
+struct LoadOptions {
+  std::optional<double> mass_kg;
+  std::optional<double> lead_mm;  // one of these two with a mass
+  std::optional<double> belt_mm;
+  std::optional<double> inertia_kgm2;
+  std::optional<double> gear;
+};
+// Refused: a mass without its way, a way or a gear without a load.
+bushd::Result<bushd::tables::profiles::Load> load_of(const LoadOptions& options);
+
 // What is known of the motor, for profiles and checks that ask for it.
 struct MotorOptions {
-  std::string torque_file;  // empty: nothing is known
-  bushd::tables::profiles::Motor motor;
+  std::string torque_file;               // empty: nothing is known
+  bushd::tables::profiles::Motor motor;  // inertia: without that of `load`
+  LoadOptions load;
 };
 bushd::Result<std::optional<bushd::tables::profiles::Motor>> load_motor(
     const MotorOptions& options);

@@ -35,8 +35,7 @@ struct Codes {
   SideKey side() const { return decel ? SideKey::kDecel : SideKey::kAccel; }
 };
 
-// A minus would be taken for a huge number.
-const CLI::Range kNotNegative(0U, std::numeric_limits<std::uint32_t>::max());
+constexpr std::int64_t kMaxIndex = tables::kMaxCodes - 1;
 
 std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
   const auto options = std::make_shared<Codes>();
@@ -45,16 +44,16 @@ std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
       ->add_option("INDEX", options->index,
                    "Index of the first code, from 0 in the order of the file")
       ->required()
-      ->check(refuse_fraction)
-      ->check(kNotNegative);
+      ->check(whole_number(0, kMaxIndex));
   if (takes_codes) {
     command->add_option("CODE", options->codes, "Delays in time units")
         ->required()
-        ->check(refuse_fraction);
+        ->check(whole_number(1, 65535,
+                             "a code has 16 bits. For longer delays take a longer time unit first: "
+                             "bushtab resample TABLE --time-unit T"));
   } else {
     command->add_option("COUNT", options->count, "Number of codes (default 1)")
-        ->check(refuse_fraction)
-        ->check(kNotNegative);
+        ->check(whole_number(1, bushd::tables::kMaxCodes));
   }
   command->add_flag("--decel", options->decel, "Change the decelerating side");
   return options;
@@ -90,16 +89,29 @@ void add_code_commands(CLI::App& app, const Places& places, const Run& run) {
   });
 }
 
-// A change of all codes, which says how much slower than asked rounding up has made it.
+// A change of all codes, which says what has become of the time unit, and how much slower than
+// asked rounding up has made it.
 int change_speeds(const Places& places, const std::string& table, bool json,
                   const std::string& note, double factor, const Change& change_content) {
   constexpr double kToldFrom = 0.001;
   double shortfall = 0;
+  std::uint32_t old_unit_ns = 0;
+  std::uint32_t new_unit_ns = 0;
   const int done = change(places, table, json, note, [&](const TableContent& before) {
     auto after = change_content(before);
-    if (after) shortfall = tables::greatest_shortfall(before, *after, factor);
+    if (after) {
+      shortfall = tables::greatest_shortfall(before, *after, factor);
+      old_unit_ns = before.time_unit_ns;
+      new_unit_ns = after->time_unit_ns;
+    }
     return after;
   });
+  if (done == kDone && factor != 1 && new_unit_ns != old_unit_ns) {
+    fmt::print(stderr,
+               "the time unit is {} ns now, as whole numbers of {} ns do not tell these delays "
+               "well; all codes are in the new unit\n",
+               new_unit_ns, old_unit_ns);
+  }
   if (done == kDone && shortfall >= kToldFrom) {
     fmt::print(stderr,
                "delays are rounded up to whole time units: speeds are up to {:.3g} % lower than "
@@ -122,7 +134,9 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
   CLI::App* scale = app.add_subcommand("scale", "Multiply speeds or accelerations");
   add_changed(scale, options->table, options->json);
   auto* what = scale->add_option_group("what", "One of")->require_option(1);
-  what->add_option("--speed", options->speed, "Multiply all speeds by FACTOR")
+  what->add_option("--speed", options->speed,
+                   "Multiply all speeds by FACTOR; takes another time unit if codes of 1..65535 "
+                   "in the old one do not tell the delays to 1 %")
       ->check(refuse_not_positive)
       ->type_name("FACTOR");
   what->add_option("--acceleration", options->acceleration,
@@ -158,7 +172,7 @@ void add_whole_commands(CLI::App& app, const Places& places, const Run& run) {
       },
       "Keep the delays, rounded up to this unit");
   how->add_option("--codes", options->codes, "Keep the speeds, over this number of codes a side")
-      ->check(refuse_fraction)
+      ->check(whole_number(1, tables::kMaxCodes))
       ->type_name("N");
   run(resample, [&places, options] {
     if (options->time_unit_ns > 0) {
@@ -193,8 +207,7 @@ void add_tui(CLI::App& app, const Places& places, const Run& run) {
   options->steps = {100, 1000, 10000};
   tui->add_option("--steps", options->steps,
                   "Lengths of the moves whose times are shown (default 100 1000 10000)")
-      ->check(refuse_fraction)
-      ->check(CLI::Range(0U, 2147483647U))
+      ->check(whole_number(0, 2147483647))
       ->type_name("N");
   add_limit_options(tui, options->limits);
   tui->footer("? lists the keys. Each save is a new revision.");
@@ -246,7 +259,7 @@ void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
   to->add_option("--steps", out->steps,
                  "Number of steps of the program, 0..65535 (BUSHD-1: 1..126)")
       ->required()
-      ->check(refuse_fraction);
+      ->check(whole_number(0, std::numeric_limits<std::uint32_t>::max()));
   to->add_option("--positions", out->positions, "The position area, 32 hexadecimal digits");
   to->add_flag("--resample", out->resample,
                "Round up to codes of 8 bits, cut the top speed at 238 codes, and print the error");
@@ -256,7 +269,7 @@ void add_bushd_commands(CLI::App& app, const Places& places, const Run& run) {
   to->add_option("--reactor-delay", out->reactor_delay,
                  "BUSHD-1: code of the delay from reactor start")
       ->needs(bushd1)
-      ->check(refuse_fraction);
+      ->check(whole_number(0, 65535));
   run(to, [&places, out] { return export_bushd(places, *out); });
 
   const auto in = std::make_shared<BushdImport>();

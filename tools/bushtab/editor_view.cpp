@@ -17,7 +17,7 @@ using bushd::tables::profiles::Severity;
 
 constexpr int kRoomyRows = 12;  // from here on messages have a line of their own
 constexpr int kTallRows = 20;   // from here on there is room for several diagnostics
-constexpr int kMaxDiagnostics = 4;
+constexpr int kMaxDiagnosticLines = 5;
 constexpr int kMaxMessageLines = 4;
 constexpr int kMinCurveRows = 5;
 constexpr int kCodeLabelColumns = 13;  // "accel[65534] "
@@ -68,7 +68,7 @@ Layout lay_out(int rows, int message_lines, int diagnostic_lines, int code_rows)
   layout.diagnostics = take(1);
   layout.times = take(1);
   if (rows >= kTallRows)
-    layout.diagnostics += take(std::min(diagnostic_lines, kMaxDiagnostics) - 1);
+    layout.diagnostics += take(std::min(diagnostic_lines, kMaxDiagnosticLines) - 1);
   const int codes_too = std::min(left / 3, code_rows - layout.codes);
   if (left - codes_too >= kMinCurveRows) layout.curve = take(left - codes_too);
   layout.codes += take(left);
@@ -106,6 +106,10 @@ std::string said(const TableEditor& editor) {
       return editor.prompt_text() + "_";
     case TableEditor::Mode::kAskQuit:
       return kQuestion;
+    case TableEditor::Mode::kAskSave:
+      return fmt::format(
+          "The check finds {} in this table (above). y: save nevertheless, any other key: go on",
+          editor.errors() == 1 ? "an error" : fmt::format("{} errors", editor.errors()));
     default:
       return editor.message();
   }
@@ -138,19 +142,38 @@ CodeRows code_rows_of(const TableEditor& editor, int columns) {
   return all;
 }
 
+// What the check found, as wide as the window.
+struct DiagnosticLine {
+  std::string text;
+  Style style = Style::kWarning;
+  std::size_t of = 0;  // index of its diagnostic
+};
+
+std::vector<DiagnosticLine> diagnostic_lines(const TableEditor& editor, int columns) {
+  std::vector<DiagnosticLine> all;
+  const auto& found = editor.diagnostics();
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Style style = found[i].severity == Severity::kError ? Style::kError : Style::kWarning;
+    for (std::string& line : wrapped(text_of(found[i]), columns)) {
+      all.push_back({std::move(line), style, i});
+    }
+  }
+  return all;
+}
+
 class View {
  public:
   View(const TableEditor& editor, const Window& window)
       : editor_(editor),
         grid_(window.rows, window.columns, window.unicode),
-        code_rows_(code_rows_of(editor, window.columns)) {}
+        code_rows_(code_rows_of(editor, window.columns)),
+        diagnostics_(diagnostic_lines(editor, window.columns)) {}
 
   CellGrid draw() {
     const auto lines = wrapped(said(editor_), grid_.columns());
-    const Layout layout =
-        lay_out(grid_.rows(), static_cast<int>(lines.size()),
-                static_cast<int>(std::max<std::size_t>(editor_.diagnostics().size(), 1)),
-                static_cast<int>(code_rows_.rows.size()));
+    const Layout layout = lay_out(grid_.rows(), static_cast<int>(lines.size()),
+                                  static_cast<int>(std::max<std::size_t>(diagnostics_.size(), 1)),
+                                  static_cast<int>(code_rows_.rows.size()));
     int row = 0;
     if (layout.title > 0) draw_title(row);
     row += layout.title;
@@ -241,15 +264,24 @@ class View {
   }
 
   void draw_diagnostics(int row, int rows) {
-    const auto& diagnostics = editor_.diagnostics();
-    if (rows > 0 && diagnostics.empty())
+    if (rows > 0 && diagnostics_.empty()) {
       grid_.put_text(row, 0, "check: nothing found", Style::kFaint);
-    for (std::size_t i = 0; i < diagnostics.size() && rows-- > 0; ++i) {
-      const bool more = rows == 0 && i + 1 < diagnostics.size();
-      grid_.put_text(row++, 0,
-                     (more ? fmt::format("({} more) ", diagnostics.size() - i - 1) : "") +
-                         text_of(diagnostics[i]),
-                     diagnostics[i].severity == Severity::kError ? Style::kError : Style::kWarning);
+      return;
+    }
+    const auto shown =
+        std::min<std::size_t>(static_cast<std::size_t>(std::max(rows, 0)), diagnostics_.size());
+    for (std::size_t i = 0; i < shown; ++i) {
+      const DiagnosticLine& line = diagnostics_[i];
+      const bool last = i + 1 == shown;
+      const std::size_t more = last ? diagnostics_.size() - shown : 0;
+      const std::size_t hidden = last ? editor_.diagnostics().size() - line.of - 1 : 0;
+      std::string text = line.text;
+      if (hidden > 0) {
+        text = fmt::format("({} more) {}", hidden, text);
+      } else if (more > 0) {
+        text = "(goes on) " + text;
+      }
+      grid_.put_text(row++, 0, text, line.style);
     }
   }
 
@@ -258,6 +290,7 @@ class View {
   const TableEditor& editor_;
   CellGrid grid_;
   CodeRows code_rows_;
+  std::vector<DiagnosticLine> diagnostics_;
 };
 
 void View::draw_codes(int row, int rows) {

@@ -41,12 +41,60 @@ Reached reach(const tables::Table& table, double speed_hz) {
   return reached;
 }
 
+// What a reader wants to know first: how much differs, and where the ends are.
+ordered_json summary_of(const tables::Table& before, const tables::Table& after,
+                        std::size_t differing) {
+  const auto of = [](const tables::Table& table) -> ordered_json {
+    const bushd_table& view = table.view();
+    const auto ramp_ms = [&](const bushd_ramp& side) {
+      double units = 0;
+      for (std::uint32_t i = 0; i < side.count; ++i) units += side.code[i];
+      return units * view.time_unit_ns * 1e-6;
+    };
+    return {{"start_steps_per_s", hz(table, view.accel.code[0])},
+            {"max_steps_per_s", hz(table, bushd_table_fastest(&view))},
+            {"accel_codes", view.accel.count},
+            {"accel_ms", ramp_ms(view.accel)},
+            {"decel_codes", view.decel.count},
+            {"decel_ms", ramp_ms(view.decel)},
+            {"time_unit_ns", view.time_unit_ns}};
+  };
+  return {{"delays_that_differ", differing}, {"before", of(before)}, {"after", of(after)}};
+}
+
+void print_summary(const ordered_json& summary) {
+  const auto line = [&](const char* what, const char* key, const char* unit) {
+    const double before = summary["before"][key].get<double>();
+    const double after = summary["after"][key].get<double>();
+    if (before == after) {
+      fmt::print("  {:<14} {:>10.6g} {} in both\n", what, before, unit);
+    } else {
+      fmt::print("  {:<14} {:>10.6g} to {:.6g} {} ({:+.1f} %)\n", what, before, after, unit,
+                 100 * (after / before - 1));
+    }
+  };
+  const auto differing = summary["delays_that_differ"].get<std::size_t>();
+  fmt::print("{} delay{} differ{}\n", differing, differing == 1 ? "" : "s",
+             differing == 1 ? "s" : "");
+  line("start speed", "start_steps_per_s", "steps/s");
+  line("top speed", "max_steps_per_s", "steps/s");
+  line("acceleration", "accel_ms", "ms");
+  line("", "accel_codes", "codes");
+  line("deceleration", "decel_ms", "ms");
+  line("", "decel_codes", "codes");
+  line("time unit", "time_unit_ns", "ns");
+}
+
 }  // namespace
 
 int list(const Places& places, bool json) {
   ordered_json all = ordered_json::array();
   std::set<std::string> seen;
   int result = kDone;
+  if (!json) {
+    fmt::print("{:<24} {:>3}  {:<8}  {:>7}..{:<7} {:<7}  {}\n", "TABLE", "REV", "HASH", "START",
+               "MAX", "STEPS/S", "DESCRIPTION");
+  }
   for (const auto& directory : directories(places)) {
     std::vector<std::filesystem::path> files;
     std::error_code error;
@@ -146,14 +194,19 @@ int diff(const Places& places, const std::string& before_name, const std::string
     by_speed.push_back(
         {{"steps_per_s", speed_hz}, {"before", entry(**before)}, {"after", entry(**after)}});
   }
+  const ordered_json summary = summary_of(**before, **after, by_step.size());
   if (json) {
-    print_json({{"same_content", same}, {"by_step", by_step}, {"by_speed", by_speed}});
+    print_json({{"same_content", same},
+                {"summary", summary},
+                {"by_step", by_step},
+                {"by_speed", by_speed}});
     return kDone;
   }
   if (same) {
     fmt::print("the same content, {}\n", (*before)->short_hash());
     return kDone;
   }
+  print_summary(summary);
   fmt::print("delays that differ (side, steps from rest, us before, us after):\n");
   for (const auto& line : by_step) {
     fmt::print("  {} {:>6} {:>14.3f} {:>14.3f}\n", line["side"].get<std::string>(),

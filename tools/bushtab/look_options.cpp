@@ -59,8 +59,7 @@ void add_time(CLI::App& app, const Places& places, const Run& run) {
   time->add_option("TABLE", options->table, kTable)->required();
   time->add_option("--steps", options->steps, "Lengths of the moves, in steps")
       ->required()
-      ->check(refuse_fraction)
-      ->check(CLI::Range(0U, 2147483647U))
+      ->check(whole_number(0, 2147483647))
       ->type_name("N");
   time->add_flag("--json", options->json, "Print JSON");
   run(time, [&places, options] {
@@ -93,7 +92,8 @@ void add_diff(CLI::App& app, const Places& places, const Run& run) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* diff = app.add_subcommand("diff", "Compare two tables by step and by speed");
+  CLI::App* diff =
+      app.add_subcommand("diff", "Compare two tables: a summary, then by step and by speed");
   diff->add_option("BEFORE", options->before, kTable)->required();
   diff->add_option("AFTER", options->after, kTable)->required();
   diff->add_flag("--json", options->json, "Print JSON");
@@ -119,12 +119,10 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
   expand->add_option("--table", expansion.table, kTable)->required()->type_name("TABLE");
   expand->add_option("--steps", expansion.steps, "Length and direction of the move")
       ->required()
-      ->check(refuse_fraction)
-      ->check(CLI::Range(-kMaxSteps, kMaxSteps));
+      ->check(whole_number(-kMaxSteps, kMaxSteps));
   expand->add_option("--tick-us", expansion.tick_us, "Length of a tick in us")
       ->required()
-      ->check(refuse_fraction)
-      ->check(CLI::Range(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
+      ->check(whole_number(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
   expand->add_option("--format", options->format, "coarse (a byte) or fine (steps x 256)")
       ->required()
       ->check(CLI::IsMember({"coarse", "fine"}));
@@ -139,11 +137,24 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
 
 }  // namespace
 
-std::string refuse_fraction(const std::string& value) {
-  const std::size_t first_digit = value.starts_with('-') || value.starts_with('+') ? 1 : 0;
-  const bool whole = value.size() > first_digit &&
-                     value.find_first_not_of("0123456789", first_digit) == std::string::npos;
-  return whole ? std::string() : value + " is not a whole number";
+std::function<std::string(const std::string&)> whole_number(std::int64_t least,
+                                                            std::int64_t greatest,
+                                                            const std::string& remedy) {
+  return [=](const std::string& value) -> std::string {
+    const bool plus = value.starts_with('+');
+    const std::string_view digits = std::string_view(value).substr(plus ? 1 : 0);
+    const std::string allowed =
+        " to " + std::to_string(greatest) + (remedy.empty() ? std::string() : ", as " + remedy);
+    std::int64_t number = 0;
+    const auto parsed = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    const bool whole =
+        parsed.ptr == digits.data() + digits.size() && parsed.ec != std::errc::invalid_argument;
+    if (!whole) {
+      return value + " is not a whole number; allowed: " + std::to_string(least) + allowed;
+    }
+    if (parsed.ec == std::errc{} && number >= least && number <= greatest) return {};
+    return value + " is out of range; allowed: " + std::to_string(least) + allowed;
+  };
 }
 
 std::string refuse_not_positive(const std::string& value) {
@@ -175,17 +186,15 @@ void add_limit_options(CLI::App* command, LimitOptions& options) {
       ->check(CLI::IsMember({8, 16}))
       ->type_name("8|16");
   command->add_option("--mcu-codes", limits.mcu_codes, "Table memory of the MCU, in codes")
-      ->check(refuse_fraction)
+      ->check(whole_number(1, std::numeric_limits<std::uint32_t>::max()))
       ->type_name("N");
   command
       ->add_option_function<std::uint32_t>(
           "--tick-us", [&](const std::uint32_t& us) { limits.tick_ns = us * 1000; },
           "Tick of the bus")
-      ->check(refuse_fraction)
-      ->check(CLI::Range(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
+      ->check(whole_number(BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000));
   command->add_option("--slots", limits.slots, "Slots of a tick, 128..256 (with --tick-us)")
-      ->check(refuse_fraction)
-      ->check(CLI::Range(128U, 256U));
+      ->check(whole_number(128, 256));
   add_motor_options(command, options.motor);
 }
 

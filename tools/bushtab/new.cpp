@@ -11,9 +11,50 @@ namespace bushtab {
 
 namespace tables = bushd::tables;
 
+bushd::Result<tables::profiles::Load> load_of(const LoadOptions& options) {
+  constexpr double kMetresPerMillimetre = 1e-3;
+  if (options.lead_mm && options.belt_mm) {
+    return bushd::fail("--lead-mm is of a screw, --belt-mm of a belt; allowed: one of them");
+  }
+  const auto travel_mm = options.lead_mm ? options.lead_mm : options.belt_mm;
+  if (options.mass_kg && !travel_mm) {
+    return bushd::fail("--mass-kg needs how far a turn moves the mass: --lead-mm or --belt-mm");
+  }
+  if (travel_mm && !options.mass_kg) {
+    return bushd::fail(fmt::format("{} needs the mass that is moved: --mass-kg",
+                                   options.lead_mm ? "--lead-mm" : "--belt-mm"));
+  }
+  if (options.gear && !options.mass_kg && !options.inertia_kgm2) {
+    return bushd::fail("--gear needs the load behind it: --mass-kg or --load-inertia");
+  }
+  if (options.inertia_kgm2 && !(*options.inertia_kgm2 > 0)) {
+    return bushd::fail("--load-inertia of 0 or less; allowed: above 0");
+  }
+  return tables::profiles::Load{
+      .mass_kg = options.mass_kg.value_or(0),
+      .travel_per_turn_m = travel_mm.value_or(0) * kMetresPerMillimetre,
+      .inertia_kgm2 = options.inertia_kgm2.value_or(0),
+      .gear = options.gear.value_or(1),
+  };
+}
+
 bushd::Result<std::optional<tables::profiles::Motor>> load_motor(const MotorOptions& options) {
-  if (options.torque_file.empty()) return std::nullopt;
+  const auto load = load_of(options.load);
+  if (!load) return bushd::fail(load.error());
+  const double load_kgm2 = tables::profiles::inertia_at_motor_kgm2(*load);
+  if (options.torque_file.empty()) {
+    if (load_kgm2 == 0) return std::nullopt;
+    return bushd::fail("a load counts with the motor's torque only: --torque FILE");
+  }
   tables::profiles::Motor motor = options.motor;
+  // Often the rotor is the greater part: without it the table would be too fast.
+  if (load_kgm2 > 0 && !(motor.inertia_kgm2 > 0)) {
+    return bushd::fail(
+        fmt::format("the load is {:.3g} kg m2 at the motor, and the rotor adds to that: --inertia, "
+                    "with screw, pulley and coupling",
+                    load_kgm2));
+  }
+  motor.inertia_kgm2 += load_kgm2;
   auto curve = tables::profiles::load_torque_csv(options.torque_file, motor.steps_per_turn);
   if (!curve) return bushd::fail(curve.error());
   motor.torque = std::move(*curve);
@@ -37,6 +78,11 @@ int make_new(const Places& places, const New& wanted) {
   auto motor = load_motor(wanted.motor);
   if (!motor) return refuse(motor.error());
   spec.motor = std::move(*motor);
+  if (spec.motor && spec.motor->inertia_kgm2 > wanted.motor.motor.inertia_kgm2) {
+    fmt::print(stderr, "inertia at the motor: {:.3g} kg m2, {:.3g} of it by the load\n",
+               spec.motor->inertia_kgm2,
+               spec.motor->inertia_kgm2 - wanted.motor.motor.inertia_kgm2);
+  }
   auto content = tables::profiles::make_content(spec);
   if (!content) return refuse(content.error());
   content->revision = 1;

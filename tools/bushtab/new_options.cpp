@@ -53,6 +53,7 @@ void add_side_options(CLI::App* command, const std::string& prefix,
       ->add_option_function<std::uint32_t>(
           dashes + "codes", [side](const std::uint32_t& value) { side().codes = value; },
           "Number of codes" + of)
+      ->check(whole_number(3, bushd::tables::kMaxCodes))
       ->type_name("N");
   add_quantity(
       command, dashes + "jerk", Quantity::kJerk, [side](double value) { side().jerk = value; },
@@ -158,16 +159,40 @@ CLI::Option* add_quantity(CLI::App* command, const std::string& name, Quantity q
       ->type_name(kTypes.at(static_cast<std::size_t>(quantity)));
 }
 
+namespace {
+
+void add_load_options(CLI::App* command, LoadOptions& load) {
+  const auto add = [command](const char* name, std::optional<double>& value, const char* type,
+                             const char* help) {
+    command->add_option(name, value, help)->check(refuse_not_positive)->type_name(type);
+  };
+  add("--mass-kg", load.mass_kg, "KG",
+      "Mass that a screw or a belt moves; with --lead-mm or --belt-mm");
+  add("--lead-mm", load.lead_mm, "MM", "Lead of the screw: travel of the mass in one turn of it");
+  add("--belt-mm", load.belt_mm, "MM",
+      "Travel of the belt in one turn of its pulley: teeth times their pitch");
+  add_quantity(
+      command, "--load-inertia", Quantity::kInertia,
+      [&load](double value) { load.inertia_kgm2 = value; },
+      "Inertia of a load that turns, such as a rotary table, at its own axis");
+  add("--gear", load.gear, "RATIO",
+      "Turns of the motor for one turn of screw, pulley or turning load (default 1)");
+}
+
+}  // namespace
+
 void add_motor_options(CLI::App* command, MotorOptions& options) {
   command
-      ->add_option("--torque", options.torque_file,
-                   "CSV of pull-out torque against speed: header speed_hz|speed_rpm,"
-                   "torque_nm|torque_ncm|torque_mnm")
+      ->add_option(
+          "--torque", options.torque_file,
+          "CSV of pull-out torque against speed: header speed_hz|speed_rpm,"
+          "torque_nm|torque_ncm|torque_mnm; speed_hz counts microsteps, as all speeds here")
       ->type_name("FILE");
   profiles::Motor& motor = options.motor;
   add_quantity(
       command, "--inertia", Quantity::kInertia, [&](double value) { motor.inertia_kgm2 = value; },
-      "Inertia of rotor and load together");
+      "Inertia of the rotor, and of the load as far as no other option states it");
+  add_load_options(command, options.load);
   add_quantity(
       command, "--friction", Quantity::kTorque, [&](double value) { motor.friction_nm = value; },
       "Torque of friction and load against the motion (default 0)");

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -31,8 +32,11 @@ CLI::Option* add_quantity(CLI::App* command, const std::string& name,
                           bushd::tables::profiles::Quantity quantity,
                           std::function<void(double)> set, const std::string& help);
 
-// "5.5" would otherwise be called out of range.
-std::string refuse_fraction(const std::string& value);
+// A check that tells the range, which CLI11's own does not if the type of the number ends before
+// ("Could not convert"), and calls "5.5" no whole number. `remedy` follows the range after "as".
+std::function<std::string(const std::string&)> whole_number(std::int64_t least,
+                                                            std::int64_t greatest,
+                                                            const std::string& remedy = {});
 
 // CLI11's own check tells the range of a double in 300 digits.
 std::string refuse_not_positive(const std::string& value);

@@ -72,6 +72,8 @@ TableEditor::Wish TableEditor::press(Key key) {
       return press_in_prompt(key);
     case Mode::kAskQuit:
       return press_in_question(key);
+    case Mode::kAskSave:
+      return press_in_save_question(key);
     case Mode::kHelp:
       mode_ = Mode::kCodes;
       return Wish::kNone;
@@ -225,7 +227,7 @@ TableEditor::Wish TableEditor::press_command(Key key) {
       break;
     case U's':
     case key::kCtrlS:
-      if (changed()) return Wish::kSave;
+      if (changed()) return wish_to_save(Wish::kSave);
       message_ = "nothing to save";
       break;
     case U'q':
@@ -240,8 +242,27 @@ TableEditor::Wish TableEditor::press_command(Key key) {
 
 TableEditor::Wish TableEditor::press_in_question(Key key) {
   mode_ = Mode::kCodes;
-  if (key == U's') return Wish::kSaveAndQuit;
+  if (key == U's') return wish_to_save(Wish::kSaveAndQuit);
   return key == U'd' ? Wish::kQuit : Wish::kNone;
+}
+
+TableEditor::Wish TableEditor::press_in_save_question(Key key) {
+  mode_ = Mode::kCodes;
+  return key == U'y' ? asked_save_ : Wish::kNone;
+}
+
+TableEditor::Wish TableEditor::wish_to_save(Wish wish) {
+  if (errors() == 0) return wish;
+  asked_save_ = wish;
+  mode_ = Mode::kAskSave;
+  return Wish::kNone;
+}
+
+std::size_t TableEditor::errors() const {
+  return static_cast<std::size_t>(
+      std::count_if(diagnostics_.begin(), diagnostics_.end(), [](const auto& diagnostic) {
+        return diagnostic.severity == tables::profiles::Severity::kError;
+      }));
 }
 
 void TableEditor::ask(Prompt prompt, std::string text) {
@@ -288,7 +309,7 @@ TableEditor::Wish TableEditor::answer() {
     case Prompt::kName:
       if (typed_.empty()) break;
       wished_name_ = typed_;
-      return Wish::kSaveAs;
+      return wish_to_save(Wish::kSaveAs);
   }
   return Wish::kNone;
 }

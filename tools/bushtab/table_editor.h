@@ -30,6 +30,7 @@ class TableEditor {
   TableEditor(bushd::tables::TableContent content, std::uint32_t revision, Watched watched);
 
   // What the owner of the file shall do now; it answers a wish to save with saved() or refused().
+  // A table in which the check finds errors is saved when that was said twice (kAskSave).
   enum class Wish { kNone, kSave, kSaveAndQuit, kSaveAs, kQuit };
   Wish press(Key key);
   // Ctrl-C: leaves what is being typed, else wants to quit.
@@ -39,7 +40,7 @@ class TableEditor {
   void saved(std::uint32_t revision);
   void refused(std::string why);
 
-  enum class Mode { kCodes, kPrompt, kAskQuit, kHelp };
+  enum class Mode { kCodes, kPrompt, kAskQuit, kAskSave, kHelp };
   Mode mode() const { return mode_; }
   // In mode kPrompt: the question and what was typed so far.
   std::string prompt_text() const;
@@ -49,6 +50,8 @@ class TableEditor {
   const bushd::tables::Table& table() const { return *table_; }
   std::uint32_t revision() const { return revision_; }
   bool changed() const { return now_.content != saved_; }
+  // Of the check, those that are errors.
+  std::size_t errors() const;
   // What was changed since the last save; a note for the log.
   std::string note() const { return difference_text(saved_, now_.content); }
 
@@ -85,6 +88,9 @@ class TableEditor {
   Wish press_command(Key key);
   Wish press_in_prompt(Key key);
   Wish press_in_question(Key key);
+  Wish press_in_save_question(Key key);
+  // `wish`, at once or when the question was answered.
+  Wish wish_to_save(Wish wish);
   bool move(Key key);
   bool drag_by(Key key);
   void drag(int percent, int codes);
@@ -119,6 +125,7 @@ class TableEditor {
   Prompt prompt_ = Prompt::kCode;
   std::string typed_;
   std::string wished_name_;
+  Wish asked_save_ = Wish::kNone;  // in mode kAskSave: what waits for the answer
   std::string message_;
   bool zoomed_ = false;
 

@@ -58,7 +58,8 @@ Page write_page(const Program& program) {
 
 Result<double> start_hz_of(const TableContent& content) {
   const double hz = 1e9 / (static_cast<double>(kSlowest) * content.time_unit_ns);
-  if (hz >= kMinStartHz * (1 - kNoise) && hz <= kMaxStartHz * (1 + kNoise)) return hz;
+  // Both ends are whole numbers of ns, so nothing is rounded there.
+  if (hz >= kMinStartHz && hz <= kMaxStartHz) return hz;
   return fail(
       fmt::format("code 250 of {} ns is F_start = {:.6g} Hz; BUSHD-2 has 1..100 Hz, a "
                   "time_unit_ns of 40000..4000000",

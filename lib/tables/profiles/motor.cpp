@@ -79,7 +79,9 @@ Result<TorqueCurve> parse_torque_csv(std::string_view text, double steps_per_tur
       if (columns) continue;
       return refuse(
           "is no header; allowed: SPEED,TORQUE with SPEED one of speed_hz, speed_steps_per_s, "
-          "speed_rpm and TORQUE one of torque_nm, torque_ncm, torque_mnm");
+          "speed_rpm and TORQUE one of torque_nm, torque_ncm, torque_mnm. speed_hz and "
+          "speed_steps_per_s count microsteps: full steps a second of a data sheet times the "
+          "microsteps of a full step");
     }
     const auto speed = number(first);
     const auto torque = number(second);
@@ -104,6 +106,11 @@ Result<TorqueCurve> load_torque_csv(const std::string& path, double steps_per_tu
       read_text(path, "a motor's data need a hundredth of that: is it the right file?");
   if (!text) return fail(text.error());
   return parse_torque_csv(*text, steps_per_turn, path);
+}
+
+double inertia_at_motor_kgm2(const Load& load) {
+  const double arm_m = load.travel_per_turn_m / (2.0 * std::numbers::pi);
+  return (load.mass_kg * arm_m * arm_m + load.inertia_kgm2) / (load.gear * load.gear);
 }
 
 Result<void> check(const Motor& motor) {
@@ -173,8 +180,9 @@ Result<Motion> fastest(const Motor& motor, Side side, double from_hz, double to_
     if (from <= 0 || to <= 0 || high < corners[i + 1]) {
       if (from > 0 && to > 0) {
         return fail(
-            fmt::format("the torque curve ends at {:.6g} steps/s; allowed: a maximum speed "
-                        "up to that",
+            fmt::format("the torque curve ends at {:.6g} steps/s, microsteps included; allowed: a "
+                        "maximum speed up to that. If the curve's speeds are full steps, multiply "
+                        "them by the microsteps of one",
                         high));
       }
       const double limit = from <= 0 ? low : low + (high - low) * from / (from - to);

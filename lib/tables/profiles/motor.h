@@ -40,10 +40,24 @@ using TorqueCurve = std::vector<TorquePoint>;
 
 // CSV: a header `SPEED,TORQUE` with units (speed_hz, speed_steps_per_s or speed_rpm; torque_nm,
 // torque_ncm or torque_mnm), then a line a point, speeds rising. Lines may be empty or comments
-// (#). `path` is only what errors say.
+// (#). speed_hz and speed_steps_per_s are the same: steps of the table, so microsteps where the
+// driver makes some. `steps_per_turn`, microsteps included, counts for speed_rpm alone. `path` is
+// only what errors say.
 Result<TorqueCurve> parse_torque_csv(std::string_view text, double steps_per_turn,
                                      const std::string& path);
 Result<TorqueCurve> load_torque_csv(const std::string& path, double steps_per_turn);
+
+// What a motor moves besides its rotor. Seen from the motor, with n turns of it for one of what it
+// turns (screw, pulley or rotary load):
+//
+//   J = (m (d / 2 pi)^2 + J_load) / n^2      d: travel of the mass in a turn of screw or pulley
+struct Load {
+  double mass_kg = 0;
+  double travel_per_turn_m = 0;  // lead of a screw; belt: teeth of the pulley times their pitch
+  double inertia_kgm2 = 0;       // of what turns, at its own shaft
+  double gear = 1;               // n, above 0
+};
+double inertia_at_motor_kgm2(const Load& load);
 
 struct Motor {
   TorqueCurve torque{};

@@ -100,8 +100,16 @@ TEST(BushdImage, WhatDoesNotFitIsRefusedWithTheReason) {
   wrong.cruise = 12;
   EXPECT_THAT(refusal(wrong), HasSubstr("cruises at code 12 after 10"));
   wrong = content;
-  wrong.time_unit_ns = 39999;
-  EXPECT_THAT(refusal(wrong), HasSubstr("BUSHD-2 has 1..100 Hz"));
+  for (const std::uint32_t time_unit_ns : {39'999U, 4'000'001U, 4'000'004U}) {
+    wrong.time_unit_ns = time_unit_ns;
+    EXPECT_THAT(refusal(wrong),
+                HasSubstr("BUSHD-2 has 1..100 Hz, a time_unit_ns of 40000..4000000"));
+  }
+  for (const std::uint32_t time_unit_ns : {40'000U, 4'000'000U}) {
+    wrong = content;
+    wrong.time_unit_ns = time_unit_ns;
+    EXPECT_EQ(refusal(wrong), "taken");
+  }
 }
 
 TEST(BushdImage, ResampledTablesFitAndAreNeverFaster) {

@@ -288,5 +288,30 @@ TEST(TorqueCsv, EveryBadLineIsNamed) {
   EXPECT_THAT(message("speed_hz,torque_nm\n5,2\n5,1\n"), HasSubstr("m.csv:3: is not faster"));
 }
 
+// By hand: a screw of 5 mm lead has an arm of 5 mm / 2 pi = 0.795775 mm; 2 kg at it are
+// 2 x 6.33257e-7 kg m2. A pulley of 20 teeth of 2 mm has an arm of 6.36620 mm, which makes
+// 0.5 x 4.05285e-5, a ninth of it behind a gear of 3.
+TEST(Load, InertiaAtTheMotorIsThatOfItsMassAtItsArmOverTheGearSquared) {
+  using tables::profiles::inertia_at_motor_kgm2;
+  EXPECT_NEAR(inertia_at_motor_kgm2({.mass_kg = 2, .travel_per_turn_m = 0.005}), 1.266515e-6,
+              1e-12);
+  EXPECT_NEAR(inertia_at_motor_kgm2({.mass_kg = 0.5, .travel_per_turn_m = 0.04}), 2.026424e-5,
+              1e-11);
+  EXPECT_NEAR(inertia_at_motor_kgm2({.mass_kg = 0.5, .travel_per_turn_m = 0.04, .gear = 3}),
+              2.251582e-6, 1e-12);
+  EXPECT_NEAR(inertia_at_motor_kgm2({.inertia_kgm2 = 9e-4, .gear = 3}), 1e-4, 1e-15);
+  EXPECT_EQ(inertia_at_motor_kgm2({}), 0.0);
+}
+
+TEST(TorqueCsv, SpeedInHzIsOfTheTablesStepsWhateverTheMicrosteps) {
+  for (const double steps_per_turn : {200.0, 1600.0}) {
+    EXPECT_EQ(parse_torque_csv("speed_hz,torque_nm\n4000,1\n", steps_per_turn, "m")->at(0).speed_hz,
+              4000);
+  }
+  EXPECT_EQ(parse_torque_csv("speed_rpm,torque_nm\n60,1\n", 1600, "m")->at(0).speed_hz, 1600);
+  EXPECT_THAT(parse_torque_csv("speed,torque_nm\n1,1\n", 200, "m").error().text(),
+              HasSubstr("full steps a second of a data sheet times the microsteps of a full step"));
+}
+
 }  // namespace
 }  // namespace bushd::test

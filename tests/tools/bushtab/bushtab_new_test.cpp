@@ -77,5 +77,52 @@ TEST(BushtabNew, WhatCannotWorkIsRefused) {
   EXPECT_THAT(outcome.err, HasSubstr("allowed: up to the maximum, 100"));
 }
 
+class BushtabLoad : public testing::Test {
+ protected:
+  Outcome run(const std::string& name, const std::string& load) {
+    return bushtab("new " + name + " --law torque --start 200 --max 3kHz --torque " + curve_ +
+                   " --friction 2Ncm --dir " + directory_.path().string() + load);
+  }
+  std::string codes(const std::string& name) {
+    const std::string text = read_file(directory_.path() / (name + ".toml"));
+    return text.substr(text.find("time_unit_ns"));
+  }
+
+  TempDirectory directory_;
+  std::string curve_ = directory_.write("m.csv", "speed_rpm,torque_ncm\n0,40\n600,30\n1500,10\n");
+};
+
+// 2 kg on 5 mm are 12.66515 g cm2, by hand; of 0.5 kg on a belt of 40 mm 202.6424, behind a gear of
+// 3 22.51582; of 900 g cm2 behind a gear of 3 100.
+TEST_F(BushtabLoad, CountsAsSoMuchMoreInertia) {
+  const Outcome screw = run("screw", " --inertia 200gcm2 --mass-kg 2 --lead-mm 5");
+  EXPECT_EQ(screw.exit_code, 0) << screw.err;
+  EXPECT_THAT(screw.err,
+              HasSubstr("inertia at the motor: 2.13e-05 kg m2, 1.27e-06 of it by the load\n"));
+  ASSERT_EQ(run("a", " --inertia 212.66515gcm2").exit_code, 0);
+  EXPECT_EQ(codes("screw"), codes("a"));
+  ASSERT_EQ(run("belt", " --inertia 200gcm2 --mass-kg 0.5 --belt-mm 40 --gear 3").exit_code, 0);
+  ASSERT_EQ(run("b", " --inertia 222.51582gcm2").exit_code, 0);
+  EXPECT_EQ(codes("belt"), codes("b"));
+  ASSERT_EQ(run("turns", " --inertia 200gcm2 --load-inertia 900gcm2 --gear 3").exit_code, 0);
+  ASSERT_EQ(run("c", " --inertia 300gcm2").exit_code, 0);
+  EXPECT_EQ(codes("turns"), codes("c"));
+}
+
+TEST_F(BushtabLoad, HalfALoadIsRefusedWithWhatIsMissing) {
+  const std::string rotor = " --inertia 200gcm2";
+  EXPECT_THAT(run("t", rotor + " --mass-kg 2").err, HasSubstr("--lead-mm or --belt-mm"));
+  EXPECT_THAT(run("t", rotor + " --lead-mm 5").err,
+              HasSubstr("needs the mass that is moved: --mass-kg"));
+  EXPECT_THAT(run("t", rotor + " --mass-kg 2 --lead-mm 5 --belt-mm 5").err,
+              HasSubstr("one of them"));
+  EXPECT_THAT(run("t", rotor + " --gear 2").err, HasSubstr("--mass-kg or --load-inertia"));
+  EXPECT_THAT(
+      run("t", " --mass-kg 2 --lead-mm 5").err,
+      HasSubstr("the load is 1.27e-06 kg m2 at the motor, and the rotor adds to that: --inertia"));
+  EXPECT_THAT(bushtab("new t --print" + std::string(kProfile) + " --mass-kg 2 --lead-mm 5").err,
+              HasSubstr("--torque FILE"));
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -142,7 +142,8 @@ TEST(BushtabExpand, FractionsOfAStepAreToldApartFromTooManySteps) {
   EXPECT_EQ(fraction.exit_code, 2);
   EXPECT_THAT(fraction.err, HasSubstr("--steps: 5.5 is not a whole number"));
   const Outcome many = bushtab(expand_arguments("bushd2-constant", 2147483648, 2560, "fine"));
-  EXPECT_THAT(many.err, HasSubstr("2147483648 not in range"));
+  EXPECT_THAT(many.err,
+              HasSubstr("2147483648 is out of range; allowed: -2147483647 to 2147483647"));
 }
 
 TEST(BushtabExpand, FullDiskIsAnError) {
@@ -309,7 +310,9 @@ TEST_F(BushtabEdit, ScaleAndResampleSayWhatRoundingMadeOfIt) {
       coarse.err,
       "delays are rounded up to whole time units: speeds are up to 37.5 % lower than asked\n");
   EXPECT_THAT(text(), HasSubstr("accel = [3, 2, 2] # fast\n"));
-  EXPECT_THAT(run("scale t --speed 1.5").err, HasSubstr("33.3 % lower"));
+  EXPECT_THAT(run("scale t --speed 1.5").err,
+              HasSubstr("the time unit is 2 ns now, as whole numbers of 40000 ns do not tell "
+                        "these delays well"));
   const std::string before = text();
   for (const char* command : {"scale t --speed 1e9", "resample t --time-unit 1s"}) {
     const Outcome refused = run(command);
@@ -317,7 +320,46 @@ TEST_F(BushtabEdit, ScaleAndResampleSayWhatRoundingMadeOfIt) {
     EXPECT_THAT(refused.err, HasSubstr("time units; allowed: 1 or more"));
   }
   EXPECT_EQ(text(), before);
+  EXPECT_THAT(run("resample t --time-unit 1us").err, HasSubstr("lower than asked"));
   EXPECT_THAT(run("scale t --speed 0.5").err, IsEmpty());
+}
+
+// The finest unit, which "new" takes, has no room for a slower start.
+TEST_F(BushtabEdit, TableOfNewIsScaledDownAndUpAgain) {
+  ASSERT_EQ(
+      run("new stage --law constant --start 800Hz --max 16kHz --acceleration 150kHz/s").exit_code,
+      0);
+  const Outcome slower = run("scale stage --speed 0.8");
+  EXPECT_EQ(slower.exit_code, 0);
+  EXPECT_THAT(slower.out, HasSubstr("stage.toml: revision 2\n"));
+  EXPECT_THAT(slower.err, HasSubstr("the time unit is 25 ns now"));
+  EXPECT_THAT(run("show stage").out, HasSubstr(", 640..12800 steps/s"));
+  EXPECT_THAT(run("scale stage --speed 0.01").err, HasSubstr("the time unit is 2500 ns now"));
+  EXPECT_THAT(run("show stage").out, HasSubstr(", 6.4..128 steps/s"));
+  EXPECT_THAT(run("scale stage --speed 125").err, HasSubstr("the time unit is 20 ns now"));
+  EXPECT_THAT(run("diff stage@1 stage").out, StartsWith("the same content"));
+  EXPECT_THAT(run("log stage").out, HasSubstr("speeds times 0.8\n"));
+}
+
+TEST_F(BushtabEdit, ScaleThatFitsTheTimeUnitKeepsIt) {
+  EXPECT_THAT(run("scale t --speed 0.002").err, IsEmpty());
+  EXPECT_THAT(text(), HasSubstr("time_unit_ns = 1000\naccel = [45000, 35000, 25000] # fast\n"));
+}
+
+TEST_F(BushtabEdit, NumbersOutOfRangeAreAnsweredWithTheRange) {
+  const Outcome code = run("set t 0 99999");
+  EXPECT_EQ(code.exit_code, 2);
+  EXPECT_THAT(code.err,
+              StartsWith("CODE: 99999 is out of range; allowed: 1 to 65535, as a code has "
+                         "16 bits. For longer delays take a longer time unit first: "
+                         "bushtab resample TABLE --time-unit T\n"));
+  EXPECT_THAT(run("insert t 0 -1").err,
+              StartsWith("CODE: -1 is out of range; allowed: 1 to 65535"));
+  EXPECT_THAT(run("set t 0 5.5").err, StartsWith("CODE: 5.5 is not a whole number; allowed: 1 to"));
+  EXPECT_THAT(run("set t 99999999999999999999 5").err,
+              StartsWith("INDEX: 99999999999999999999 is out of range; allowed: 0 to 65534\n"));
+  EXPECT_THAT(run("resample t --codes 99999999999").err,
+              StartsWith("--codes: 99999999999 is out of range; allowed: 1 to 65535\n"));
 }
 
 TEST_F(BushtabEdit, TextThatWasKeptIsToldAndNotWrittenOver) {
@@ -349,6 +391,9 @@ TEST_F(BushtabEdit, CopyHasANameAndAHistoryOfItsOwn) {
               StartsWith("# mine\nname = \"other\"\nrevision = 1\n"));
   EXPECT_THAT(run("copy bushd2-constant t").err, HasSubstr("is there already"));
   EXPECT_THAT(run("list").out, HasSubstr("other                      1  "));
+  EXPECT_THAT(run("list").out,
+              StartsWith("TABLE                    REV  HASH        START..MAX     STEPS/S  "
+                         "DESCRIPTION\n"));
 }
 
 TEST_F(BushtabEdit, TimesAndDifferencesAreThoseOfTheDelays) {
@@ -357,7 +402,13 @@ TEST_F(BushtabEdit, TimesAndDifferencesAreThoseOfTheDelays) {
   EXPECT_EQ(run("time t --steps 5").out,
             "         5 steps           0.370 ms  up to 20000 steps/s\n");
   ASSERT_EQ(run("set t 1 71").exit_code, 0);
+  EXPECT_THAT(run("diff t@1 t").out, StartsWith("2 delays differ\n"
+                                                "  start speed       11111.1 steps/s in both\n"
+                                                "  top speed           20000 steps/s in both\n"
+                                                "  acceleration         0.21 to 0.211 ms (+0.5 %)\n"
+                                                "                          3 codes in both\n"));
   EXPECT_THAT(run("diff t@1 t").out, HasSubstr("accel      1         70.000         71.000\n"));
+  EXPECT_THAT(run("diff t@1 t --json").out, HasSubstr("\"delays_that_differ\": 2"));
   EXPECT_THAT(run("diff t@1 t@1").out, HasSubstr("the same content"));
   EXPECT_THAT(run("diff t@1 t --json").out, HasSubstr("\"after_us\": 71.0"));
 }

@@ -72,6 +72,27 @@ TEST(EditorView, ShowsWhatTheCheckFinds) {
   EXPECT_THAT(screen(editor, {14, 80, true}), HasSubstr("(1 more) "));
 }
 
+TEST(EditorView, WhatTheCheckFindsIsWrappedToTheWindow) {
+  TableEditor editor({.name = "t", .time_unit_ns = 1000, .accel = {90, 30}}, 1,
+                     watching({}, 20000));
+  const auto& found = editor.diagnostics();
+  ASSERT_EQ(found.size(), 2U);
+  std::string joined;
+  for (const std::string& line : lines(editor, {30, 60, true})) {
+    EXPECT_LE(from_utf8(line).size(), 60U);
+    joined += line + " ";
+  }
+  for (const auto& diagnostic : found) EXPECT_THAT(joined, HasSubstr(diagnostic.message));
+}
+
+TEST(EditorView, AsksBeforeErrorsAreSaved) {
+  TableEditor editor({.name = "t", .time_unit_ns = 1000, .accel = {90, 30}}, 1,
+                     watching({}, 20000));
+  type(editor, U"-s");
+  EXPECT_THAT(screen(editor, {24, 100, true}),
+              HasSubstr("\nThe check finds an error in this table (above). y: save nevertheless"));
+}
+
 TEST(EditorView, TellsOfChangesAndMarks) {
   TableEditor editor = editor_of({90, 70, 50});
   EXPECT_THAT(screen(editor, {24, 80, true}), HasSubstr(" t  revision 7  (decel mirrors accel)\n"));

@@ -168,7 +168,7 @@ class HostileFiles(unittest.TestCase):
             (["show", path], 0),
             (["check", path], 0),
             (["plot", path], 0),
-            (["set", path, "0", "0"], 1),
+            (["set", path, "0", "1"], 1),
             (["set", path, "0", "89"], 0),
             (["tag", path, "good\u202e"], 0),
             (["log", path], 0),

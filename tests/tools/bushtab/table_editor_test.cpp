@@ -347,5 +347,36 @@ TEST(TableEditorProperty, ContentIsAlwaysATableAndUndoLeadsBack) {
   }));
 }
 
+// Faster than 20 kHz is an error here.
+TEST(TableEditorSave, AsksBeforeATableWithErrorsIsSaved) {
+  TableEditor editor({.name = "t", .time_unit_ns = 1000, .accel = {90, 30}}, 1,
+                     watching({}, 20000));
+  type(editor, U"-");
+  ASSERT_EQ(editor.errors(), 1U);
+  EXPECT_EQ(editor.press(U's'), Wish::kNone);
+  EXPECT_EQ(editor.mode(), Mode::kAskSave);
+  EXPECT_EQ(editor.press(U'n'), Wish::kNone);
+  EXPECT_EQ(editor.mode(), Mode::kCodes);
+  EXPECT_EQ(editor.press(key::kCtrlS), Wish::kNone);
+  EXPECT_EQ(editor.press(U'y'), Wish::kSave);
+  // On the way out as well, and under another name.
+  EXPECT_EQ(editor.press(U'q'), Wish::kNone);
+  EXPECT_EQ(editor.press(U's'), Wish::kNone);
+  EXPECT_EQ(editor.mode(), Mode::kAskSave);
+  EXPECT_EQ(editor.interrupt(), Wish::kNone);
+  EXPECT_EQ(editor.mode(), Mode::kCodes);
+  type(editor, U"wother");
+  EXPECT_EQ(editor.press(key::kEnter), Wish::kNone);
+  EXPECT_EQ(editor.press(U'y'), Wish::kSaveAs);
+  EXPECT_EQ(editor.wished_name(), "other");
+}
+
+TEST(TableEditorSave, WarningsAreSavedAtOnce) {
+  TableEditor editor({.name = "t", .time_unit_ns = 1000, .accel = {90, 30}}, 1, watching({}));
+  type(editor, U"-");
+  ASSERT_FALSE(editor.diagnostics().empty());
+  EXPECT_EQ(editor.press(U's'), Wish::kSave);
+}
+
 }  // namespace
 }  // namespace bushtab::test
