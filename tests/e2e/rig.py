@@ -62,6 +62,15 @@ def delays_before_end_us(table):
     return [code * content["time_unit_ns"] / 1000 for code in decel]
 
 
+def go_first(pid):
+    """Before whatever else this PC does. A nice value counts among the processes of one session only (autogroups)."""
+    try:
+        os.sched_setscheduler(pid, os.SCHED_RR, os.sched_param(1))
+    except PermissionError:
+        with contextlib.suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, pid, -15)
+
+
 class Running:
     """A program under way; what it says goes to a file. `urgent`: before others, where that is allowed."""
 
@@ -72,8 +81,7 @@ class Running:
             errors = file if stderr is None else stderr
             self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=errors, env=env)
         if urgent:
-            with contextlib.suppress(PermissionError):
-                os.setpriority(os.PRIO_PROCESS, self.process.pid, -15)
+            go_first(self.process.pid)
 
     def wait_until_written(self):
         """Threads of bushd write lines: when they sleep, all that was told before is in its file."""
