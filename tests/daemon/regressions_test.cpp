@@ -1,4 +1,4 @@
-// What tools/bushfaults found, each reduced to the least that shows it.
+// What tests/faults found, each reduced to the least that shows it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
