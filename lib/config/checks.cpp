@@ -56,6 +56,38 @@ Result<void> check_step_period(const Loading& loading, std::size_t index) {
   return fail(std::move(error));
 }
 
+// A first step that waited for DIR would be followed by the next one too soon.
+Result<void> check_dir_setup(const Loading& loading, std::size_t index) {
+  const Config& config = loading.config;
+  const Motor& motor = config.motors[index];
+  const Mcu& mcu = config.mcu_of(motor);
+  const bushd_emission& settings = mcu.emission.settings;
+  if (settings.mode != BUSHD_EMISSION_EVEN || config.bus_of(mcu).kind != BusKind::kRs485) return {};
+  const bushd_table& view = config.table_of(motor).view();
+  std::uint32_t longest_us = fieldbus::longest_dir_setup_us(view);
+  std::string whose = fmt::format(
+      "motor \"{}\" makes the first step of table \"{}\" {:.6g} us after DIR, in a line after half "
+      "of "
+      "that",
+      motor.name, config.table_of(motor).name(), 1e-3 * view.accel.code[0] * view.time_unit_ns);
+  if (motor.drive.moved_by_people() && motor.drive.velocity) {
+    const std::uint32_t of_loop_us =
+        fieldbus::longest_dir_setup_us(motor.drive.velocity->min_steps_per_s * 64);
+    if (of_loop_us < longest_us) {
+      longest_us = of_loop_us;
+      whose = fmt::format("motor \"{}\" turns at {} steps/s by its `velocity`", motor.name,
+                          motor.drive.velocity->min_steps_per_s);
+    }
+  }
+  if (settings.dir_setup_us <= longest_us) return {};
+  Error error = mcu.emission.dir_setup_at;
+  error.message = fmt::format(
+      "is {} us, but {}: steps that wait for DIR would come closer together than the table says; "
+      "allowed: {} us or less. Or begin more slowly",
+      settings.dir_setup_us, whose, longest_us);
+  return fail(std::move(error));
+}
+
 // What no MCU can do, however many slots it has; what some cannot, they say when they are asked.
 Result<void> check_emission(const Loading& loading, std::size_t index) {
   const Mcu& mcu = loading.config.mcus[index];
@@ -228,6 +260,7 @@ Result<void> check_together(const Loading& loading) {
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
     if (auto checked = check_speed(loading, i); !checked) return checked;
     if (auto checked = check_step_period(loading, i); !checked) return checked;
+    if (auto checked = check_dir_setup(loading, i); !checked) return checked;
     if (auto checked = check_board_speed(loading, i); !checked) return checked;
     if (auto checked = check_idle(loading, i); !checked) return checked;
   }

@@ -1,6 +1,9 @@
 #include "fieldbus/emission_setup.h"
 
+#include <algorithm>
+
 #include "engine/slots.h"
+#include "engine/velocity.h"
 
 namespace bushd::fieldbus {
 namespace {
@@ -48,6 +51,17 @@ Result<unsigned> max_steps_per_tick(const EmissionSetup& setup, const bushd_iden
   const bushd_status status = bushd_emission_fit(&setup.settings, tick_ns, identity.slots, &grid);
   if (status != BUSHD_OK) return fail(emission_refusal(setup, status, identity.slots, tick_ns));
   return grid.max_steps;
+}
+
+std::uint32_t longest_dir_setup_us(const bushd_table& table) {
+  const std::uint64_t first_ns = std::uint64_t{table.accel.code[0]} * table.time_unit_ns;
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(first_ns / 2000, UINT32_MAX));
+}
+
+std::uint32_t longest_dir_setup_us(std::int32_t least_speed) {
+  const std::uint32_t period_ns =
+      bushd_velocity_period(least_speed, least_speed) * BUSHD_VELOCITY_INTERVAL_NS;
+  return period_ns / 2000;
 }
 
 std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::uint16_t slots,

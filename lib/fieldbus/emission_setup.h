@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "engine/emission.h"
+#include "engine/table.h"
 
 namespace bushd::fieldbus {
 
@@ -37,6 +38,14 @@ inline constexpr std::array<std::string_view, 4> kSequenceNames = {"wave", "full
 // told without asking.
 Result<unsigned> max_steps_per_tick(const EmissionSetup& setup, const bushd_identity& identity,
                                     std::uint32_t tick_ns);
+
+// The longest dir_setup_us with which no step of this table is made later than the table says. DIR
+// changes where a run begins; the first step comes after the first delay, in a line after half of
+// that. A step that has to wait would be followed by the next one too soon. For even emission: the
+// other modes let all steps wait.
+std::uint32_t longest_dir_setup_us(const bushd_table& table);
+// The same of the velocity loop, which turns a motor at its least speed, in 1/64 step/s, above 0.
+std::uint32_t longest_dir_setup_us(std::int32_t least_speed);
 
 // What can be done about a refusal that the configuration is not to blame for.
 const char* remedy_of(unsigned refusal);

@@ -46,6 +46,34 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
   return {};
 }
 
+// Of even emission: steps that wait for DIR would be followed by others too soon.
+Result<void> check_dir_setup(const McuSetup& setup) {
+  const bushd_emission& settings = setup.emission.settings;
+  if (settings.mode != BUSHD_EMISSION_EVEN) return {};
+  const auto refusal = [&settings](std::size_t motor, const char* what, std::uint32_t longest_us) {
+    return fail("has dir_setup_us = " + std::to_string(settings.dir_setup_us) + ", but motor " +
+                std::to_string(motor) + what +
+                ", so steps that wait for DIR would come too close together: use dir_setup_us = " +
+                std::to_string(longest_us) + " or less, or let it begin more slowly");
+  };
+  for (std::size_t output = 0; output < setup.table_of_motor.size(); ++output) {
+    const auto slot = setup.table_of_motor[output];
+    if (!slot) continue;
+    const std::uint32_t longest_us = fieldbus::longest_dir_setup_us(*setup.tables[*slot].table);
+    if (settings.dir_setup_us > longest_us) {
+      return refusal(output, " begins by its table sooner than that allows", longest_us);
+    }
+  }
+  for (const bushd_set_velocity& one : setup.velocities) {
+    if (one.most == 0) continue;
+    const std::uint32_t longest_us = fieldbus::longest_dir_setup_us(one.least);
+    if (settings.dir_setup_us > longest_us) {
+      return refusal(one.motor, " turns by its `velocity` sooner than that allows", longest_us);
+    }
+  }
+  return {};
+}
+
 Result<void> check_currents(const McuSetup& setup, const bushd_identity& identity) {
   if ((identity.capabilities & BUSHD_CAN_CURRENTS) != 0) return {};
   for (const bushd_currents& one : setup.currents) {
@@ -114,6 +142,7 @@ Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
   if (auto currents = check_currents(setup, identity); !currents) return currents;
   if (auto velocities = check_velocities(setup, identity); !velocities) return velocities;
   if (auto keypad = check_keypad(setup, identity); !keypad) return keypad;
+  if (auto dir_setup = check_dir_setup(setup); !dir_setup) return dir_setup;
   std::size_t codes = 0;
   for (const TableRef& ref : setup.tables) codes += codes_of(*ref.table);
   if (codes <= identity.table_codes) return check_time(setup, identity, tick_ns);

@@ -113,6 +113,29 @@ TEST(EmissionKeys, PhasesHaveFourOutputsAMotor) {
                 "take 4 outputs a motor"));
 }
 
+// bushd2-constant begins with 10 ms. The first step of a line may come after half of that.
+TEST(EmissionKeys, NoStepOfATableWaitsForDir) {
+  EXPECT_EQ(settings_of("dir_setup_us = 2400\n").dir_setup_us, 2400);
+  const auto with_first_delay = [](int us, int dir_setup_us) {
+    const ConfigFile file(
+        replaced(with_keys("dir_setup_us = " + std::to_string(dir_setup_us) + "\n"),
+                 "table = \"bushd2-constant\"", "table = \"fast\""));
+    file.directory().write("fast.toml", "name = \"fast\"\ntime_unit_ns = 1000\naccel = [" +
+                                            std::to_string(us) + ", 200]\n");
+    const auto config = file.load();
+    return config ? "no error" : config.error().text();
+  };
+  EXPECT_THAT(
+      with_first_delay(200, 1000),
+      HasSubstr("mcu[0].dir_setup_us: is 1000 us, but motor \"theta\" makes the first step of "
+                "table \"fast\" 200 us after DIR, in a line after half of that: steps that wait "
+                "for DIR would come closer together than the table says; allowed: 100 us or "
+                "less. Or begin more slowly"));
+  EXPECT_EQ(with_first_delay(200, 100), "no error");
+  EXPECT_THAT(with_first_delay(200, 101), HasSubstr("allowed: 100 us"));
+  EXPECT_EQ(with_first_delay(2000, 1000), "no error");
+}
+
 // What no MCU can do is found before one is asked.
 TEST(EmissionKeys, WhatNoMcuCanDoIsRefused) {
   EXPECT_THAT(emission_error(with_keys("dir_setup_us = 65535\n")),

@@ -92,6 +92,30 @@ TEST(Connect, AnMcuWithoutTheVelocityLoopIsNamedWhereVelocityIsSet) {
               HasSubstr("moves no motor by the velocity loop, but motor 1 has `velocity`"));
 }
 
+// Checked here as well as in the configuration: tables and velocities change in operation.
+TEST(Connect, ATableThatBeginsBeforeDirMayBeStepsAfterKeepsTheMcuAway) {
+  FakeBus bus(1, 2);
+  static const std::array<std::uint16_t, 1> kCode = {100};
+  static const bushd_table kQuick = {.accel = {kCode.data(), 1, nullptr, nullptr, 0},
+                                     .decel = {kCode.data(), 1, nullptr, nullptr, 0},
+                                     .cruise = 100,
+                                     .time_unit_ns = 4'000};
+  constexpr std::uint32_t kMostUs = 200;
+  for (const bool too_long : {true, false}) {
+    link::McuSetup setup = bus.setup.mcus[0];
+    for (auto& table : setup.tables) table.table = &kQuick;
+    setup.emission.settings.dir_setup_us = static_cast<std::uint16_t>(kMostUs + too_long);
+    bus.master->reconfigure(McuIndex{0}, setup);
+    bus.run_for(3'000'000);
+    EXPECT_EQ(bus.master->view(McuIndex{0}).phase == McuPhase::kOffline, too_long);
+    if (!too_long) continue;
+    EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
+                HasSubstr("but motor 0 begins by its table sooner than that allows, so steps that "
+                          "wait for DIR would come too close together: use dir_setup_us = " +
+                          std::to_string(kMostUs) + " or less"));
+  }
+}
+
 TEST(Connect, AnMcuWhoseOutputsAreActiveHighOnlyIsNamedWithTheKey) {
   FakeBus bus(1, 2);
   link::McuSetup setup = bus.setup.mcus[0];

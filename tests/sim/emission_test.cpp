@@ -2,6 +2,7 @@
 // (pulse width, DIR setup, sequences of phases) and by where the documents put the pulses.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -109,6 +110,33 @@ TEST(EmissionOnPins, StaggeredPulsesFollowEachOther) {
   // T_step / 4 = 0.512 ms is less than 0.518 ms; the one motor of the second T_step need not wait.
   for (int m = 0; m < 4; ++m) EXPECT_EQ(steps.at(m)[0].rise_ns - lab.start_ns, m * 512'000) << m;
   EXPECT_EQ(steps.at(3)[1].rise_ns - lab.start_ns, kStepNs);
+}
+
+// The least time between two steps of a motor with delays of 0.2 ms, to the left and then back.
+TimeNs closest_steps(std::uint16_t dir_setup_us) {
+  EmissionBus lab(2'000'000, {}, BUSHD_FORMAT_FINE);
+  bushd_emission settings = of_mode(BUSHD_EMISSION_EVEN);
+  settings.dir_setup_us = dir_setup_us;
+  lab.use(settings, 1);
+  lab.run({{-10}, {-10}, {-10}});
+  lab.run({{10}, {10}, {10}});
+  const auto steps = steps_of(lab.recorder, false);
+  EXPECT_EQ(steps.at(0).size(), 60U);
+  EXPECT_EQ(sum(steps.at(0)), 0);
+  TimeNs closest = lab.bus.now_ns();
+  for (std::size_t i = 1; i < steps.at(0).size(); ++i) {
+    closest = std::min(closest, steps.at(0)[i].rise_ns - steps.at(0)[i - 1].rise_ns);
+  }
+  return closest;
+}
+
+TEST(EmissionOnPins, StepsKeepTheirDistanceWhereDirIsEarlyEnough) {
+  constexpr TimeNs kSlotNs = 2'000'000 / 256 + 1;
+  for (const std::uint16_t us : {std::uint16_t{0}, std::uint16_t{50}, std::uint16_t{100}}) {
+    EXPECT_GE(closest_steps(us), 200'000 - 2 * kSlotNs) << us;
+  }
+  // Which is why no configuration has it (longest_dir_setup_us).
+  EXPECT_LE(closest_steps(1000), kSlotNs);
 }
 
 // The rules of drivers, whatever is asked for: random counts that turn as often as they like.

@@ -47,7 +47,8 @@ struct Layout {
   int help = 0;
 };
 
-Layout lay_out(int rows, int message_lines, int diagnostic_lines, int code_rows) {
+Layout lay_out(int rows, int message_lines, int diagnostic_lines, int first_diagnostic_lines,
+               int code_rows) {
   Layout layout;
   int left = rows;
   const auto take = [&left](int wanted) {
@@ -67,8 +68,10 @@ Layout lay_out(int rows, int message_lines, int diagnostic_lines, int code_rows)
   layout.title = take(1);
   layout.diagnostics = take(1);
   layout.times = take(1);
-  if (rows >= kTallRows)
-    layout.diagnostics += take(std::min(diagnostic_lines, kMaxDiagnosticLines) - 1);
+  if (rows >= kRoomyRows) {
+    const int wanted = rows >= kTallRows ? diagnostic_lines : first_diagnostic_lines;
+    layout.diagnostics += take(std::min(wanted, kMaxDiagnosticLines) - 1);
+  }
   const int codes_too = std::min(left / 3, code_rows - layout.codes);
   if (left - codes_too >= kMinCurveRows) layout.curve = take(left - codes_too);
   layout.codes += take(left);
@@ -171,9 +174,12 @@ class View {
 
   CellGrid draw() {
     const auto lines = wrapped(said(editor_), grid_.columns());
-    const Layout layout = lay_out(grid_.rows(), static_cast<int>(lines.size()),
-                                  static_cast<int>(std::max<std::size_t>(diagnostics_.size(), 1)),
-                                  static_cast<int>(code_rows_.rows.size()));
+    const Layout layout =
+        lay_out(grid_.rows(), static_cast<int>(lines.size()),
+                static_cast<int>(std::max<std::size_t>(diagnostics_.size(), 1)),
+                static_cast<int>(std::max<std::ptrdiff_t>(
+                    std::ranges::count(diagnostics_, 0U, &DiagnosticLine::of), 1)),
+                static_cast<int>(code_rows_.rows.size()));
     int row = 0;
     if (layout.title > 0) draw_title(row);
     row += layout.title;
