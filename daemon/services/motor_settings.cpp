@@ -51,6 +51,7 @@ config::Settings MotorSettings::settings_of(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   settings.coordinates = motor.coordinates();
   settings.soft_limits = motor.soft_limits();
+  settings.max_speed = motor.max_speed();
   settings.drive = installation_.drives()[id];
   return settings;
 }
@@ -76,11 +77,11 @@ Result<MotorSettings::Plan> MotorSettings::plan_of(
     if (!key) {
       std::vector<std::string_view> known;
       for (const config::SettingKey each : config::kSettingKeys) known.push_back(name_of(each));
-      return fail(name + ": \"" + word + "\" cannot be changed in operation" +
-                  did_you_mean(word, known) +
-                  "; allowed: offset, direction, soft_limits, "
-                  "input_active, local, keypad, velocity, currents. Edit bushd.toml and restart "
-                  "bushd for other keys");
+      return fail(
+          name + ": \"" + word + "\" cannot be changed in operation" + did_you_mean(word, known) +
+          "; allowed: offset, direction, soft_limits, "
+          "input_active, local, keypad, velocity, currents, max_speed. Edit bushd.toml and restart "
+          "bushd for other keys");
     }
     auto at = static_cast<std::size_t>(std::ranges::find(plan.motors, *id) - plan.motors.begin());
     if (at == plan.motors.size()) {
@@ -188,6 +189,7 @@ void MotorSettings::offset_set(MotorId id, const units::Coordinates& before, con
 void MotorSettings::put(MotorId id, const config::Settings& settings) {
   installation_[id].set_coordinates(settings.coordinates);
   installation_[id].set_soft_limits(settings.soft_limits);
+  installation_[id].set_max_speed(settings.max_speed);
   if (settings.drive != installation_.drives()[id]) {
     installation_.put(id, settings.drive);
     installation_[id].set_local(settings.drive.moved_by_people());
@@ -216,9 +218,12 @@ void MotorSettings::keep(MotorId id) {
 void MotorSettings::take_kept() {
   for (const MotorId id : installation_.motors()) {
     const state::Settings all = kept_.settings(id);
-    for (const SettingKey key : config::kSettingKeys) {
-      const auto found = all.find(std::string(config::name_of(key)));
-      if (found != all.end()) take_kept(id, key, found->second);
+    for (const bool first : {true, false}) {
+      for (const SettingKey key : config::kSettingKeys) {
+        const auto found = all.find(std::string(config::name_of(key)));
+        if (found == all.end() || config::goes_first(key, found->second.value) != first) continue;
+        take_kept(id, key, found->second);
+      }
     }
     // An edit of the file ends a setting for good, also if it is taken back later.
     keep(id);

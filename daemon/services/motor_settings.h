@@ -1,6 +1,6 @@
-// What may be changed of motors in operation: their offsets, directions and soft limits, and what
-// their MCU keeps of velocity loop and currents. Kept in the state store, where each counts until
-// its key in bushd.toml is edited.
+// What may be changed of motors in operation: their offsets, directions, soft limits and greatest
+// speeds, and what their MCU keeps of velocity loop and currents. Kept in the state store, where
+// each counts until its key in bushd.toml is edited.
 //
 // This daemon reads bushd.toml when it starts and never writes it: clients do, with the rights of
 // those who use them, and say so (docs/decisions/0033-settings-in-operation.md).

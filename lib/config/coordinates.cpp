@@ -128,8 +128,8 @@ Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
   constexpr std::string_view kKey = "max_speed";
   const auto speed = reader.number(kKey, "a number above 0");
   if (!speed) return speed;
-  if (!(*speed > 0)) {
-    return fail(reader.error(kKey, fmt::format("is {}; allowed: a number above 0", *speed)));
+  if (const auto good = check_user_speed(motor.coordinates, *speed); !good) {
+    return fail(reader.error(kKey, good.error().message));
   }
   if (motor.drive.moved_by_people()) {
     return fail(
@@ -165,8 +165,8 @@ Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
     }
     const auto speed = reader.number(kKey, "a number above 0");
     if (!speed) return fail(speed.error());
-    if (!(*speed > 0)) {
-      return fail(reader.error(kKey, fmt::format("is {}; allowed: a number above 0", *speed)));
+    if (const auto good = check_user_speed(motor->coordinates, *speed); !good) {
+      return fail(reader.error(kKey, good.error().message));
     }
     motor->backlash_speed = *speed;
   }

@@ -152,7 +152,9 @@ Result<std::string> edited(std::string_view text, std::span<const Edit> edits,
   if (!config) return fail(config.error());
   // One may need another: a velocity is of a motor that people move. Keys are in that order.
   std::vector<Edit> in_order(edits.begin(), edits.end());
-  std::ranges::stable_sort(in_order, {}, &Edit::key);
+  std::ranges::stable_sort(in_order, {}, [](const Edit& edit) {
+    return std::pair(!goes_first(edit.key, edit.value), edit.key);
+  });
   std::map<std::string, Settings> changed;  // by motor
   std::string out(text);
   for (Edit& edit : in_order) {

@@ -4,6 +4,9 @@
 
 #include <cmath>
 #include <string>
+#include <string_view>
+
+#include "config/setting.h"
 
 namespace bushd::config {
 namespace {
@@ -101,14 +104,20 @@ Result<Home> read_home(const TomlReader& motor) {
   return home;
 }
 
-Result<void> check_then(const TomlReader& reader, const Motor& motor) {
-  if (!motor.home || !motor.home->then) return {};
+Result<void> check_home_in_units(const TomlReader& reader, const Motor& motor) {
+  if (!motor.home) return {};
   const units::Coordinates& coordinates = motor.coordinates;
-  const double then = *motor.home->then;
-  const auto refuse = [&](const std::string& why) {
+  const auto refuse_key = [&](std::string_view key, const std::string& why) {
     auto home = reader.section("home", "a table");
-    return fail(home ? home->error("then", why) : home.error());
+    return fail(home ? home->error(key, why) : home.error());
   };
+  if (motor.home->speed) {
+    const auto good = check_user_speed(coordinates, *motor.home->speed);
+    if (!good) return refuse_key("speed", good.error().message);
+  }
+  if (!motor.home->then) return {};
+  const double then = *motor.home->then;
+  const auto refuse = [&](const std::string& why) { return refuse_key("then", why); };
   if (!coordinates.has_unit() && std::trunc(then) != then) {
     return refuse(fmt::format("is {}; allowed: a whole number of steps, as it has no unit", then));
   }

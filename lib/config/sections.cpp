@@ -419,7 +419,7 @@ Result<void> read_motors(Loading* loading) {
     if (!velocity) return fail(velocity.error());
     motor.drive.velocity = *velocity;
     if (auto read = read_coordinates(reader, &motor); !read) return read;
-    if (auto checked = check_then(reader, motor); !checked) return checked;
+    if (auto checked = check_home_in_units(reader, motor); !checked) return checked;
     const bool has_mcu = !config.mcus[mcu->value].stand_in;
     motor.has_one_input = has_mcu && motor.inputs.own && !reader.has("inputs");
     motor.drive.input_open = motor.has_one_input && motor.inputs.own->active_open;

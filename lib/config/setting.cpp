@@ -20,8 +20,8 @@ constexpr std::string_view kNone = "none";
 
 // In the order of the enumeration.
 constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {
-    "offset", "direction", "soft_limits", "input_active",
-    "local",  "keypad",    "velocity",    "currents"};
+    "offset", "direction", "soft_limits", "input_active", "local",
+    "keypad", "velocity",  "currents",    "max_speed"};
 constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
     "a number of user units",
     "negative, positive",
@@ -31,7 +31,8 @@ constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
     "true, false",
     "MIN,MAX,ACCELERATION, whole numbers of 1..40000 steps/s, MIN to 40000 steps/s and 1..8388607 "
     "steps/s^2, or none",
-    "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or none"};
+    "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or none",
+    "a number above 0, of units per second (of steps per second without a unit), or none"};
 // What an inline table of these keys has, in order.
 constexpr std::array<std::string_view, 3> kVelocityNames = {"min_steps_per_s", "max_steps_per_s",
                                                             "steps_per_s2"};
@@ -187,8 +188,8 @@ Result<Settings> with_people(Settings settings, SettingKey key, std::string_view
   if (word != "true" && word != "false") return refuse(key, text);
   if (word == "true" && settings.max_speed) {
     return refuse(key, text,
-                  "local motion goes by the table alone, and may be faster than max_speed; leave "
-                  "max_speed out in bushd.toml first");
+                  "local motion goes by the table alone, and may be faster than max_speed; set "
+                  "max_speed=none first");
   }
   if (word == "true" && settings.idle_disabled) {
     return refuse(
@@ -197,6 +198,25 @@ Result<Settings> with_people(Settings settings, SettingKey key, std::string_view
         "idle_disable_s out in bushd.toml first");
   }
   (key == SettingKey::kLocal ? settings.drive.local : settings.drive.keypad) = word == "true";
+  return settings;
+}
+
+Result<Settings> with_max_speed(Settings settings, std::string_view text) {
+  if (trimmed(text) == kNone) {
+    settings.max_speed.reset();
+    return settings;
+  }
+  const auto speed = number_of(text);
+  if (!speed || !(*speed > 0)) return refuse(SettingKey::kMaxSpeed, text);
+  if (const auto good = check_user_speed(settings.coordinates, *speed); !good) {
+    return fail(fmt::format("{}: {}", name_of(SettingKey::kMaxSpeed), good.error().message));
+  }
+  if (settings.drive.moved_by_people()) {
+    return refuse(SettingKey::kMaxSpeed, text,
+                  "local motion goes by the table alone, and may be faster; set local=false and "
+                  "keypad=false first, or give its group a slower table");
+  }
+  settings.max_speed = speed;
   return settings;
 }
 
@@ -227,7 +247,7 @@ Settings settings_of(const Motor& motor, const Mcu& mcu) {
           .drive = motor.drive,
           .phases = mcu.emission.settings.mode == BUSHD_EMISSION_PHASES,
           .has_mcu = !mcu.stand_in,
-          .max_speed = motor.max_speed.has_value(),
+          .max_speed = motor.max_speed,
           .idle_disabled = mcu.idle_disable_s.has_value(),
           .has_one_input = motor.has_one_input,
           .written = motor.written};
@@ -235,6 +255,10 @@ Settings settings_of(const Motor& motor, const Mcu& mcu) {
 
 std::string_view name_of(SettingKey key) {
   return kKeyNames.at(static_cast<std::size_t>(key));
+}
+
+bool goes_first(SettingKey key, std::string_view value) {
+  return key == SettingKey::kMaxSpeed && value == kNone;
 }
 
 std::optional<SettingKey> setting_key_of(std::string_view name) {
@@ -247,6 +271,7 @@ std::optional<SettingKey> setting_key_of(std::string_view name) {
 bool applies(const Settings& settings, SettingKey key) {
   switch (key) {
     case SettingKey::kSoftLimits:
+    case SettingKey::kMaxSpeed:
       return true;
     case SettingKey::kInputActive:
       return settings.has_one_input;
@@ -266,6 +291,7 @@ bool is_reported(const Settings& settings, SettingKey key) {
   if (key == SettingKey::kInputActive) return settings.drive.input_open;
   if (key == SettingKey::kLocal) return settings.drive.local;
   if (key == SettingKey::kKeypad) return settings.drive.keypad;
+  if (key == SettingKey::kMaxSpeed) return settings.max_speed.has_value();
   return applies(settings, key);
 }
 
@@ -286,6 +312,8 @@ std::string text_of(const Settings& settings, SettingKey key) {
       return text_of(settings.drive.velocity);
     case SettingKey::kCurrents:
       return text_of(settings.drive.currents);
+    case SettingKey::kMaxSpeed:
+      return settings.max_speed ? fmt::format("{}", *settings.max_speed) : std::string(kNone);
     case SettingKey::kSoftLimits:
       break;
   }
@@ -308,6 +336,7 @@ Result<Settings> with(Settings settings, SettingKey key, std::string_view text) 
   }
   if (key == SettingKey::kVelocity) return with_velocity(std::move(settings), text);
   if (key == SettingKey::kCurrents) return with_currents(std::move(settings), text);
+  if (key == SettingKey::kMaxSpeed) return with_max_speed(std::move(settings), text);
   units::Scale scale = settings.coordinates.scale();
   if (key == SettingKey::kDirection) {
     const std::string_view word = trimmed(text);
@@ -329,6 +358,17 @@ Result<void> check_soft_limits(const units::Coordinates& coordinates,
   if (coordinates.first_step_from(limits.low) <= coordinates.last_step_to(limits.high)) return {};
   return fail(fmt::format("has no step from {} to {}; allowed: [lowest, highest] dial position",
                           limits.low, limits.high));
+}
+
+Result<void> check_user_speed(const units::Coordinates& coordinates, double speed) {
+  if (!(speed > 0)) {
+    return fail(fmt::format("is {}; allowed: a number above 0", speed));
+  }
+  constexpr std::uint32_t kAnyUnitNs = 1;
+  if (const auto delay = coordinates.delay_at(speed, kAnyUnitNs); !delay) {
+    return fail(delay.error().message);
+  }
+  return {};
 }
 
 }  // namespace bushd::config

@@ -22,17 +22,23 @@ enum class SettingKey {
   kLocal,
   kKeypad,
   kVelocity,
-  kCurrents
+  kCurrents,
+  kMaxSpeed
 };
-// In the order in which they may be taken: a velocity is of a motor that people move.
+// In the order in which they may be taken: a velocity is of a motor that people move. What goes
+// before all others is said by goes_first().
 inline constexpr std::array kSettingKeys = {
-    SettingKey::kOffset, SettingKey::kDirection, SettingKey::kSoftLimits, SettingKey::kInputActive,
-    SettingKey::kLocal,  SettingKey::kKeypad,    SettingKey::kVelocity,   SettingKey::kCurrents};
+    SettingKey::kOffset,      SettingKey::kDirection, SettingKey::kSoftLimits,
+    SettingKey::kInputActive, SettingKey::kLocal,     SettingKey::kKeypad,
+    SettingKey::kVelocity,    SettingKey::kCurrents,  SettingKey::kMaxSpeed};
 
 // By SettingKey.
 using WrittenKeys = std::bitset<kSettingKeys.size()>;
 
 std::string_view name_of(SettingKey key);  // as in bushd.toml
+// A motor that has no max_speed any more may be moved by people, and one that they do not move any
+// more may have one. `value` is one that text_of() makes.
+bool goes_first(SettingKey key, std::string_view value);
 std::optional<SettingKey> setting_key_of(std::string_view name);
 
 // Of one motor, what they stand for.
@@ -40,9 +46,9 @@ struct Settings {
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};
   Drive drive{};
-  bool phases = false;     // its MCU drives it by phases: it may have currents
-  bool has_mcu = false;    // its controller is an MCU, which can move it by local inputs
-  bool max_speed = false;  // max_speed is configured, which an MCU does not keep to by itself
+  bool phases = false;   // its MCU drives it by phases: it may have currents
+  bool has_mcu = false;  // its controller is an MCU, which can move it by local inputs
+  std::optional<double> max_speed = {};  // user units/s; an MCU does not keep to it by itself
   // Its drivers are disabled at rest, and local inputs cannot enable them.
   bool idle_disabled = false;
   // It has one input, which no other motor uses: input_active may be changed.
@@ -56,12 +62,12 @@ Settings settings_of(const Motor& motor, const Mcu& mcu);  // as bushd.toml has 
 // Whether the motor has this setting. Offset, direction and soft limits need a unit, velocity needs
 // local inputs or a keypad, currents need a motor that is driven by phases.
 bool applies(const Settings& settings, SettingKey key);
-// Whether it is listed when all settings are asked for. The defaults of `local`, `keypad` and
-// `input_active` are not.
+// Whether it is listed when all settings are asked for. The defaults of `local`, `keypad`,
+// `input_active` and `max_speed` are not.
 bool is_reported(const Settings& settings, SettingKey key);
 
 // "12.5"; "negative"; "[-5, 30]" or "none"; "true" or "false"; velocity and currents as an inline
-// table of TOML, or "none". The same value has one text.
+// table of TOML, or "none"; max_speed "2.5" or "none". The same value has one text.
 std::string text_of(const Settings& settings, SettingKey key);
 
 // "offset = 12.5"; "" if it was left out.
@@ -76,5 +82,8 @@ Result<Settings> with(Settings settings, SettingKey key, std::string_view text);
 // Error: no step lies between them.
 Result<void> check_soft_limits(const units::Coordinates& coordinates,
                                const units::SoftLimits& limits);
+
+// Error: no speed above 0, or slower than a step an hour. Without key; in user units/s.
+Result<void> check_user_speed(const units::Coordinates& coordinates, double speed);
 
 }  // namespace bushd::config

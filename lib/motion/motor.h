@@ -138,6 +138,7 @@ class Motor {
   Output output() const { return setup_.output; }
   const units::Coordinates& coordinates() const { return setup_.coordinates; }
   const std::optional<units::SoftLimits>& soft_limits() const { return setup_.soft_limits; }
+  const std::optional<double>& max_speed() const { return setup_.max_speed; }
 
   const Activity& activity() const { return activity_; }
   template <class A>
@@ -271,6 +272,8 @@ class Motor {
     setup_.coordinates = std::move(coordinates);
   }
   void set_soft_limits(std::optional<units::SoftLimits> limits) { setup_.soft_limits = limits; }
+  // User units/s, for the motions that begin from now on.
+  void set_max_speed(std::optional<double> speed) { setup_.max_speed = speed; }
   void set_local(bool local) { setup_.local = local; }
   // Error: how far it is from where it may be.
   Result<void> stands_within_soft_limits() const;

@@ -88,6 +88,12 @@ TEST(ConfigCoordinates, WhatCannotBeIsRefusedWithItsLineAndKey) {
            {unit + "offset = inf\n", "motor[1].offset: is the floating-point number inf"},
            {unit + "direction = \"up\"\n", "motor[1].direction: is \"up\"; allowed: \"negative\""},
            {unit + "precision = 13\n", "motor[1].precision: is 13; allowed: a whole number 0..12"},
+           {"max_speed = 1e-9\n",
+            "37:13: motor[1].max_speed: 1e-09 steps/s would take 1e+09 s a step; "
+            "allowed: up to an hour a step"},
+           {unit + "backlash = 1\nbacklash_speed = 1e-9\n", "motor[1].backlash_speed: 1e-09 mm/s"},
+           {"home = { direction = \"negative\", most_steps = 5, speed = 1e-9 }\n",
+            "motor[1].home.speed: 1e-09 steps/s would take"},
            {"soft_limits = [0]\n", "motor[1].soft_limits: has 1 elements; allowed: [lowest"},
            {"soft_limits = [0, \"x\"]\n", "motor[1].soft_limits[1]: is the string \"x\""},
            {"soft_limits = [5, 4]\n", "37:15: motor[1].soft_limits: has no step from 5 to 4"},

@@ -67,6 +67,18 @@ TEST(Edit, VelocityAndCurrentsAreInlineTables) {
               HasSubstr("its MCU does not drive it by phases"));
 }
 
+TEST(Edit, AGreatestSpeedIsANumberOrHasNoKey) {
+  constexpr SettingKey kMaxSpeed = SettingKey::kMaxSpeed;
+  expect("max_speed = 5 # mm/s\n", {{"theta", kMaxSpeed, "2.50"}}, "max_speed = 2.5 # mm/s\n");
+  expect("", {{"theta", kMaxSpeed, "2"}}, "max_speed = 2\n");
+  expect("max_speed = 5\n", {{"theta", kMaxSpeed, "none"}}, "");
+  // A motor has one of the two, whatever it had.
+  expect("max_speed = 5\n", {{"theta", SettingKey::kLocal, "true"}, {"theta", kMaxSpeed, "none"}},
+         "local = true\n");
+  expect("local = true\n", {{"theta", kMaxSpeed, "2"}, {"theta", SettingKey::kLocal, "false"}},
+         "local = false\nmax_speed = 2\n");
+}
+
 // Who moves it and how fast, as 'bushctl config --save' writes them together.
 TEST(Edit, AValueMayNeedAnotherOneOfTheSameTime) {
   const std::string velocity =

@@ -99,13 +99,34 @@ TEST(Setting, PeopleMoveAMotorWhereItsMcuLetsThem) {
       EXPECT_THAT(with(settings, key, text).error().message, HasSubstr("allowed: true, false"));
     }
     Settings held = settings;
-    held.max_speed = true;
+    held.max_speed = 5;
     EXPECT_THAT(with(held, key, "true").error().message, HasSubstr("may be faster than max_speed"));
     EXPECT_TRUE(with(held, key, "false"));
     Settings idle = settings;
     idle.idle_disabled = true;
     EXPECT_THAT(with(idle, key, "true").error().message, HasSubstr("idle_disable_s"));
   }
+}
+
+TEST(Setting, AGreatestSpeedIsANumberAboveZeroOfAMotorThatPeopleDoNotMove) {
+  const auto key = SettingKey::kMaxSpeed;
+  EXPECT_TRUE(applies(Settings{}, key)) << "without a unit too";
+  EXPECT_FALSE(is_reported(blade(), key));
+  EXPECT_EQ(text_of(blade(), key), "none");
+  const Settings held = with(blade(), key, " 2.50").value();
+  EXPECT_EQ(text_of(held, key), "2.5");
+  EXPECT_TRUE(is_reported(held, key));
+  EXPECT_EQ(text_of(with(held, key, "none").value(), key), "none");
+  for (const char* text : {"", "0", "-1", "nan", "inf", "2 mm", "fast"}) {
+    EXPECT_THAT(with(held, key, text).error().message, HasSubstr("above 0")) << text;
+  }
+  // An hour a step is 1 / 400 mm in 3600 s.
+  EXPECT_TRUE(with(held, key, "7e-7"));
+  EXPECT_THAT(with(held, key, "6e-7").error().message, HasSubstr("up to an hour a step"));
+  EXPECT_THAT(with(unipolar(), key, "2").error().message, HasSubstr("set local=false"));
+  EXPECT_TRUE(with(unipolar(), key, "none"));
+  EXPECT_TRUE(goes_first(key, "none"));
+  EXPECT_FALSE(goes_first(key, "2"));
 }
 
 TEST(Setting, AnyTextOfVelocityAndCurrentsIsTakenWholeOrRefused) {

@@ -141,6 +141,57 @@ TEST(MotorSettings, ThatMakeNoSenseAreRefusedWithMotorKeyCauseAndRemedy) {
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
+TEST(MotorSettings, AGreatestSpeedCountsFromTheNextMoveOnAndIsKept) {
+  SettingsLab lab;
+  const auto seconds = [&lab](std::int64_t steps) {
+    const std::int64_t before_us = lab.now_us();
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {steps})).result, "reached");
+    return static_cast<double>(lab.now_us() - before_us) * 1e-6;
+  };
+  EXPECT_LT(seconds(400), 1);
+  lab.expect_done("m01", "max_speed", "0.25");  // 100 steps a second
+  EXPECT_THAT(lab.show("m01"), Contains("m01 max_speed = 0.25, in the file none"));
+  EXPECT_NEAR(seconds(-400), 4, 0.5);
+  lab.cut_pc_power();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 20));
+  EXPECT_NEAR(seconds(400), 4, 0.5) << "the state store has kept it";
+  lab.expect_refused(lab.change("m01", "local", "true"), "set max_speed=none first");
+  lab.expect_refused(lab.change("m01", "max_speed", "0"),
+                     "m01: max_speed: is \"0\"; allowed: a number");
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {-400});
+  lab.run_for(0.3);
+  lab.expect_refused(lab.change("m01", "max_speed", "none"), "at rest only");
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  lab.expect_done("m01", "max_speed", "none");
+  EXPECT_LT(seconds(400), 1);
+  EXPECT_THAT(lab.show("m01"), Not(Contains(HasSubstr("max_speed"))));
+}
+
+// Each of the two keeps the other away, so their order counts where both are kept.
+TEST(MotorSettings, AGreatestSpeedAndLocalInputsTakeTurnsOverARestart) {
+  const std::string slow = "offset = 10\nmax_speed = 0.25\n";
+  SettingsLab lab(blade(slow));
+  EXPECT_EQ(lab.wait(lab.send(api::Configure{
+                         .kind = api::Configure::Kind::kChange,
+                         .changes = {{"m01", "max_speed", "none"}, {"m01", "local", "true"}}}))
+                .result,
+            "done");
+  lab.restart(blade(slow));
+  EXPECT_THAT(lab.show("m01"), IsSupersetOf({"m01 local = true, in the file false",
+                                             "m01 max_speed = none, in the file 0.25"}));
+  const std::string local = "offset = 10\nlocal = true\n";
+  SettingsLab other(blade(local));
+  EXPECT_EQ(other
+                .wait(other.send(api::Configure{
+                    .kind = api::Configure::Kind::kChange,
+                    .changes = {{"m01", "local", "false"}, {"m01", "max_speed", "0.25"}}}))
+                .result,
+            "done");
+  other.restart(blade(local));
+  EXPECT_THAT(other.show("m01"), IsSupersetOf({"m01 local = false, in the file true",
+                                               "m01 max_speed = 0.25, in the file none"}));
+}
+
 // m01 has local inputs.
 void hold_forward(Lab& lab, bool held) {
   lab.bus(0).mcu(0).set_inputs({0, static_cast<std::uint8_t>(held ? BUSHD_INPUT_FORWARD : 0)});

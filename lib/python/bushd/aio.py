@@ -454,6 +454,7 @@ class Client:
         keypad: bool | object = KEEP,
         velocity: tuple[int, int, int] | None | object = KEEP,
         currents: tuple[int | str, ...] | None | object = KEEP,
+        max_speed: float | None | object = KEEP,
     ) -> model.Configuration:
         given = {
             "offset": offset,
@@ -464,6 +465,7 @@ class Client:
             "keypad": keypad,
             "velocity": velocity,
             "currents": currents,
+            "max_speed": max_speed,
         }
         changes = {key: value for key, value in given.items() if value is not KEEP}
         if changes and name is None:

@@ -522,6 +522,7 @@ class Client:
         keypad: bool | object = KEEP,
         velocity: tuple[int, int, int] | None | object = KEEP,
         currents: tuple[int | str, ...] | None | object = KEEP,
+        max_speed: float | None | object = KEEP,
     ) -> model.Configuration:
         """Shows the settings of this motor (or of all), or changes those that are written, of a motor at rest.
 
@@ -530,6 +531,7 @@ class Client:
             client.config("theta", local=True, keypad=False)    # who at its MCU moves it
             client.config("theta", velocity=(100, 1500, 500))   # least and full speed in steps/s, steps/s^2
             client.config("theta", currents=(1500, 1000, 300, "fast"))   # ramp, cruise, hold in mA, decay
+            client.config("theta", max_speed=2.5)               # above 0, in units a second; None: as fast as its table
 
         They are kept until the key in bushd.toml is edited. Returns what holds now, and what the file says.
         """
@@ -544,6 +546,7 @@ class Client:
                 keypad=keypad,
                 velocity=velocity,
                 currents=currents,
+                max_speed=max_speed,
             )
         )
 
