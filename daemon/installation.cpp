@@ -299,6 +299,30 @@ motion::Axis Installation::new_axis(MotorId id) const {
   return {table_of(id)->view(), bus.tick_ns(), bus.format};
 }
 
+Result<void> Installation::has_table(MotorId id, const Tables& tables, const Drives& drives) const {
+  const auto table = gentler_.of(tables[config_[id].group], drives[id].acceleration);
+  if (table) return {};
+  return fail(motors_[id].name() + ": acceleration: " + table.error().message);
+}
+
+// Host and MCU ask here, so they have the same one in any case.
+tables::TablePtr Installation::table_of(MotorId id, const Tables& tables,
+                                        const Drives& drives) const {
+  const tables::TablePtr& of_group = tables[config_[id].group];
+  return gentler_.of(of_group, drives[id].acceleration).value_or(of_group);
+}
+
+link::McuSetup Installation::setup_of(McuId mcu, const Tables& tables, const Drives& drives) const {
+  return daemon::setup_of(
+      config_, mcu, [&](MotorId id) { return table_of(id, tables, drives); }, drives);
+}
+
+void Installation::put(MotorId id, const config::Drive& drive) {
+  const bool other_table = drives_[id].acceleration != drive.acceleration;
+  drives_[id] = drive;
+  if (other_table) motors_[id].set_axis(new_axis(id));
+}
+
 void Installation::put_in_service(GroupId group, tables::TablePtr table) {
   tables_[group] = std::move(table);
   for (const MotorId id : motors_.ids()) {

@@ -21,6 +21,7 @@
 #include "daemon/mcu_setup.h"
 #include "link/bus_master.h"
 #include "motion/motor.h"
+#include "tables/gentler.h"
 
 namespace bushd::daemon {
 
@@ -201,10 +202,13 @@ class Installation {
   const config::Config& config() const { return config_; }
   // Currents and velocities as they are now. What is put has yet to be told to the MCU.
   const Drives& drives() const { return drives_; }
-  void put(MotorId motor, const config::Drive& drive) { drives_[motor] = drive; }
-  link::McuSetup setup_of(McuId mcu) const {
-    return daemon::setup_of(config_, mcu, tables_, drives_);
-  }
+  // Precondition: the motor has no plan; has_table().
+  void put(MotorId motor, const config::Drive& drive);
+  link::McuSetup setup_of(McuId mcu) const { return setup_of(mcu, tables_, drives_); }
+  // Precondition: has_table() of its motors.
+  link::McuSetup setup_of(McuId mcu, const Tables& tables, const Drives& drives) const;
+  // Whether the motor could go by its share of this table.
+  Result<void> has_table(MotorId motor, const Tables& tables, const Drives& drives) const;
 
   Bus& operator[](BusId id) { return *buses_[id]; }
   const Bus& operator[](BusId id) const { return *buses_[id]; }
@@ -247,7 +251,8 @@ class Installation {
   std::string not_online(const std::vector<MotorId>& motors) const;
 
   const Tables& tables() const { return tables_; }
-  const tables::TablePtr& table_of(MotorId id) const { return tables_[config_[id].group]; }
+  // By which it goes: that of its group, or its share of that. Lives as long as this.
+  tables::TablePtr table_of(MotorId id) const { return table_of(id, tables_, drives_); }
   // Precondition: none of the group's motors has a plan. MCUs are set up by the caller.
   void put_in_service(GroupId group, tables::TablePtr table);
   motion::Axis new_axis(MotorId id) const;
@@ -257,6 +262,7 @@ class Installation {
   bool shutting_down = false;  // nothing new is begun
 
  private:
+  tables::TablePtr table_of(MotorId id, const Tables& tables, const Drives& drives) const;
   void add_buses(std::uint16_t master);
   void add_mcus();
   void add_motors();
@@ -264,6 +270,7 @@ class Installation {
   const config::Config& config_;
   Drives drives_;
   Tables tables_;  // in service
+  mutable tables::Gentler gentler_;
   ById<BusId, std::unique_ptr<Bus>> buses_;
   ById<McuId, Mcu> mcus_;
   ById<MotorId, motion::Motor> motors_;

@@ -64,7 +64,7 @@ void add_table(link::McuSetup& setup, Output output, const tables::Table& table)
 
 }  // namespace
 
-link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& tables,
+link::McuSetup setup_of(const config::Config& config, McuId id, const TableOf& table_of,
                         const Drives& drives) {
   const config::Mcu& mcu = config[id];
   link::McuSetup setup{.address = mcu.address, .tables = {}};
@@ -77,8 +77,11 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
   for (const config::Motor& motor : config.motors) {
     if (motor.mcu == id) motors.push_back(&motor);
   }
+  const auto id_of = [&config](const config::Motor* motor) {
+    return MotorId{static_cast<std::size_t>(motor - config.motors.data())};
+  };
   const auto drive_of = [&](const config::Motor* motor) -> const config::Drive& {
-    return drives[{static_cast<std::size_t>(motor - config.motors.data())}];
+    return drives[id_of(motor)];
   };
   // Slots are given in the order of outputs.
   std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
@@ -101,7 +104,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const Tables& ta
                                   .most = its.max_steps_per_s * kVelocityUnits,
                                   .acceleration = its.steps_per_s2});
     }
-    add_table(setup, motor->output, *tables[motor->group]);
+    add_table(setup, motor->output, *table_of(id_of(motor)));
   }
   return setup;
 }

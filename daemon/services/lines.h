@@ -127,7 +127,7 @@ class Lines final : public Service {
   Result<void> may_be_one_line(const std::vector<MotorId>& motors) const;
   Result<void> on_one_bus(const std::vector<MotorId>& motors) const;
   Result<std::vector<Point>> points_of(const Line& line, const api::MoveLine& request) const;
-  const tables::TablePtr& table_of(const Line& line, std::size_t motor) const;
+  tables::TablePtr table_of(const Line& line, std::size_t motor) const;
   bushd_delay floor_on(const Line& line, std::size_t motor, bushd_delay floor) const;
   motion::Way lay(const Line& line, const std::vector<std::int64_t>& from, const Point& to) const;
   Result<void> fits_duration(Line& line, std::optional<double> duration_s) const;

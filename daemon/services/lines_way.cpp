@@ -122,7 +122,7 @@ Result<std::vector<Lines::Point>> Lines::points_of(const Line& line,
   return std::vector<Point>{std::move(to), std::move(back), std::move(again)};
 }
 
-const tables::TablePtr& Lines::table_of(const Line& line, std::size_t motor) const {
+tables::TablePtr Lines::table_of(const Line& line, std::size_t motor) const {
   return line.by ? line.by : installation_.table_of(line.motors[motor]);
 }
 

@@ -77,11 +77,12 @@ Result<MotorSettings::Plan> MotorSettings::plan_of(
     if (!key) {
       std::vector<std::string_view> known;
       for (const config::SettingKey each : config::kSettingKeys) known.push_back(name_of(each));
-      return fail(
-          name + ": \"" + word + "\" cannot be changed in operation" + did_you_mean(word, known) +
-          "; allowed: offset, direction, soft_limits, "
-          "input_active, local, keypad, velocity, currents, max_speed. Edit bushd.toml and restart "
-          "bushd for other keys");
+      return fail(name + ": \"" + word + "\" cannot be changed in operation" +
+                  did_you_mean(word, known) +
+                  "; allowed: offset, direction, soft_limits, "
+                  "input_active, local, keypad, velocity, currents, max_speed, acceleration. Edit "
+                  "bushd.toml and restart "
+                  "bushd for other keys");
     }
     auto at = static_cast<std::size_t>(std::ranges::find(plan.motors, *id) - plan.motors.begin());
     if (at == plan.motors.size()) {
@@ -120,8 +121,18 @@ Result<void> MotorSettings::mcu_takes(const Plan& plan, MotorId id) const {
     return fail("a motor of MCU " + mcu.name() + " moves; what it does by itself can be " +
                 "changed when all of them are at rest");
   }
-  return mcu.has_room(
-      daemon::setup_of(installation_.config(), mcu.id, installation_.tables(), drives));
+  const bool other_table = drives[id].acceleration != installation_.drives()[id].acceleration;
+  if (other_table && mcu.view().phase == link::McuPhase::kConnecting) {
+    return fail("MCU " + mcu.name() + " is being set up; wait until it is ready");
+  }
+  if (auto good = installation_.has_table(id, installation_.tables(), drives); !good) return good;
+  const link::McuSetup setup = installation_.setup_of(mcu.id, installation_.tables(), drives);
+  if (setup.tables.size() > BUSHD_TABLE_SLOTS) {
+    return fail("MCU " + mcu.name() + " would need " + std::to_string(setup.tables.size()) +
+                " different tables; allowed: " + std::to_string(BUSHD_TABLE_SLOTS) +
+                ". Give its motors the same `acceleration`, or the same table");
+  }
+  return mcu.has_room(setup);
 }
 
 void MotorSettings::change(const api::Asker& asker, const api::Configure& request) {
@@ -241,7 +252,13 @@ void MotorSettings::take_kept(MotorId id, SettingKey key, const state::Setting& 
     return;
   }
   if (kept.value == in_file) return;
-  const auto settings = config::with(settings_of(id), key, kept.value);
+  auto settings = config::with(settings_of(id), key, kept.value);
+  if (settings) {
+    Drives drives = installation_.drives();
+    drives[id] = settings->drive;
+    const auto good = installation_.has_table(id, installation_.tables(), drives);
+    if (!good) settings = fail(good.error());
+  }
   if (!settings) {
     outputs_.log(LogLevel::kWarning, id,
                  motor.name() + ": what was set in operation is not possible any more: " +

@@ -195,6 +195,7 @@ Result<void> TablesInService::fits(const Tables& tables, GroupId group,
   std::set<McuId> mcus;
   for (const MotorId id : installation_.motors()) {
     if (installation_.config()[id].group != group) continue;
+    if (auto good = installation_.has_table(id, tables, installation_.drives()); !good) return good;
     const Mcu& mcu = installation_.mcu_of(id);
     if (!mcus.insert(mcu.id).second) continue;
     const std::uint32_t tick_ns = installation_.bus_of(mcu).config.tick_ns();
@@ -203,8 +204,7 @@ Result<void> TablesInService::fits(const Tables& tables, GroupId group,
           review != nullptr ? review->by_tick_ns.at(tick_ns) : check_by_tick(table, tick_ns);
       if (!good) return good;
     }
-    const link::McuSetup setup =
-        setup_of(installation_.config(), mcu.id, tables, installation_.drives());
+    const link::McuSetup setup = installation_.setup_of(mcu.id, tables, installation_.drives());
     if (setup.tables.size() > BUSHD_TABLE_SLOTS) {
       return fail("MCU " + mcu.name() + " would need " + std::to_string(setup.tables.size()) +
                   " different tables; allowed: " + std::to_string(BUSHD_TABLE_SLOTS));

@@ -12,6 +12,7 @@
 #include "engine/run.h"
 #include "engine/slots.h"
 #include "fieldbus/line_budget.h"
+#include "tables/gentler.h"
 
 namespace bushd::config {
 namespace {
@@ -180,16 +181,20 @@ Result<void> check_board_speed(const Loading& loading, std::size_t index) {
 
 Result<void> check_table_slots(const Loading& loading) {
   const Config& config = loading.config;
+  tables::Gentler gentler;
   std::vector<std::set<const tables::Table*>> used(config.mcus.size());
   for (std::size_t i = 0; i < config.motors.size(); ++i) {
     const Motor& motor = config.motors[i];
     std::set<const tables::Table*>& of_mcu = used[motor.mcu.value];
-    of_mcu.insert(&config.table_of(motor));
+    const auto table = gentler.of(config.group_of(motor).table, motor.drive.acceleration);
+    if (!table) return fail(loading.motors[i].error("acceleration", table.error().message));
+    of_mcu.insert(table->get());
     if (of_mcu.size() <= BUSHD_TABLE_SLOTS) continue;
     return fail(loading.motors[i].error(
         "group",
         fmt::format("is one table too many for MCU \"{}\"; allowed: {} different tables among its "
-                    "motors. Let groups share a table or move the motor to another MCU",
+                    "motors. Let groups share a table (and `acceleration`) or move the motor to "
+                    "another MCU",
                     config.mcu_of(motor).id, BUSHD_TABLE_SLOTS)));
   }
   return {};

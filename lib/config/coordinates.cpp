@@ -141,6 +141,16 @@ Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
   return speed;
 }
 
+Result<double> read_acceleration(const TomlReader& reader) {
+  constexpr std::string_view kKey = "acceleration";
+  const auto share = reader.number(kKey, "a number above 0 and at most 1");
+  if (!share) return share;
+  if (const auto good = check_acceleration_share(*share); !good) {
+    return fail(reader.error(kKey, good.error().message));
+  }
+  return share;
+}
+
 Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
   if (reader.has("backlash")) {
     const auto backlash = reader.number("backlash", "a number; 0 is none");
@@ -197,6 +207,11 @@ Result<void> read_coordinates(const TomlReader& reader, Motor* motor) {
     const auto speed = read_max_speed(reader, *motor);
     if (!speed) return fail(speed.error());
     motor->max_speed = *speed;
+  }
+  if (reader.has("acceleration")) {
+    const auto share = read_acceleration(reader);
+    if (!share) return fail(share.error());
+    motor->drive.acceleration = *share;
   }
   if (auto read = read_backlash(reader, motor); !read) return read;
   if (!reader.has("soft_limits")) return {};

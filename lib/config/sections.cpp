@@ -365,7 +365,8 @@ Result<void> read_motors(Loading* loading) {
                                   "backlash",     "backlash_speed",
                                   "settle_ms",    "currents",
                                   "velocity",     "keypad",
-                                  "step_active",  "direction_active"});
+                                  "step_active",  "direction_active",
+                                  "acceleration"});
         !known) {
       return known;
     }

@@ -21,7 +21,7 @@ constexpr std::string_view kNone = "none";
 // In the order of the enumeration.
 constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {
     "offset", "direction", "soft_limits", "input_active", "local",
-    "keypad", "velocity",  "currents",    "max_speed"};
+    "keypad", "velocity",  "currents",    "max_speed",    "acceleration"};
 constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
     "a number of user units",
     "negative, positive",
@@ -32,7 +32,8 @@ constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
     "MIN,MAX,ACCELERATION, whole numbers of 1..40000 steps/s, MIN to 40000 steps/s and 1..8388607 "
     "steps/s^2, or none",
     "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or none",
-    "a number above 0, of units per second (of steps per second without a unit), or none"};
+    "a number above 0, of units per second (of steps per second without a unit), or none",
+    "a number above 0 and at most 1, of the acceleration of its table"};
 // What an inline table of these keys has, in order.
 constexpr std::array<std::string_view, 3> kVelocityNames = {"min_steps_per_s", "max_steps_per_s",
                                                             "steps_per_s2"};
@@ -220,6 +221,13 @@ Result<Settings> with_max_speed(Settings settings, std::string_view text) {
   return settings;
 }
 
+Result<Settings> with_acceleration(Settings settings, std::string_view text) {
+  const auto share = number_of(text);
+  if (!share || !check_acceleration_share(*share)) return refuse(SettingKey::kAcceleration, text);
+  settings.drive.acceleration = *share;
+  return settings;
+}
+
 std::string_view why_not(SettingKey key) {
   switch (key) {
     case SettingKey::kVelocity:
@@ -272,6 +280,7 @@ bool applies(const Settings& settings, SettingKey key) {
   switch (key) {
     case SettingKey::kSoftLimits:
     case SettingKey::kMaxSpeed:
+    case SettingKey::kAcceleration:
       return true;
     case SettingKey::kInputActive:
       return settings.has_one_input;
@@ -292,6 +301,7 @@ bool is_reported(const Settings& settings, SettingKey key) {
   if (key == SettingKey::kLocal) return settings.drive.local;
   if (key == SettingKey::kKeypad) return settings.drive.keypad;
   if (key == SettingKey::kMaxSpeed) return settings.max_speed.has_value();
+  if (key == SettingKey::kAcceleration) return settings.drive.acceleration != 1;
   return applies(settings, key);
 }
 
@@ -312,6 +322,8 @@ std::string text_of(const Settings& settings, SettingKey key) {
       return text_of(settings.drive.velocity);
     case SettingKey::kCurrents:
       return text_of(settings.drive.currents);
+    case SettingKey::kAcceleration:
+      return fmt::format("{}", settings.drive.acceleration);
     case SettingKey::kMaxSpeed:
       return settings.max_speed ? fmt::format("{}", *settings.max_speed) : std::string(kNone);
     case SettingKey::kSoftLimits:
@@ -337,6 +349,7 @@ Result<Settings> with(Settings settings, SettingKey key, std::string_view text) 
   if (key == SettingKey::kVelocity) return with_velocity(std::move(settings), text);
   if (key == SettingKey::kCurrents) return with_currents(std::move(settings), text);
   if (key == SettingKey::kMaxSpeed) return with_max_speed(std::move(settings), text);
+  if (key == SettingKey::kAcceleration) return with_acceleration(std::move(settings), text);
   units::Scale scale = settings.coordinates.scale();
   if (key == SettingKey::kDirection) {
     const std::string_view word = trimmed(text);
@@ -358,6 +371,11 @@ Result<void> check_soft_limits(const units::Coordinates& coordinates,
   if (coordinates.first_step_from(limits.low) <= coordinates.last_step_to(limits.high)) return {};
   return fail(fmt::format("has no step from {} to {}; allowed: [lowest, highest] dial position",
                           limits.low, limits.high));
+}
+
+Result<void> check_acceleration_share(double share) {
+  if (share > 0 && share <= 1) return {};
+  return fail(fmt::format("is {}; allowed: a number above 0 and at most 1", share));
 }
 
 Result<void> check_user_speed(const units::Coordinates& coordinates, double speed) {

@@ -23,14 +23,16 @@ enum class SettingKey {
   kKeypad,
   kVelocity,
   kCurrents,
-  kMaxSpeed
+  kMaxSpeed,
+  kAcceleration
 };
 // In the order in which they may be taken: a velocity is of a motor that people move. What goes
 // before all others is said by goes_first().
-inline constexpr std::array kSettingKeys = {
-    SettingKey::kOffset,      SettingKey::kDirection, SettingKey::kSoftLimits,
-    SettingKey::kInputActive, SettingKey::kLocal,     SettingKey::kKeypad,
-    SettingKey::kVelocity,    SettingKey::kCurrents,  SettingKey::kMaxSpeed};
+inline constexpr std::array kSettingKeys = {SettingKey::kOffset,     SettingKey::kDirection,
+                                            SettingKey::kSoftLimits, SettingKey::kInputActive,
+                                            SettingKey::kLocal,      SettingKey::kKeypad,
+                                            SettingKey::kVelocity,   SettingKey::kCurrents,
+                                            SettingKey::kMaxSpeed,   SettingKey::kAcceleration};
 
 // By SettingKey.
 using WrittenKeys = std::bitset<kSettingKeys.size()>;
@@ -63,11 +65,12 @@ Settings settings_of(const Motor& motor, const Mcu& mcu);  // as bushd.toml has 
 // local inputs or a keypad, currents need a motor that is driven by phases.
 bool applies(const Settings& settings, SettingKey key);
 // Whether it is listed when all settings are asked for. The defaults of `local`, `keypad`,
-// `input_active` and `max_speed` are not.
+// `input_active`, `max_speed` and `acceleration` are not.
 bool is_reported(const Settings& settings, SettingKey key);
 
 // "12.5"; "negative"; "[-5, 30]" or "none"; "true" or "false"; velocity and currents as an inline
-// table of TOML, or "none"; max_speed "2.5" or "none". The same value has one text.
+// table of TOML, or "none"; max_speed "2.5" or "none"; acceleration "0.5". The same value has one
+// text.
 std::string text_of(const Settings& settings, SettingKey key);
 
 // "offset = 12.5"; "" if it was left out.
@@ -83,6 +86,8 @@ Result<Settings> with(Settings settings, SettingKey key, std::string_view text);
 Result<void> check_soft_limits(const units::Coordinates& coordinates,
                                const units::SoftLimits& limits);
 
+// Error: no share of a table's acceleration: above 0 and at most 1. Without key.
+Result<void> check_acceleration_share(double share);
 // Error: no speed above 0, or slower than a step an hour. Without key; in user units/s.
 Result<void> check_user_speed(const units::Coordinates& coordinates, double speed);
 

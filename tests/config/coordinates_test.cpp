@@ -88,6 +88,9 @@ TEST(ConfigCoordinates, WhatCannotBeIsRefusedWithItsLineAndKey) {
            {unit + "offset = inf\n", "motor[1].offset: is the floating-point number inf"},
            {unit + "direction = \"up\"\n", "motor[1].direction: is \"up\"; allowed: \"negative\""},
            {unit + "precision = 13\n", "motor[1].precision: is 13; allowed: a whole number 0..12"},
+           {"acceleration = 1.5\n",
+            "37:16: motor[1].acceleration: is 1.5; allowed: a number above 0 and at most 1"},
+           {"acceleration = 1e-6\n", "codes; allowed: 16384. Use a greater share"},
            {"max_speed = 1e-9\n",
             "37:13: motor[1].max_speed: 1e-09 steps/s would take 1e+09 s a step; "
             "allowed: up to an hour a step"},

@@ -72,6 +72,7 @@ TEST(Edit, AGreatestSpeedIsANumberOrHasNoKey) {
   expect("max_speed = 5 # mm/s\n", {{"theta", kMaxSpeed, "2.50"}}, "max_speed = 2.5 # mm/s\n");
   expect("", {{"theta", kMaxSpeed, "2"}}, "max_speed = 2\n");
   expect("max_speed = 5\n", {{"theta", kMaxSpeed, "none"}}, "");
+  expect("", {{"theta", SettingKey::kAcceleration, "0.5"}}, "acceleration = 0.5\n");
   // A motor has one of the two, whatever it had.
   expect("max_speed = 5\n", {{"theta", SettingKey::kLocal, "true"}, {"theta", kMaxSpeed, "none"}},
          "local = true\n");

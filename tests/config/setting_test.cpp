@@ -129,6 +129,19 @@ TEST(Setting, AGreatestSpeedIsANumberAboveZeroOfAMotorThatPeopleDoNotMove) {
   EXPECT_FALSE(goes_first(key, "2"));
 }
 
+TEST(Setting, AnAccelerationIsAShareOfThatOfTheTable) {
+  const auto key = SettingKey::kAcceleration;
+  EXPECT_TRUE(applies(Settings{}, key));
+  EXPECT_EQ(text_of(blade(), key), "1");
+  EXPECT_FALSE(is_reported(blade(), key));
+  const Settings half = with(blade(), key, " 0.50").value();
+  EXPECT_EQ(text_of(half, key), "0.5");
+  EXPECT_TRUE(is_reported(half, key));
+  for (const char* text : {"", "0", "-1", "1.001", "nan", "none", "50 %"}) {
+    EXPECT_THAT(with(half, key, text).error().message, HasSubstr("above 0 and at most 1")) << text;
+  }
+}
+
 TEST(Setting, AnyTextOfVelocityAndCurrentsIsTakenWholeOrRefused) {
   for (const char* text : {"", "{}", "{", "100", "100,1500", "100,1500,500,1", "0,1500,500",
                            "200,100,500", "1,40001,5", "1,2,0", "1,2,8388608", "1.5,2,3", "1,,3",

@@ -191,6 +191,8 @@ class Arguments(unittest.TestCase):
         self.assertEqual(requests.change_configuration("m", {"soft_limits": None}).message.change_values, ["none"])
         message = requests.change_configuration("m", {"max_speed": 2.5}).message
         self.assertEqual((message.change_keys, message.change_values), (["max_speed"], ["2.5"]))
+        message = requests.change_configuration("m", {"acceleration": 0.5}).message
+        self.assertEqual((message.change_keys, message.change_values), (["acceleration"], ["0.5"]))
         message = requests.change_configuration("m", {"local": True, "keypad": False}).message
         self.assertEqual(message.change_values, ["true", "false"])
         changes = {"velocity": (100, 1500, 500), "currents": (1500, 1000, 300, "fast")}

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tables/gentler.h"
 #include "tables/random_table.h"
 
 namespace bushd::test {
@@ -265,6 +266,25 @@ TEST(TableEdit, ResampledSidesHaveTheNumberOfCodesAskedFor) {
     RC_ASSERT(made->accel.size() == count);
     if (made->decel) RC_ASSERT(made->decel->size() == count);
   }));
+}
+
+TEST(Gentler, IsTheTableOfScaledAccelerationMadeOnce) {
+  tables::Gentler gentler;
+  for (const TableContent& content : {constant_acceleration(20'000, 400), kUneven}) {
+    const auto table = tables::make(content).value();
+    EXPECT_EQ(gentler.of(table, 1).value(), table);
+    const auto half = gentler.of(table, 0.5).value();
+    EXPECT_EQ(gentler.of(table, 0.5).value(), half);
+    EXPECT_EQ(gentler.of(tables::make(content).value(), 0.5).value(), half)
+        << "of the same content";
+    EXPECT_NE(gentler.of(table, 0.25).value(), half);
+    EXPECT_EQ(half->content_hash(), content_hash(*scale_acceleration(content, 0.5)));
+    EXPECT_EQ(half->name(), "t");
+    EXPECT_EQ(half->path(), "");
+  }
+  const auto table = tables::make(constant_acceleration(20'000, 400)).value();
+  EXPECT_THAT(gentler.of(table, 0.001).error().text(),
+              HasSubstr("has 400000 codes; allowed: 16384. Use a greater share"));
 }
 
 }  // namespace

@@ -455,6 +455,7 @@ class Client:
         velocity: tuple[int, int, int] | None | object = KEEP,
         currents: tuple[int | str, ...] | None | object = KEEP,
         max_speed: float | None | object = KEEP,
+        acceleration: float | object = KEEP,
     ) -> model.Configuration:
         given = {
             "offset": offset,
@@ -466,6 +467,7 @@ class Client:
             "velocity": velocity,
             "currents": currents,
             "max_speed": max_speed,
+            "acceleration": acceleration,
         }
         changes = {key: value for key, value in given.items() if value is not KEEP}
         if changes and name is None:

@@ -523,6 +523,7 @@ class Client:
         velocity: tuple[int, int, int] | None | object = KEEP,
         currents: tuple[int | str, ...] | None | object = KEEP,
         max_speed: float | None | object = KEEP,
+        acceleration: float | object = KEEP,
     ) -> model.Configuration:
         """Shows the settings of this motor (or of all), or changes those that are written, of a motor at rest.
 
@@ -532,6 +533,7 @@ class Client:
             client.config("theta", velocity=(100, 1500, 500))   # least and full speed in steps/s, steps/s^2
             client.config("theta", currents=(1500, 1000, 300, "fast"))   # ramp, cruise, hold in mA, decay
             client.config("theta", max_speed=2.5)               # above 0, in units a second; None: as fast as its table
+            client.config("theta", acceleration=0.5)            # of that of its table, above 0 and at most 1
 
         They are kept until the key in bushd.toml is edited. Returns what holds now, and what the file says.
         """
@@ -547,6 +549,7 @@ class Client:
                 velocity=velocity,
                 currents=currents,
                 max_speed=max_speed,
+                acceleration=acceleration,
             )
         )
 

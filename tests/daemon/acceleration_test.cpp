@@ -1,0 +1,95 @@
+// Motors that take a share of their table's acceleration: host and MCU go by the same codes, on
+// every way, judged by tools/check-trace edge by edge.
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+#include "daemon/traced.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::HasSubstr;
+
+class Acceleration : public Traced<const char*> {
+ protected:
+  int judge(Lab& lab) {
+    lab.run_for(0.1);
+    EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+    return Traced::check(lab, "");
+  }
+  static Answer change(Lab& lab, const std::string& motor, const std::string& value) {
+    return lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kChange,
+                                            .changes = {{motor, "acceleration", value}}}));
+  }
+  // A move of so many steps, in seconds.
+  static double seconds(Lab& lab, const std::string& motor, std::int64_t steps) {
+    const std::int64_t before_us = lab.now_us();
+    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {motor}, {steps})).result, "reached");
+    return static_cast<double>(lab.now_us() - before_us) * 1e-6;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Manners, Acceleration,
+                         testing::Values("fine", "coarse", "fine_table", "coarse_table",
+                                         "fine_ticks"),
+                         [](const auto& manner) { return std::string(manner.param); });
+
+TEST_P(Acceleration, IsThatOfHostAndMcuFromTheChangeOn) {
+  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
+  lab.connect();
+  const std::string hash = lab.description("m01").table.hash;
+  const double whole_s = seconds(lab, "m01", 400);
+  EXPECT_EQ(change(lab, "m01", "0.25").result, "done");
+  EXPECT_NE(lab.description("m01").table.hash, hash);
+  EXPECT_EQ(lab.description("m02").table.hash, hash);
+  // Of ramps alone: a quarter of the acceleration takes twice as long.
+  const double quarter_s = seconds(lab, "m01", -400);
+  EXPECT_NEAR(quarter_s - 0.05, 2 * (whole_s - 0.05), 0.3 * whole_s);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {300, 300})).result, "reached");
+  api::MoveLine line{.motors = motor_steps({"m01", "m02", "m03"}, {700, -400, 150})};
+  EXPECT_EQ(lab.wait(lab.send(line)).result, "reached");
+  // A stop ramps down as gently.
+  const auto stopped = lab.send(Ask::kMoveBy, {"m01"}, {3000});
+  lab.run_for(0.6);
+  lab.send(Ask::kStop, {"m01"});
+  EXPECT_EQ(lab.wait(stopped).result, "stopped");
+  EXPECT_EQ(change(lab, "m01", "1").result, "done");
+  EXPECT_EQ(lab.description("m01").table.hash, hash);
+  EXPECT_NEAR(seconds(lab, "m01", 400), whole_s, 0.05);
+  for (const char* motor : {"m01", "m02", "m03"}) {
+    EXPECT_EQ(lab.motor(motor).position_steps, lab.shaft_steps(motor)) << motor;
+  }
+  EXPECT_EQ(judge(lab), 0) << said();
+}
+
+TEST(AccelerationSetting, IsKeptAndCountsWithAnotherTable) {
+  Lab lab(hall(1, 2));
+  lab.keep_positions();
+  lab.connect();
+  const auto change = [&lab](const std::string& motor, const std::string& value) {
+    return lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kChange,
+                                            .changes = {{motor, "acceleration", value}}}));
+  };
+  const std::string whole = lab.description("m01").table.hash;
+  const Answer too_gentle = change("m01", "0.001");
+  EXPECT_EQ(too_gentle.result, "refused");
+  EXPECT_THAT(too_gentle.reason, HasSubstr("m01: acceleration: with 0.001 of its acceleration"));
+  const auto move = lab.send(Ask::kMoveBy, {"m02"}, {1000});
+  lab.run_for(0.3);
+  EXPECT_THAT(change("m01", "0.5").reason, HasSubstr("a motor of MCU hall:1 moves"));
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(change("m01", "0.5").result, "done");
+  const std::string half = lab.description("m01").table.hash;
+  EXPECT_NE(half, whole);
+  lab.cut_pc_power();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 20));
+  EXPECT_EQ(lab.description("m01").table.hash, half) << "the state store has kept it";
+  EXPECT_EQ(lab.wait(lab.use("axes", "bushd2-scurve")).result, "done");
+  EXPECT_NE(lab.description("m01").table.hash, lab.description("m02").table.hash);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {500, -500})).result, "reached");
+  EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+}
+
+}  // namespace
+}  // namespace bushd::test
