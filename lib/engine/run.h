@@ -32,8 +32,8 @@ extern "C" {
 #define BUSHD_RUN_BRAKES 1
 #endif
 
-// Plain state, copyable: a copy taken at some tick replays the same ticks. Private to run.c but for
-// the fields named here: `direction` (+1 / -1), `steps_done`.
+// Plain state, copyable: a copy taken at some tick replays the same ticks. Private to run*.c but
+// for the fields named here: `direction` (+1 / -1), `steps_done`.
 typedef struct bushd_run {
   const bushd_table* table;
 #if BUSHD_RUN_COUNTS
@@ -55,26 +55,6 @@ typedef struct bushd_run {
   uint8_t fraction;     // of the position at the end of the last fine tick, 1/256 step
   int8_t direction;
 } bushd_run;
-
-// For run.c, run_plan.c and run_slots.c. Where the decelerating side ends.
-static inline uint16_t bushd_run_decel_end(const bushd_run* run) {
-  return run->accel_at > run->accel_end ? (uint16_t)(run->accel_at - run->accel_end) : (uint16_t)0;
-}
-// Steps on it have been made; with the last one the run is done.
-static inline void bushd_run_set_decel(bushd_run* run, uint16_t left) {
-  run->decel_left = left;
-  if (left != bushd_run_decel_end(run)) return;
-  run->decel_left = 0;
-  run->accel_at = run->accel_end;
-}
-static inline void bushd_run_count(bushd_run* run, uint32_t steps) {
-#if BUSHD_RUN_COUNTS
-  run->steps_done += steps;
-#else
-  (void)run;
-  (void)steps;
-#endif
-}
 
 // A move of `steps` (>= 0) from rest; direction is +1 or -1. The first tick expanded is the one in
 // which the move starts at its beginning. O(log steps).

@@ -2,14 +2,7 @@
 
 #include <stdbool.h>
 
-static inline uint16_t brake_left(const bushd_run* run) {
-#if BUSHD_RUN_BRAKES
-  return run->brake_left;
-#else
-  (void)run;
-  return 0;
-#endif
-}
+#include "engine/run_parts.h"
 
 static uint64_t units_between(const bushd_ramp* ramp, uint32_t from, uint32_t to) {
 #if BUSHD_RAMP_INDEX
@@ -32,7 +25,7 @@ uint64_t bushd_run_units_of_last(const bushd_run* run, uint32_t steps) {
   const uint32_t end = bushd_run_decel_end(run);
   uint64_t units = units_between(&table->decel, end, end + take(&steps, run->decel_left - end));
   units += (uint64_t)take(&steps, run->cruise_left) * run->cruise;
-  const uint32_t braked = take(&steps, brake_left(run));
+  const uint32_t braked = take(&steps, bushd_run_brake_left(run));
   units += units_between(&table->decel, run->decel_left, run->decel_left + braked);
   const uint32_t rising =
       run->accel_at < run->accel_end ? (uint32_t)(run->accel_end - run->accel_at) : 0u;
@@ -42,7 +35,7 @@ uint64_t bushd_run_units_of_last(const bushd_run* run, uint32_t steps) {
 }
 
 void bushd_run_ramp_down_once(bushd_run* run) {
-  if (brake_left(run) == 0) {
+  if (bushd_run_brake_left(run) == 0) {
     const bool ramps_down = run->accel_at >= run->accel_end && run->cruise_left == 0;
     if (!ramps_down) bushd_run_ramp_down_after_step(run);
     if (ramps_down && run->accel_at == run->accel_end) bushd_run_leave_out_slow(run);

@@ -16,6 +16,7 @@
 // an 8-bit MCU divisions would not fit into a tick.
 #include "engine/run_slots.h"
 
+#include "engine/run_parts.h"
 #include "engine/slots.h"
 
 #if BUSHD_MAX_SLOTS <= 128

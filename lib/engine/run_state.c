@@ -1,5 +1,7 @@
 #include "engine/run_state.h"
 
+#include "engine/run_parts.h"
+
 // In cruise now and for `ticks` more: then the numbers of the other parts need not be told.
 static bool cruises(const bushd_run* run, uint32_t tick_ns, uint16_t ticks) {
   if (run->lead_delay != 0 || run->accel_at != run->accel_end || run->cruise_left == 0) {
