@@ -1,4 +1,5 @@
-"""How deep the stack of an image for Cortex-M can get, by its machine code, and that this much RAM is left for it.
+"""How deep the stack of an image for Cortex-M can get, by its machine code, that this much RAM is left for it, and that
+docs/firmware.md says so.
 
     cortex_m_stack_bound_test.py OBJDUMP IMAGE.elf...
 
@@ -12,6 +13,10 @@ import subprocess
 import sys
 from collections import namedtuple
 
+import page_figures
+
+RAM_BEGIN = 0x20000000
+RAM_SIZE = 64 * 1024
 SAVED_BY_CPU = 8 * 4 + 4  # and aligned
 CLOSING = {"b", "bx", "tbb", "tbh", "udf"}
 ASSEMBLER = {"reset", "emission_half_slot"}
@@ -171,6 +176,7 @@ def main(objdump, *paths):
         deepest = program + deepest_interrupt
         print(f"  stack up to {deepest} of {room} bytes")
         assert deepest <= room, "the stack may reach the variables"
+        page_figures.expect(path, objdump, image.symbols["bss_end"] - RAM_BEGIN, RAM_SIZE, deepest)
 
 
 if __name__ == "__main__":

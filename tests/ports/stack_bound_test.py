@@ -1,4 +1,5 @@
-"""How deep the stack of an image for AVR can get, by its machine code, and that this much RAM is left for it.
+"""How deep the stack of an image for AVR can get, by its machine code, and that this much RAM is left for it, and that
+docs/firmware.md says so.
 
     stack_bound_test.py CHIP OBJDUMP IMAGE.elf...
 
@@ -12,6 +13,8 @@ import re
 import subprocess
 import sys
 from collections import namedtuple
+
+import page_figures
 
 Chip = namedtuple("Chip", "ram_size return_address receiver")
 CHIPS = {"atmega2560": Chip(8192, 3, "__vector_25"), "atmega1284p": Chip(16384, 2, "__vector_20")}
@@ -189,6 +192,7 @@ def main(chip, objdump, *paths):
         deepest = bound(image)
         print(f"  stack up to {deepest}, variables {used}: {chip.ram_size - used - deepest} bytes of RAM are left")
         assert used + deepest <= chip.ram_size, "the stack may reach the variables"
+        page_figures.expect(path, objdump, used, chip.ram_size, deepest)
 
 
 if __name__ == "__main__":
