@@ -78,4 +78,12 @@ inline std::string replaced(std::string text, const std::string& from, const std
   return text.replace(at, from.size(), to);
 }
 
+// Lines in the first [[mcu]], "hall:1", and in the first [[motor]], "theta" at output 0 of that.
+inline std::string of_mcu(const std::string& keys, const std::string& text = kGood) {
+  return replaced(text, "address = 1\n", "address = 1\n" + keys);
+}
+inline std::string of_motor(const std::string& keys, const std::string& text = kGood) {
+  return replaced(text, "output = 0\n", "output = 0\n" + keys);
+}
+
 }  // namespace bushd::test

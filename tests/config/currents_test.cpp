@@ -12,15 +12,13 @@ namespace {
 
 using test::ConfigFile;
 using test::error_of;
-using test::kGood;
-using test::replaced;
+using test::of_mcu;
+using test::of_motor;
 using testing::HasSubstr;
 
 // Of "theta", on an MCU with this emission; on line 33.
 std::string with(const std::string& currents, const std::string& emission = "phases") {
-  const std::string mcu =
-      replaced(kGood, "address = 1\n", "address = 1\nemission = \"" + emission + "\"\n");
-  return replaced(mcu, "output = 0\n", "output = 0\ncurrents = " + currents + "\n");
+  return of_mcu("emission = \"" + emission + "\"\n", of_motor("currents = " + currents + "\n"));
 }
 
 TEST(Currents, AreReadOfAMotorWithPhases) {

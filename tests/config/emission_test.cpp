@@ -8,18 +8,13 @@ namespace bushd::config {
 namespace {
 
 using test::ConfigFile;
-using test::kGood;
+using test::of_mcu;
 using test::replaced;
 using testing::EndsWith;
 using testing::HasSubstr;
 
-// The first MCU with more keys, from line 19 on.
-std::string with_keys(const std::string& keys) {
-  return replaced(kGood, "address = 1\n", "address = 1\n" + keys);
-}
-
 bushd_emission settings_of(const std::string& keys) {
-  const auto config = ConfigFile(with_keys(keys)).load();
+  const auto config = ConfigFile(of_mcu(keys)).load();
   if (!config) {
     ADD_FAILURE() << config.error().text();
     return {};
@@ -66,31 +61,31 @@ TEST(EmissionKeys, EachModeHasItsKeys) {
 }
 
 TEST(EmissionKeys, WhatIsWrongIsNamedWithItsLine) {
-  EXPECT_THAT(emission_error(with_keys("emission = \"odd\"\n")),
+  EXPECT_THAT(emission_error(of_mcu("emission = \"odd\"\n")),
               EndsWith("19:12: mcu[0].emission: is \"odd\"; allowed: \"even\", \"burst\", "
                        "\"common-dir\", \"staggered\" or \"phases\""));
-  EXPECT_THAT(emission_error(with_keys("emission = \"burst\"\n")),
+  EXPECT_THAT(emission_error(of_mcu("emission = \"burst\"\n")),
               HasSubstr("16:1: mcu[0].step_us: is missing; allowed: a whole number 1..65535 us"));
-  EXPECT_THAT(emission_error(with_keys("pulse_us = 2.5\n")),
+  EXPECT_THAT(emission_error(of_mcu("pulse_us = 2.5\n")),
               HasSubstr("19:12: mcu[0].pulse_us: is the floating-point number 2.5; allowed: a "
                         "whole number 0..65535 us"));
-  EXPECT_THAT(emission_error(with_keys("emission = \"phases\"\nhold_current = 1\n")),
+  EXPECT_THAT(emission_error(of_mcu("emission = \"phases\"\nhold_current = 1\n")),
               HasSubstr("20:16: mcu[0].hold_current: is 1; allowed: true or false"));
-  EXPECT_THAT(emission_error(with_keys("emission = \"phases\"\nphase_sequence = \"four\"\n")),
+  EXPECT_THAT(emission_error(of_mcu("emission = \"phases\"\nphase_sequence = \"four\"\n")),
               HasSubstr("20:18: mcu[0].phase_sequence: is \"four\"; allowed: \"wave\", \"full\", "
                         "\"half\" or \"three-phase\""));
 }
 
 TEST(EmissionKeys, KeysThatSayNothingInThisModeAreRefused) {
   EXPECT_THAT(
-      emission_error(with_keys("step_us = 300\n")),
+      emission_error(of_mcu("step_us = 300\n")),
       HasSubstr("19:11: mcu[0].step_us: says nothing with emission = \"even\"; allowed: only "
                 "with \"burst\", \"common-dir\", \"staggered\""));
-  EXPECT_THAT(emission_error(with_keys("emission = \"burst\"\nstep_us = 9\nsettle_us = 5\n")),
+  EXPECT_THAT(emission_error(of_mcu("emission = \"burst\"\nstep_us = 9\nsettle_us = 5\n")),
               HasSubstr("mcu[0].settle_us: says nothing"));
-  EXPECT_THAT(emission_error(with_keys("emission = \"phases\"\npulse_us = 5\n")),
+  EXPECT_THAT(emission_error(of_mcu("emission = \"phases\"\npulse_us = 5\n")),
               HasSubstr("mcu[0].pulse_us: says nothing"));
-  EXPECT_THAT(emission_error(with_keys("hold_current = true\n")),
+  EXPECT_THAT(emission_error(of_mcu("hold_current = true\n")),
               HasSubstr("mcu[0].hold_current: says nothing"));
 }
 
@@ -98,14 +93,14 @@ TEST(EmissionKeys, StepPeriodMustHaveRoomForWhatTheTablesMake) {
   // The table makes up to seven steps in a tick.
   EXPECT_EQ(settings_of("emission = \"burst\"\nstep_us = 365\n").step_us, 365);
   EXPECT_THAT(
-      emission_error(with_keys("emission = \"burst\"\nstep_us = 366\n")),
+      emission_error(of_mcu("emission = \"burst\"\nstep_us = 366\n")),
       HasSubstr("20:11: mcu[0].step_us: is 366: room for 6 steps in the 2560 us tick of bus "
                 "\"hall\", but motor \"theta\" makes up to 7 by table \"bushd2-constant\"; "
                 "allowed: 365 or less. Or use a slower table"));
 }
 
 TEST(EmissionKeys, PhasesHaveFourOutputsAMotor) {
-  const std::string phases = with_keys("emission = \"phases\"\n");
+  const std::string phases = of_mcu("emission = \"phases\"\n");
   EXPECT_EQ(emission_error(replaced(phases, "output = 0\n", "output = 3\n")), "no error");
   EXPECT_THAT(
       emission_error(replaced(phases, "output = 0\n", "output = 4\n")),
@@ -117,9 +112,8 @@ TEST(EmissionKeys, PhasesHaveFourOutputsAMotor) {
 TEST(EmissionKeys, NoStepOfATableWaitsForDir) {
   EXPECT_EQ(settings_of("dir_setup_us = 2400\n").dir_setup_us, 2400);
   const auto with_first_delay = [](int us, int dir_setup_us) {
-    const ConfigFile file(
-        replaced(with_keys("dir_setup_us = " + std::to_string(dir_setup_us) + "\n"),
-                 "table = \"bushd2-constant\"", "table = \"fast\""));
+    const ConfigFile file(replaced(of_mcu("dir_setup_us = " + std::to_string(dir_setup_us) + "\n"),
+                                   "table = \"bushd2-constant\"", "table = \"fast\""));
     file.directory().write("fast.toml", "name = \"fast\"\ntime_unit_ns = 1000\naccel = [" +
                                             std::to_string(us) + ", 200]\n");
     const auto config = file.load();
@@ -138,22 +132,22 @@ TEST(EmissionKeys, NoStepOfATableWaitsForDir) {
 
 // What no MCU can do is found before one is asked.
 TEST(EmissionKeys, WhatNoMcuCanDoIsRefused) {
-  EXPECT_THAT(emission_error(with_keys("dir_setup_us = 65535\n")),
+  EXPECT_THAT(emission_error(of_mcu("dir_setup_us = 65535\n")),
               HasSubstr("19:16: mcu[0].dir_setup_us: is 65535 us; allowed: less than the length of "
                         "the 2560 us tick of bus \"hall\", 2520 us at most"));
-  EXPECT_THAT(emission_error(with_keys("dir_setup_us = 2560\n")), HasSubstr("is 2560 us"));
+  EXPECT_THAT(emission_error(of_mcu("dir_setup_us = 2560\n")), HasSubstr("is 2560 us"));
   EXPECT_EQ(settings_of("dir_setup_us = 2400\n").dir_setup_us, 2400);
   // Half a slot is 2520 / 256 us.
   EXPECT_THAT(
-      emission_error(with_keys("pulse_us = 10\n")),
+      emission_error(of_mcu("pulse_us = 10\n")),
       HasSubstr("mcu[0].pulse_us: is 10 us; allowed: half a slot of the 2560 us tick of bus "
                 "\"hall\", 9 us at most. Use a longer tick_us"));
   EXPECT_EQ(settings_of("pulse_us = 9\n").pulse_us, 9);
   EXPECT_THAT(
-      emission_error(with_keys("emission = \"common-dir\"\nstep_us = 300\ndir_setup_us = 10\n")),
+      emission_error(of_mcu("emission = \"common-dir\"\nstep_us = 300\ndir_setup_us = 10\n")),
       HasSubstr(
           "mcu[0].dir_setup_us: is 10 us; allowed: less than half a slot of the 2560 us tick"));
-  EXPECT_THAT(emission_error(with_keys("emission = \"burst\"\nstep_us = 2560\n")),
+  EXPECT_THAT(emission_error(of_mcu("emission = \"burst\"\nstep_us = 2560\n")),
               HasSubstr("mcu[0].step_us: is 2560"));
 }
 

@@ -10,17 +10,9 @@ namespace {
 using test::ConfigFile;
 using test::error_of;
 using test::kGood;
-using test::replaced;
+using test::of_mcu;
+using test::of_motor;
 using testing::HasSubstr;
-
-std::string of_mcu(const std::string& keys, const std::string& text = kGood) {
-  return replaced(text, "address = 1\n", "address = 1\n" + keys);
-}
-
-// The first motor, at output 0 of it.
-std::string of_motor(const std::string& keys, const std::string& text = kGood) {
-  return replaced(text, "output = 0\n", "output = 0\n" + keys);
-}
 
 bushd_set_outputs outputs_of(const std::string& text) {
   const auto config = ConfigFile(text).load();

@@ -12,14 +12,13 @@ namespace {
 
 using test::ConfigFile;
 using test::error_of;
-using test::kGood;
-using test::replaced;
+using test::of_motor;
 using testing::HasSubstr;
 
 // Of "theta".
 std::string with_velocity(const std::string& velocity,
                           const std::string& before = "local = true\n") {
-  return replaced(kGood, "output = 0\n", "output = 0\n" + before + "velocity = " + velocity + "\n");
+  return of_motor(before + "velocity = " + velocity + "\n");
 }
 
 TEST(Velocity, IsReadOfAMotorWithLocalInputs) {
