@@ -71,20 +71,24 @@ TEST_P(Matrix, EveryRequestIsAccountedFor) {
     lab.connect();
     lab.bring_to_rest();
   }
-  bool reached = false;
+  int rows = 0;
+  int rows_in_motion = 0;
   for (const Row& row : requests()) {
     if (random() % static_cast<unsigned>(share()) != 0) continue;
     SCOPED_TRACE(std::string(row.name) + " while: " + state.name);
     const std::int64_t before = lab.steps_of(state.motor);
     state.reach(lab);
-    reached = reached || !state.moves || lab.steps_of(state.motor) != before;
+    ++rows;
+    if (lab.steps_of(state.motor) != before) ++rows_in_motion;
     lab.ask(row.of(state.motor, state.other, random));
     stop_behind(lab);
     lab.run(0.8 + lab.below(1200) * 1e-3);
     lab.bring_to_rest();
     if (HasFailure()) return;
   }
-  EXPECT_TRUE(reached || share() > 1) << "it has never moved";
+  if (state.moves && share() == 1) {
+    EXPECT_GT(rows_in_motion, rows / 2) << "of " << rows << " rows it has moved in few";
+  }
 }
 
 TEST(MatrixRequests, AreAllThereAre) {

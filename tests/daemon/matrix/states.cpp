@@ -33,7 +33,9 @@ void load_shutter(WatchedLab& lab) {
   std::vector<std::uint32_t> bytes{20, 0, 100, 0};
   for (int i = 0; i < 20; ++i) bytes.insert(bytes.end(), {244, 1});
   for (const std::uint32_t byte : bytes) lab.cycle(7, 0, 16, byte);
-  lab.cycle(7, 2, 16, 0x77);
+  // To the farther switch: at the other one it stands, or is barred until it has moved away.
+  const std::uint32_t left = lab.steps_of("shutter") > kShutterWay / 2 ? 0x08 : 0;
+  lab.cycle(7, 2, 16, 0x77 | left);
   lab.cycle(7, 0, 26);
 }
 
@@ -239,7 +241,10 @@ const std::vector<State>& states() {
        }},
       {"meets a limit", "a", true, "d",
        [](WatchedLab& lab) {
-         // Once: it is barred until it has moved away again. So it is given time to move.
+         const std::int64_t from = lab.steps_of("a");
+         // Where it has met one before it is barred until it has moved away.
+         move(lab, {{"a", -60}});
+         lab.run_till([&] { return lab.steps_of("a") == from - 60 && lab.stands("a"); });
          move(lab, {{"a", 2500}});
          lab.run(0.4 + lab.below(500) * 1e-3);
          lab.hold_input(8, true);

@@ -23,7 +23,6 @@ constexpr std::int64_t kHomeAt = -150;
 constexpr unsigned kShutterRight = 5;
 constexpr unsigned kShutterLeft = 6;
 constexpr unsigned kShutterSensor = 7;
-constexpr std::int64_t kShutterWay = 20;
 
 }  // namespace
 

@@ -27,6 +27,7 @@ std::string installation(const std::string& manner);
 inline const std::vector<std::string> kMotors{"a", "b", "c", "program", "shutter", "d", "e"};
 inline const std::set<std::string> kLocal{"a"};
 inline const std::set<std::string> kKeypad{"c"};
+inline constexpr std::int64_t kShutterWay = 20;  // steps between its limit switches
 
 class WatchedLab : public Lab {
  public:
