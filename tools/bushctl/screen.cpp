@@ -4,9 +4,21 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 
 namespace bushctl {
+namespace {
+
+bool begins_character(char byte) {
+  return (static_cast<unsigned char>(byte) & 0xC0) != 0x80;  // of UTF-8
+}
+
+std::size_t characters_in(const std::string& line) {
+  return static_cast<std::size_t>(std::ranges::count_if(line, begins_character));
+}
+
+}  // namespace
 
 Screen::Screen() {
   fmt::print("\x1b[?1049h\x1b[?25l\x1b[?7l");
@@ -26,13 +38,26 @@ Screen::Size Screen::size() {
 
 void Screen::show(const std::vector<std::string>& lines) const {
   // Overwritten from the top, not cleared first: that would flicker.
-  const std::size_t rows = size().rows;
+  const Size room = size();
   std::string screen = "\x1b[H";
-  for (std::size_t i = 0; i < lines.size() && i < rows; ++i) {
-    screen += (i > 0 ? "\n" : "") + lines[i] + "\x1b[K";
+  for (std::size_t i = 0; i < lines.size() && i < room.rows; ++i) {
+    const std::string line = clipped(lines[i], room.columns);
+    screen += (i > 0 ? "\n" : "") + line;
+    // Behind a full line the cursor stands on its last character, and would take that away.
+    if (characters_in(line) < room.columns) screen += "\x1b[K";
   }
-  fmt::print("{}\x1b[J", screen);
+  if (lines.size() < room.rows) screen += "\n\x1b[J";
+  fmt::print("{}", screen);
   std::fflush(stdout);
+}
+
+std::string clipped(const std::string& line, std::size_t columns) {
+  if (characters_in(line) <= columns) return line;
+  std::size_t end = 0;
+  for (std::size_t characters = 0; characters < columns; ++end) {
+    if (begins_character(line[end])) ++characters;
+  }
+  return line.substr(0, end - 1) + ">";
 }
 
 std::vector<std::string> cut(std::vector<std::string> lines, std::size_t rows,

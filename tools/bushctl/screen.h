@@ -25,7 +25,7 @@ class Screen {
   };
   static Size size();
 
-  // From the top; those for which there is no room are not shown.
+  // From the top; those for which there is no room are not shown, and long ones are clipped.
   void show(const std::vector<std::string>& lines) const;
 
   // Keys that have been pressed since; nothing once the terminal is gone.
@@ -34,6 +34,9 @@ class Screen {
  private:
   RawTerminal terminal_;
 };
+
+// As much of a line of text as there are columns for, and that there is more: ">" in the last one.
+std::string clipped(const std::string& line, std::size_t columns);
 
 // For a screen of so many rows: these, as far as there is room, then that there are more and where
 // (`elsewhere`), and a last line.

@@ -133,13 +133,14 @@ void add_watch(CommandLine& line) {
   Command command = line.add("watch", "Show a live table; in a pipe: lines of what changes");
   command
       .footer(
-          "Motors that move come first, then those with which something is wrong, then the others; "
-          "above them stand MCUs that do not work. Keys: n and p, or Page Down and Page Up, turn "
-          "pages, g is the first one; o is the order of the configuration; / takes a filter: part "
-          "of the name of a motor, group or MCU, slit*, or @GROUP, up to Enter, and Esc drops it; "
-          "q "
-          "ends. When the daemon ends, watch waits until it is there again; in a pipe as long as "
-          "--timeout-s.")
+          "Motors that move come first, then those at a limit or at an MCU that does not work, "
+          "then "
+          "those whose position is not sure, then the others; above them stand MCUs that do not "
+          "work. A > at the end of a line: there is more than the terminal has room for. Keys: n "
+          "and p, or Page Down and Page Up, turn pages, g is the first one; o is the order of the "
+          "configuration; / takes a filter: part of the name of a motor, group or MCU, slit*, or "
+          "@GROUP, up to Enter, and Esc drops it; q ends. When the daemon ends, watch waits until "
+          "it is there again; in a pipe as long as --timeout-s.")
       .words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .number<std::uint32_t>("--count", &options->count, 1, kMany, "Exit after so many snapshots");
   add_timeout(command, &options->timeout_s).run([&line, options] {

@@ -77,12 +77,12 @@ struct WatchTable::Row {
   const api::StateSnapshot* mcu;
   bool of_mcu;
 
-  // What comes first.
+  // What comes first. On a bench without a state store all positions are uncertain: what does not
+  // work comes before those.
   int rank() const {
     if (motor->moving) return 0;
-    const bool well =
-        (!of_mcu || works(*mcu)) && motor->trust == api::Trust::kKnown && !motor->inhibited.any();
-    return well ? 2 : 1;
+    if ((of_mcu && !works(*mcu)) || motor->inhibited.any()) return 1;
+    return motor->trust == api::Trust::kKnown ? 3 : 2;
   }
 };
 
@@ -121,7 +121,10 @@ std::vector<std::string> cells(const api::MotorState& motor,
   if (layout.target) {
     out.push_back(position_text(motor, motor.target_steps, motor.user_target, scale));
   }
-  out.insert(out.end(), {speed_text(motor, scale), moving_word(motor, moves_text(motor), "-"),
+  // Where there is no room for notes a limit stands in place of what a motor does.
+  const bool at_limit = motor.inhibited.any() && !layout.place;
+  out.insert(out.end(), {speed_text(motor, scale),
+                         moving_word(motor, moves_text(motor), at_limit ? "limit" : "-"),
                          range_text(motor, description, layout.bar), std::string(word(motor.trust)),
                          notes_text(motor)});
   return out;
@@ -225,8 +228,9 @@ std::string WatchTable::last_line(std::size_t pages) const {
     return fmt::format("show (part of a name, group or MCU; slit*, @group): {}_", filter_);
   }
   std::string text = pages > 1 ? fmt::format("page {} of {}  ", page_ + 1, pages) : "";
-  if (!filter_.empty()) text += fmt::format("filter {} (Esc: none)  ", filter_);
-  return text + kKeys + ", Ctrl-C too";
+  text += kKeys;
+  if (!filter_.empty()) text += fmt::format("  shows {} (Esc: all)", filter_);
+  return text;
 }
 
 std::vector<std::string> WatchTable::lines(const Status& status, std::size_t columns,

@@ -1,6 +1,6 @@
 // What `bushctl watch` shows of a status in a terminal of this size, and what keys change of that:
 // the order, the page, a filter. Motors that move come first, then those with which something is
-// wrong.
+// wrong, the worst before.
 #pragma once
 
 #include <cstddef>

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 
+#include "tools/bushctl/screen.h"
+
 namespace bushctl {
 namespace {
 
@@ -96,11 +98,35 @@ TEST_F(WatchOfManyMotors, ShowsFirstWhatMovesThenWhatIsWrong) {
   EXPECT_THAT(names(), testing::Contains("m001"));
   auto shown = names();
   shown.resize(4);
-  EXPECT_THAT(shown, testing::ElementsAre("m090", "m017", "m040", "m001"));
+  EXPECT_THAT(shown, testing::ElementsAre("m090", "m040", "m017", "m001"));
   table.take_keys("o");
   EXPECT_EQ(names().front(), "m001");
   table.take_keys("o");
   EXPECT_EQ(names().front(), "m090");
+}
+
+TEST_F(WatchOfManyMotors, ShowsWhatDoesNotWorkBeforePositionsThatNobodyKnows) {
+  for (int i = 1; i <= 128; ++i) motor(status, i).trust = api::Trust::kUncertain;
+  motor(status, 60).inhibited.negative = true;
+  status.states[7].snapshot.state = api::McuState::kFault;
+  EXPECT_THAT(names().front(), "m060");
+  EXPECT_THAT(names().at(1), "m113");
+  EXPECT_THAT(names().at(17), "m001");
+}
+
+TEST_F(WatchOfManyMotors, ShowsALimitWhereThereIsNoRoomForNotes) {
+  motor(status, 40).inhibited.positive = true;
+  motor(status, 40).trust = api::Trust::kUncertain;
+  EXPECT_THAT(clipped(lines()[2], kColumns), AllOf(StartsWith("m040 "), HasSubstr("  limit  ")));
+  EXPECT_THAT(lines(160)[2], AllOf(HasSubstr("  -  "), HasSubstr("  limit positive")));
+}
+
+TEST(Screen, ClipsLinesAtACharacterAndSaysThatThereIsMore) {
+  EXPECT_EQ(clipped("12345", 5), "12345");
+  EXPECT_EQ(clipped("123456", 5), "1234>");
+  EXPECT_EQ(clipped("\u00b5m \u00b0", 4), "\u00b5m \u00b0");
+  EXPECT_EQ(clipped("12\u00b5\u00b0\u00b5", 4), "12\u00b5>");
+  EXPECT_EQ(clipped("", 1), "");
 }
 
 TEST_F(WatchOfManyMotors, TellsOfMcusThatDoNotWorkOnEveryPage) {
@@ -143,7 +169,10 @@ TEST_F(WatchOfManyMotors, AreFilteredByNameGroupAndMcu) {
   table.take_keys("5\r");
   EXPECT_THAT(names(), testing::ElementsAre("m005"));
   EXPECT_THAT(lines()[0], HasSubstr("; 1 shown"));
-  EXPECT_THAT(lines().back(), StartsWith("filter m005 (Esc: none)  "));
+  EXPECT_THAT(lines().back(), HasSubstr("shows m005 (Esc: all)"));
+  table.take_keys("/slits\r");
+  EXPECT_THAT(lines().back(), AllOf(StartsWith("page 1 of 4  "), HasSubstr("q ends  shows slits")));
+  EXPECT_LE(lines().back().size(), kColumns);
   table.take_keys("/@sl*\r");
   EXPECT_THAT(lines()[0], HasSubstr("; 64 shown"));
   table.take_keys("/hall:2\n");

@@ -26,6 +26,7 @@ class Screen:
         self.last = " "
         self.resize(rows, columns)
         self.alternate = False  # between smcup and rmcup
+        self.wraps = True
         self.seen_colour = False
         self.pending = ""
 
@@ -66,6 +67,8 @@ class Screen:
         elif character == "\t":
             self.column = min((self.column // 8 + 1) * 8, self.columns - 1)
         elif character >= " ":
+            if self.column == self.columns and not self.wraps:
+                self.column -= 1
             if self.column == self.columns:  # a wrap that was put off
                 self.column = 0
                 self.down()
@@ -92,6 +95,8 @@ class Screen:
         if private:
             if numbers[0] == 1049:
                 self.alternate = final == "h"
+            if numbers[0] == 7:
+                self.wraps = final == "h"
             return
         self.column = min(self.column, self.columns - 1)
         line = self.cells[self.row]
