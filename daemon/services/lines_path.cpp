@@ -310,7 +310,7 @@ void Lines::begin_path(std::int64_t now_us, Coming coming) {
   const double duration_ns = static_cast<double>(path.units()) * path.unit_ns();
   if (duration_ns > longest_ns) {
     return refuse(
-        Error{fmt::format("the path would take {:.0f} days; the longest move is {:.0f} "
+        Error{fmt::format("the path would take {:.1f} days; the longest move is {:.1f} "
                           "days: make several paths of it",
                           duration_ns / 86400e9, longest_ns / 86400e9)});
   }

@@ -152,7 +152,8 @@ Result<void> Lines::fits_duration(Line& line, std::optional<double> duration_s) 
   const double longest_ns = tick_ns * motion::Axis::kMaxDurationTicks;
   if (line.way.duration_ns() > longest_ns) {
     return fail(fmt::format(
-        "the line would take {:.0f} days, limited by {}; the longest move is {:.0f} days",
+        "the line would take {:.1f} days, limited by {}; the longest move is {:.1f} days: move it "
+        "faster, or in parts",
         line.way.duration_ns() / 86400e9, limiting(line), longest_ns / 86400e9));
   }
   if (!duration_s) return {};

@@ -69,11 +69,11 @@ Result<void> Motor::may_move_to(std::int64_t target, bushd_delay floor) const {
   }
   if (axis_.duration_ticks(steps, floor) > Axis::kMaxDurationTicks) {
     const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
-    const auto days = [tick_days](double ticks) { return std::llround(ticks * tick_days); };
-    return fail(std::to_string(steps) + " steps would take " +
-                std::to_string(days(axis_.duration_ticks(steps, floor))) +
-                " days at that speed; the longest move is " +
-                std::to_string(days(Axis::kMaxDurationTicks)) + " days");
+    return fail(fmt::format(
+        "{} steps would take {:.1f} days at that speed; the longest move is {:.1f} days: move it "
+        "faster, or in parts",
+        steps, axis_.duration_ticks(steps, floor) * tick_days,
+        Axis::kMaxDurationTicks * tick_days));
   }
   return {};
 }

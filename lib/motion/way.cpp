@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "base/bound_text.h"
+
 namespace bushd::motion {
 
 Way::Way(std::vector<Motor> motors) : motors_(std::move(motors)) {
@@ -90,20 +92,18 @@ Result<void> Way::take(double duration_s, double longest_ns) {
   }
   const double wanted_ns = duration_s * 1e9;
   const double least_ns = duration_ns();
-  // What a client was told before must not be refused for its last digit.
+  // What a dry run has told must not be refused for its last digit.
   if (wanted_ns < least_ns * (1 - 1e-6)) {
     return fail(
-        fmt::format("duration of {:.6g} s: the line takes at least {:.6g} s; ask for that "
-                    "or more",
-                    duration_s, least_ns * 1e-9));
+        fmt::format("duration of {:.6g} s: the line takes at least {} s; ask for that or more",
+                    duration_s, text_of_least(least_ns * 1e-9)));
   }
   const double most_ns =
       std::min(static_cast<double>(longest_) * BUSHD_LONGEST_DELAY_NS, longest_ns);
   if (wanted_ns > most_ns) {
     return fail(
-        fmt::format("duration of {:.6g} s: the line takes at most {:.6g} s; ask for that or "
-                    "less",
-                    duration_s, most_ns * 1e-9));
+        fmt::format("duration of {:.6g} s: the line takes at most {} s; ask for that or less",
+                    duration_s, text_of_most(most_ns * 1e-9)));
   }
   if (wanted_ns > duration_ns(UINT16_MAX)) {
     make_slower(wanted_ns);

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "base/bound_text.h"
 #include "units/exact.h"
 
 namespace bushd::units {
@@ -197,8 +198,9 @@ Result<std::uint64_t> Coordinates::delay_at(double user_units_per_s, std::uint32
   }
   const mpq_class slowest = *speed * delay_ns / kLongestDelayNs;
   return fail(fmt::format(
-      "{} {}/s would take {:.6g} s a step; allowed: up to an hour a step, which is {:.6g} {}/s",
-      user_units_per_s, scale_.unit, delay_ns.get_d() * 1e-9, slowest.get_d(), scale_.unit));
+      "{} {}/s would take {:.6g} s a step; allowed: up to an hour a step, which is {} {}/s",
+      user_units_per_s, scale_.unit, delay_ns.get_d() * 1e-9, text_of_least(slowest.get_d()),
+      scale_.unit));
 }
 
 std::int64_t Coordinates::first_step_from(double dial) const {

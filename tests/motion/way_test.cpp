@@ -73,6 +73,27 @@ TEST_F(WayTest, TakesAsLongAsIsAsked) {
   EXPECT_FALSE(way.take(0.0 / 0.0, 1e12));
 }
 
+// Both bounds have more than six digits, and the nearest six are beyond them.
+TEST_F(WayTest, WhatARefusalTellsIsTaken) {
+  const auto told = [](const Result<void>& refused) {
+    const std::string& text = refused.error().message;
+    return std::stod(text.substr(text.find(" at ") + std::string(" at least ").size()));
+  };
+  Way slow({{quick_.view(), 0, 1000, 0}});
+  const auto too_long = slow.take(1e8, 2748779.069e9);
+  ASSERT_FALSE(too_long);
+  EXPECT_EQ(too_long.error().message,
+            "duration of 1e+08 s: the line takes at most 2.74877e+06 s; ask for that or less");
+  EXPECT_TRUE(slow.take(2.74877e6, 2748779.069e9));
+  // 1000 + 500 + 400 x 12345 + 1000 us.
+  Way quick({{slow_.view(), 0, 12348, 0}});
+  const auto too_short = quick.take(1, 1e16);
+  ASSERT_FALSE(too_short);
+  EXPECT_GE(told(too_short) * 1e9, quick.duration_ns()) << too_short.error().message;
+  EXPECT_LT(told(too_short) * 1e9, quick.duration_ns() * 1.00001);
+  EXPECT_TRUE(quick.take(told(too_short), 1e16));
+}
+
 // Its table has longer time units then, so that its MCUs can be told.
 TEST_F(WayTest, TakesLongerThan16BitsOfItsUnitsTell) {
   for (const double asked_s : {70.0, 1000.0, 3.6e6}) {

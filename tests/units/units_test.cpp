@@ -170,5 +170,18 @@ TEST(Steps, AddUpToTheNearestWholeNumber) {
   EXPECT_NEAR(blade->user_of(Steps{-3, kHalf}), 0.25, 1e-15);
 }
 
+// The slowest speed that a refusal tells is none that is refused, whatever the scale.
+TEST(Coordinates, TheSlowestSpeedThatIsToldIsAllowed) {
+  for (const char* steps_per_unit : {"1", "7", "400", "1600", "400/1.25", "1/3", "12345.678"}) {
+    const Coordinates axis = with(steps_per_unit);
+    const auto refused = axis.delay_at(1e-12, 20);
+    ASSERT_FALSE(refused);
+    const std::string& text = refused.error().message;
+    const double told = std::stod(text.substr(text.find("which is ") + 9));
+    EXPECT_TRUE(axis.delay_at(told, 20)) << text;
+    EXPECT_FALSE(axis.delay_at(told * 0.9999, 20)) << text;
+  }
+}
+
 }  // namespace
 }  // namespace bushd::units
