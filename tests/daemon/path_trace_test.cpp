@@ -80,6 +80,20 @@ TEST_P(PathTrace, OfALogOfSeveralPathsEachIsJudgedByItsPoints) {
   EXPECT_EQ(Traced::check(lab, both), 1) << said();
 }
 
+TEST_P(PathTrace, OtherMovesBesidePathsAreRefusedWithARemedy) {
+  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(api::Move{.motors = {{"m01", 20}}})).result, "reached");
+  const auto move = lab.send(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()});
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  write_points(points());
+  for (const char* given : {"", "--path path.csv"}) {
+    EXPECT_EQ(Traced::check(lab, given), 2) << given;
+    EXPECT_THAT(said(), testing::HasSubstr("begin a new one (bushd --move-log FILE"));
+  }
+}
+
 TEST_P(PathTrace, ATraceThatIsStillWrittenIsToldAsThat) {
   Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   lab.connect();
