@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "api/no_such_motor.h"
 #include "base/nearest_name.h"
 #include "base/shortened.h"
 
@@ -211,8 +212,10 @@ std::vector<std::string_view> Installation::names(bool of_groups) const {
 Result<MotorId> Installation::find(const std::string& name) const {
   const auto found = motor_by_name_.find(name);
   if (found != motor_by_name_.end()) return found->second;
-  return fail("there is no motor \"" + shortened(name, 64) + "\"" +
-              did_you_mean(name, this->names(false)) + "; 'bushctl status' lists them");
+  std::vector<std::string> groups;
+  for (const config::Group& group : config_.groups) groups.push_back(group.name);
+  return fail(api::no_such_motor(name, this->names(false), std::move(groups)) +
+              "; 'bushctl status' lists them");
 }
 
 Result<std::vector<MotorId>> Installation::find(const api::MotorNames& names) const {

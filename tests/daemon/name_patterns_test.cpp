@@ -23,7 +23,7 @@ TEST(NamePatterns, StandForMotorsByNameOrByGroup) {
   EXPECT_FALSE(api::names_motor("theta", "thetax", "")) << "what is no pattern is a name";
 }
 
-// m01..m08; of groups ag, bg, ag, bg and so on as hall() gives them.
+// m01..m08, all of the group "axes".
 class LabWithPatterns : public testing::Test {
  protected:
   LabWithPatterns() { lab.connect(); }
@@ -57,7 +57,10 @@ TEST_F(LabWithPatterns, MoveStopAndPauseTakeThemAlike) {
 
 TEST_F(LabWithPatterns, WhatStandsForNoMotorIsRefusedAndAStopStopsTheOthers) {
   EXPECT_THAT(lab.last_reply(lab.send(api::Move{.motors = {{"slit*", 1}}})).reason,
-              HasSubstr("there is no motor \"slit*\""));
+              HasSubstr("there is no motor with a name like \"slit*\"; 'bushctl status'"));
+  EXPECT_THAT(
+      lab.last_reply(lab.send(api::Move{.motors = {{"@axse", 1}}})).reason,
+      HasSubstr("there is no group with a motor for \"@axse\" (did you mean \"@axes\"?); "));
   EXPECT_THAT(lab.last_reply(lab.send(api::Move{.motors = {{"m0*", 1}, {"m01", 2}}})).reason,
               HasSubstr("m01 is named twice"));
   lab.send(api::Move{.motors = {{"m01", 4000}}});

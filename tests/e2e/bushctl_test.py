@@ -212,7 +212,7 @@ class Bushctl(EndToEndTest):
         self.bring_up()
         watch, health = (self.enterContext(Terminal([program("BUSHCTL"), *words.split()])) for words in ("watch", "health --watch"))
         for terminal in (watch, health):
-            terminal.wait_for("Ctrl-C")
+            terminal.wait_for(" ends")
         self.bushd.end(signal.SIGKILL)
         for terminal in (watch, health):
             terminal.wait_for("what is shown is old: ")
@@ -243,14 +243,17 @@ class Bushctl(EndToEndTest):
         self.assertEqual([motor["name"] for motor in json.loads(self.command("status", "--json", "b*").stdout)["motors"]], ["b0", "b1", "b2", "b3"])
         self.assertEqual([motor["name"] for motor in json.loads(self.command("where", "--json", "*1", "a0").stdout)["motors"]], ["a1", "b1", "a0"])
         self.assertNotIn("a0 ", self.command("watch", "--count", "1", "a1").stdout)
-        self.assertIn('there is no motor "c*"', self.bushctl("status", "c*").stderr)
+        for show in ("status", "where", "watch"):
+            refused = self.bushctl(show, "c*")
+            self.assertIn('there is no motor with a name like "c*"', refused.stderr)
+            self.assertEqual(refused.returncode, 1)
         self.command("move", "a*", "10", "--wait")
         self.assertEqual([motor["position_steps"] for motor in json.loads(self.command("status", "--json").stdout)["motors"]], [10] * 4 + [0] * 4)
 
     def test_what_is_typed_into_watch_is_no_command(self):
         self.bring_up()
         shell = self.enterContext(Terminal(["sh", "-c", f"{program('BUSHCTL')} watch; read -r typed; echo got: $typed"]))
-        shell.wait_for("a0", "Ctrl-C")
+        shell.wait_for("a0", "q ends")
         shell.send("bushctl move a0 1000\r")
         shell.send("q")
         shell.wait(lambda _: not shell.screen.alternate)

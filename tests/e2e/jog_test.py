@@ -113,7 +113,7 @@ class Keys(EndToEndTest):
 
     def test_jog_and_make_steps(self):
         panel = self.open("--speed", "300", "--step", "7")
-        panel.wait_for("speed 300 steps/s, step 7 | no soft limits")
+        panel.wait_for("speed 300 steps/s, step 7 | ", " | no soft limits")
         panel.send(UP)
         panel.wait_for("a0: reached, stands at 7 ")
         panel.send(LEFT)

@@ -1,11 +1,9 @@
 #include "named_motors.h"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 #include "api/name_pattern.h"
-#include "base/nearest_name.h"
+#include "api/no_such_motor.h"
 #include "motor_cells.h"
 
 namespace bushctl {
@@ -28,11 +26,14 @@ bool is_any(const Status& status, const std::string& name) {
 
 std::string no_such_motor(const Status& status, const std::string& name) {
   std::vector<std::string> names;
+  std::vector<std::string> groups;
   for (const auto& mcu : status.descriptions) {
-    for (const api::MotorDescription& motor : mcu.snapshot.motors) names.push_back(motor.name);
+    for (const api::MotorDescription& motor : mcu.snapshot.motors) {
+      names.push_back(motor.name);
+      groups.push_back(motor.group);
+    }
   }
-  return fmt::format("there is no motor \"{}\"{}; 'bushctl where' lists them", name,
-                     bushd::did_you_mean(name, names));
+  return api::no_such_motor(name, names, std::move(groups)) + "; 'bushctl where' lists them";
 }
 
 bushd::Result<Status> only(Status status, const std::vector<std::string>& names) {

@@ -178,14 +178,13 @@ std::string bounds_text(const Status& status, std::size_t mcu, std::size_t index
   const api::MotorState& motor = status.states[mcu].snapshot.motors[index];
   const auto description = description_of(status.descriptions.at(mcu).snapshot, index, motor.name);
   const auto coordinates = units::Coordinates::make(description.scale);
-  std::string text = "no soft limits";
-  if (description.soft_limits && coordinates) {
-    const units::SoftLimits limits = coordinates->on_user_scale(*description.soft_limits);
-    text = fmt::format("{:g} .. {:g}", limits.low, limits.high);
-  }
-  if (motor.trust != api::Trust::kKnown) text += fmt::format(" | {}", word(motor.trust));
-  if (const std::string notes = notes_text(motor); !notes.empty()) text += " | " + notes;
-  return text;
+  // A terminal may cut the end off.
+  std::string text;
+  if (motor.trust != api::Trust::kKnown) text += fmt::format("{} | ", word(motor.trust));
+  if (const std::string notes = notes_text(motor); !notes.empty()) text += notes + " | ";
+  if (!description.soft_limits || !coordinates) return text + "no soft limits";
+  const units::SoftLimits limits = coordinates->on_user_scale(*description.soft_limits);
+  return text + fmt::format("{:g} .. {:g}", limits.low, limits.high);
 }
 
 std::string json(const Status& status) {

@@ -27,8 +27,8 @@ std::string motor_line(const bushd::client::Status& status, std::size_t mcu, std
 // Of the same motor: "at 5.3 of 12.5 mm".
 std::string way_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 
-// Of the same motor: "5.3 mm, 0.25 mm/s", "5.3 mm, at rest". And what bounds it: "-5 .. 25 |
-// uncertain | limit positive".
+// Of the same motor: "5.3 mm, 0.25 mm/s", "5.3 mm, at rest". And what bounds it: "uncertain |
+// limit positive | -5 .. 25".
 std::string stand_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 std::string bounds_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 

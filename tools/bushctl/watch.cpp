@@ -8,12 +8,14 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "api/name_pattern.h"
 #include "base/printable.h"
 #include "commands.h"
 #include "live.h"
 #include "motor_cells.h"
+#include "named_motors.h"
 #include "render.h"
 #include "screen.h"
 #include "watch_table.h"
@@ -75,6 +77,22 @@ class Changes {
   std::map<std::string, std::string> shown_;  // last line by motor or MCU
 };
 
+// A name that stands for no motor ends it at the first status.
+int follow(const Connection& connection, const WatchOptions& options, Live live) {
+  std::optional<bushd::Error> unknown;
+  live.show = [&, show = std::move(live.show), first = true](const Status& status) mutable {
+    if (std::exchange(first, false)) {
+      if (auto named = only(status, options.names); !named) {
+        unknown = named.error();
+        return false;
+      }
+    }
+    return show(status);
+  };
+  const int code = follow_live(connection, live);
+  return unknown ? failed(*unknown) : code;
+}
+
 int watch_changes(const Connection& connection, const WatchOptions& options) {
   Changes changes(options.names);
   Losses losses;
@@ -85,17 +103,18 @@ int watch_changes(const Connection& connection, const WatchOptions& options) {
       fmt::print(stderr, "bushctl: {}\n", bushd::printable(text));
     trouble = text;
   };
-  return follow_live(connection, {.timeout = options.timeout,
-                                  .next = &Client::next_state_or_input,
-                                  .show =
-                                      [&](const Status& status) {
-                                        changes.show(status);
-                                        tell(losses.text_of(status));
-                                        return options.count == 0 || ++shown < options.count;
-                                      },
-                                  .on_input = [] { return true; },
-                                  .on_trouble = tell,
-                                  .close = [] {}});
+  return follow(connection, options,
+                {.timeout = options.timeout,
+                 .next = &Client::next_state_or_input,
+                 .show =
+                     [&](const Status& status) {
+                       changes.show(status);
+                       tell(losses.text_of(status));
+                       return options.count == 0 || ++shown < options.count;
+                     },
+                 .on_input = [] { return true; },
+                 .on_trouble = tell,
+                 .close = [] {}});
 }
 
 int watch_screen(const Connection& connection, const WatchOptions& options) {
@@ -108,8 +127,8 @@ int watch_screen(const Connection& connection, const WatchOptions& options) {
     const Screen::Size size = Screen::size();
     screen->show(table.lines(newest, size.columns, size.rows, notice));
   };
-  return follow_live(
-      connection,
+  return follow(
+      connection, options,
       {.timeout = options.timeout,
        .for_ever = true,
        .next = &Client::next_state_or_input,

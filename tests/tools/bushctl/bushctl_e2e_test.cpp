@@ -370,7 +370,7 @@ TEST(Bushctl, WatchLeavesTheTerminalAsItWas) {
   FakeDaemon daemon;
   daemon.start();
   Program watch(with_program({"watch"}), true);
-  ASSERT_TRUE(watch.wait_for("Ctrl-C"));
+  ASSERT_TRUE(watch.wait_for("q ends"));
   watch.send_signal(SIGTERM);
   EXPECT_EQ(watch.finish(), 0);
   EXPECT_THAT(watch.out(), testing::StartsWith("\x1b[?1049h"));

@@ -97,7 +97,7 @@ TEST(Render, SaysHowAMotorStandsAndWhatBoundsIt) {
   motor.inhibited.positive = true;
   status.descriptions[0].snapshot.motors[0].soft_limits.reset();
   EXPECT_EQ(stand_text(status, 0, 0), "2.00 mm, at rest");
-  EXPECT_EQ(bounds_text(status, 0, 0), "no soft limits | uncertain | limit positive");
+  EXPECT_EQ(bounds_text(status, 0, 0), "uncertain | limit positive | no soft limits");
 }
 
 TEST(Render, TellsOfPositionsThatWereRoundedToAStep) {
