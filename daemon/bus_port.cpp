@@ -1,5 +1,6 @@
 #include "daemon/bus_port.h"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -79,9 +80,16 @@ Result<std::unique_ptr<BusPort>> open_port(const std::string& path, const config
 
 }  // namespace
 
-Result<std::unique_ptr<BusPort>> open_first_port(const config::Bus& bus) {
+Result<std::unique_ptr<BusPort>> open_first_port(const config::Bus& bus, const PortOrder& order,
+                                                 const std::vector<PortInUse>& in_use) {
   std::optional<Error> first_error;
-  for (const std::string& path : config::ports_matching(bus.port)) {
+  for (const std::string& path : in_order(config::ports_matching(bus.port), order)) {
+    const auto other = std::ranges::find_if(
+        in_use, [&path](const PortInUse& port) { return config::is_same_port(port.path, path); });
+    if (other != in_use.end()) {
+      if (!first_error) first_error = {.message = "is open for " + other->user, .file = path};
+      continue;
+    }
     auto opened = open_port(path, bus);
     if (opened) return opened;
     if (!first_error) first_error = opened.error();

@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "config/config.h"
+#include "daemon/port_search.h"
 #include "link/pulse_port.h"
 
 namespace bushd::daemon {
@@ -34,7 +35,15 @@ class BusPort {
   }
 };
 
-// Of the ports that the configuration may mean, the first that opens; else why the first does not.
-Result<std::unique_ptr<BusPort>> open_first_port(const config::Bus& bus);
+// One that is open already.
+struct PortInUse {
+  std::string path;
+  std::string user;  // "bus roof"
+};
+
+// Of the ports that the configuration may mean, in this order, the first that opens; else why the
+// first does not. What `in_use` names, under whatever name, is passed over without being opened.
+Result<std::unique_ptr<BusPort>> open_first_port(const config::Bus& bus, const PortOrder& order,
+                                                 const std::vector<PortInUse>& in_use);
 
 }  // namespace bushd::daemon

@@ -111,9 +111,10 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
   });
 }
 
-void Core::port_opened(std::int64_t now_us, BusId bus) {
+void Core::port_opened(std::int64_t now_us, BusId bus, const std::string& path) {
   installation_[bus].master.port_opened(now_us);
   installation_[bus].port_state = "open";
+  installation_[bus].port = path;
   health_.port_changed();
   installation_.changed = true;
 }
@@ -121,6 +122,7 @@ void Core::port_opened(std::int64_t now_us, BusId bus) {
 void Core::port_lost(std::int64_t now_us, BusId bus, const std::string& cause) {
   installation_[bus].master.port_lost(now_us, cause);
   installation_[bus].port_state = cause;
+  installation_[bus].port.clear();
   health_.port_changed();
   supervisor_.handle_events(now_us, installation_[bus]);
   installation_.changed = true;

@@ -53,9 +53,12 @@ class Core {
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
 
-  void port_opened(std::int64_t now_us, BusId bus);
+  // `path`: where, for people.
+  void port_opened(std::int64_t now_us, BusId bus, const std::string& path = "");
   void port_lost(std::int64_t now_us, BusId bus, const std::string& cause);
   void receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t> bytes);
+  // Something of the bus has answered since its port was opened.
+  bool heard(BusId bus) const { return installation_[bus].master.heard(); }
   // To be called soon after the output that ordered it.
   void pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus& status);
 

@@ -13,7 +13,6 @@
 #include <limits>
 
 #include "base/printable.h"
-#include "daemon/bus_port.h"
 #include "daemon/event_loop_source.h"
 #include "daemon/process.h"
 #include "daemon/service_manager.h"
@@ -58,7 +57,10 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLogWriter*
       lcm_watch_(lcm_front_, publishing_, config.lcm.prefix,
                  [this](LogLevel level, const std::string& text) { log(level, {}, text); }),
       alive_us_(alive_period_us()) {
-  for ([[maybe_unused]] const config::Bus& bus : config.buses) ports_.add();
+  for (std::size_t b = 0; b < config.buses.size(); ++b) {
+    const auto mcus = std::ranges::count(config.mcus, BusId{b}, &config::Mcu::bus);
+    ports_.add(PortSearch(config.buses[b].port, static_cast<std::size_t>(mcus)));
+  }
   for ([[maybe_unused]] const config::Mcu& mcu : config.mcus) {
     mcu_states_.add(api::McuState::kOffline);
   }
@@ -166,6 +168,7 @@ Result<void> EventLoop::run() {
       if (ports_[bus].lost) lose_port(now, bus, *std::exchange(ports_[bus].lost, std::nullopt));
     }
     open_due_ports(now);
+    search_ports(now);
     step_keypads(now);
     publishing_.set_dropped_messages(lcm_front_.dropped() +
                                      (socket_front_ ? socket_front_->dropped() : 0));
@@ -221,97 +224,12 @@ std::int64_t EventLoop::next_wake_us() const {
   std::int64_t wake = std::min({core_.next_wake_us(), next_keypad_wake_us(), alive_due_us_});
   for (const Port& port : ports_) {
     if (port.lost) return 0;
-    if (!port.serial && !port.opening) wake = std::min(wake, port.open_due_us);
+    if (port.opening) continue;
+    wake = std::min(wake, port.serial ? port.search.due_us() : port.open_due_us);
   }
   if (socket_front_) wake = std::min(wake, socket_front_->next_wake_us());
   if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
   return wake;
-}
-
-// Drivers may take their time to open and to close a port.
-void EventLoop::open_due_ports(std::int64_t now) {
-  for (const BusId bus : ports_.ids()) {
-    Port& port = ports_[bus];
-    if (port.serial || port.opening || port.open_due_us > now) continue;
-    port.opening = true;
-    port_worker_.post([this, bus]() -> Worker::Completion {
-      const auto opened =
-          std::make_shared<Result<std::unique_ptr<BusPort>>>(open_first_port(config_[bus]));
-      return [this, bus, opened] { port_opened(now_us(), bus, std::move(*opened)); };
-    });
-  }
-}
-
-void EventLoop::port_opened(std::int64_t now, BusId bus, Result<std::unique_ptr<BusPort>> opened) {
-  Port& port = ports_[bus];
-  const config::Bus& config = config_[bus];
-  port.opening = false;
-  port.open_due_us = now + kReopenUs;
-  Result<std::unique_ptr<Source>> watched;
-  if (opened) {
-    watched = watch((*opened)->fd(),
-                    [this, bus](std::uint32_t events) { handle_port(now_us(), bus, events); });
-  }
-  if (!opened || !watched) {
-    const std::string error = opened ? watched.error().text() : opened.error().text();
-    if (opened) close_in_worker(std::shared_ptr<BusPort>(std::move(*opened)));
-    if (error != port.last_error) {
-      log(LogLevel::kError, {},
-          fmt::format("bus {}: {}; trying again twice a second", config.name, error));
-      port.last_error = error;
-      core_.port_lost(now, bus, "port " + error);
-    }
-    return;
-  }
-  port.serial = std::move(*opened);
-  port.source = std::move(*watched);
-  port.last_error.clear();
-  log(LogLevel::kInfo, {},
-      fmt::format("bus {}: port {} opened {}", config.name, port.serial->path(),
-                  port.serial->text()));
-  core_.port_opened(now, bus);
-}
-
-void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause) {
-  Port& port = ports_[bus];
-  if (!port.serial) return;
-  const config::Bus& config = config_[bus];
-  const std::string path = port.serial->path();
-  port.source.reset();
-  close_in_worker(std::shared_ptr<BusPort>(std::move(port.serial)));
-  port.status.reset();
-  port.open_due_us = now + kReopenUs;
-  port.last_error = path + ": " + cause;
-  log(LogLevel::kError, {},
-      fmt::format("bus {}: port {} lost: {}; trying again twice a second", config.name, path,
-                  cause));
-  core_.port_lost(now, bus, "port " + port.last_error);
-}
-
-void EventLoop::close_in_worker(std::shared_ptr<void> port) {
-  port_worker_.post([port = std::move(port)]() mutable -> Worker::Completion {
-    port.reset();
-    return [] {};
-  });
-}
-
-// What is lost is given up in the loop: its source cannot go while it is being handled.
-void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
-  if (!ports_[bus].serial) return;
-  BusPort& serial = *ports_[bus].serial;
-  if (events & EPOLLIN) {
-    std::vector<std::uint8_t> bytes;
-    const auto read = serial.read(bytes);
-    if (!bytes.empty()) core_.receive(now, bus, bytes);
-    if (!read) ports_[bus].lost = read.error().text();
-  } else if (events & (EPOLLHUP | EPOLLERR)) {
-    ports_[bus].lost = "hung up";
-  }
-  if (events & EPOLLOUT) {
-    const auto flushed = serial.flush();
-    if (!flushed) ports_[bus].lost = flushed.error().text();
-    update_write_interest(bus);
-  }
 }
 
 void EventLoop::handle_signal(std::int64_t now, int signal) {
@@ -389,33 +307,11 @@ void EventLoop::answer_table_job(const api::Asker& asker, const api::Reply& repl
   asker.answer(reply);
 }
 
-void EventLoop::update_write_interest(BusId bus) {
-  const bool writes = ports_[bus].serial->wants_to_write();
-  ports_[bus].source->await(EPOLLIN | (writes ? static_cast<std::uint32_t>(EPOLLOUT) : 0u));
-}
-
 void EventLoop::log_cpu_share() const {
   const double elapsed_s = static_cast<double>(now_us() - started_us_) * 1e-6;
   const double cpu_s = static_cast<double>(cpu_us()) * 1e-6;
   spdlog::info("ended; used {:.2f} s of CPU in {:.1f} s, {:.1f} % of a core", cpu_s, elapsed_s,
                100.0 * cpu_s / elapsed_s);
-}
-
-void EventLoop::send(BusId bus, std::span<const std::uint8_t> bytes) {
-  if (!ports_[bus].serial) return;
-  const bool waited = ports_[bus].serial->wants_to_write();
-  if (const auto written = ports_[bus].serial->write(bytes); !written) {
-    ports_[bus].lost = written.error().text();
-  } else if (waited != ports_[bus].serial->wants_to_write()) {
-    update_write_interest(bus);
-  }
-}
-
-void EventLoop::pulse(BusId bus, const link::PulseOrder& order) {
-  if (!ports_[bus].serial) return;
-  const auto status = ports_[bus].serial->carry_out(order);
-  if (!status) ports_[bus].lost = status.error().text();
-  if (status) ports_[bus].status = *status;
 }
 
 void EventLoop::publish(McuId mcu, const api::StateSnapshot& state) {

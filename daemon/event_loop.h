@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "base/by_id.h"
@@ -21,6 +22,7 @@
 #include "daemon/lcm_watch.h"
 #include "daemon/log_limit.h"
 #include "daemon/move_log_writer.h"
+#include "daemon/port_search.h"
 #include "daemon/publishing.h"
 #include "daemon/reception.h"
 #include "daemon/socket_front.h"
@@ -65,14 +67,18 @@ class EventLoop : private Outputs, private state::Backend {
   using Handler = std::function<void(std::uint32_t events)>;
 
   struct Port {
-    std::unique_ptr<BusPort> serial;
-    bool opening = false;                     // a worker opens it
-    std::optional<link::PulseStatus> status;  // to be told to the core
-    std::unique_ptr<Source> source;           // of its descriptor
+    explicit Port(PortSearch its_search);
+    Port(Port&&) noexcept;
+    ~Port();
+    PortSearch search;
+    std::unique_ptr<BusPort> serial{};
+    bool opening = false;                       // a worker opens it, or another match
+    std::optional<link::PulseStatus> status{};  // to be told to the core
+    std::unique_ptr<Source> source{};           // of its descriptor
     std::int64_t open_due_us = 0;
-    std::string last_error;  // so that a missing port is logged once, not twice a second
+    std::string last_error{};  // so that a missing port is logged once, not twice a second
     // Why it is to be given up, as soon as neither the core nor its source is at work.
-    std::optional<std::string> lost;
+    std::optional<std::string> lost{};
   };
 
   struct KeypadPort {
@@ -94,7 +100,12 @@ class EventLoop : private Outputs, private state::Backend {
   Result<void> keep_watching(int fd, Handler handler);
   void open_due_ports(std::int64_t now_us);
   void port_opened(std::int64_t now_us, BusId bus, Result<std::unique_ptr<BusPort>> opened);
+  void search_ports(std::int64_t now_us);
+  void next_port_opened(std::int64_t now_us, BusId bus, Result<std::unique_ptr<BusPort>> opened);
+  std::vector<PortInUse> ports_in_use(BusId asking) const;
   void lose_port(std::int64_t now_us, BusId bus, const std::string& cause);
+  // Without a word to the core.
+  void release_port(BusId bus);
   void handle_port(std::int64_t now_us, BusId bus, std::uint32_t events);
   void close_in_worker(std::shared_ptr<void> port);
   void add_keypads();

@@ -63,6 +63,7 @@ class Bus final : public AxisSource {
   link::BusMaster& master;
   std::vector<McuId> mcus;  // by link::McuIndex
   std::string port_state = "not yet opened";
+  std::string port;          // that is open; "": none
   bool two_masters = false;  // as told in the log last
 };
 

@@ -187,7 +187,8 @@ api::StateSnapshot StatePublisher::state_of(const Mcu& mcu) const {
 }
 
 api::Description StatePublisher::description_of(const Mcu& mcu) const {
-  const config::Bus& bus = installation_.bus_of(mcu).config;
+  const Bus& its_bus = installation_.bus_of(mcu);
+  const config::Bus& bus = its_bus.config;
   api::Description description{.bus = bus.name,
                                .mcu = mcu.name(),
                                .address = mcu.config.address.value,
@@ -195,6 +196,7 @@ api::Description StatePublisher::description_of(const Mcu& mcu) const {
                                .emergency_stop = bus.emergency_stop == BUSHD_STOP_IMMEDIATE
                                                      ? api::StopMode::kImmediate
                                                      : api::StopMode::kRamp,
+                               .port = its_bus.port,
                                .motors = {}};
   for (const MotorId motor : mcu.motors()) {
     const config::Motor& config = installation_.config()[motor];

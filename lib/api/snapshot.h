@@ -79,6 +79,7 @@ struct Description {
   std::int32_t address = 0;  // 0: axes that are computed from motors
   std::int64_t tick_ns = 0;
   StopMode emergency_stop = StopMode::kRamp;
+  std::string port{};                      // of the bus, that is open; "": none
   std::vector<MotorDescription> motors{};  // by output
   // Else axes that are computed from motors.
   bool is_mcu() const { return address != 0; }

@@ -2,6 +2,7 @@
 
 #include <fnmatch.h>
 #include <glob.h>
+#include <sys/stat.h>
 
 #include <string_view>
 
@@ -40,6 +41,15 @@ std::vector<std::string> ports_matching(const std::string& port) {
   }
   ::globfree(&found);
   return paths;
+}
+
+// std::filesystem::equivalent does not answer for devices.
+bool is_same_port(const std::string& a, const std::string& b) {
+  struct stat one{};
+  struct stat other{};
+  if (::stat(a.c_str(), &one) != 0 || ::stat(b.c_str(), &other) != 0) return false;
+  if (S_ISCHR(one.st_mode) && S_ISCHR(other.st_mode)) return one.st_rdev == other.st_rdev;
+  return one.st_dev == other.st_dev && one.st_ino == other.st_ino;
 }
 
 bool patterns_may_meet(const std::string& a, const std::string& b) {

@@ -72,7 +72,7 @@ BUSHD_LAYOUT(history_answer_t, "tnT", {&kReplyHeader, &kPastMotion})
 BUSHD_LAYOUT(table_answer_t, "tnTnT", {&kReplyHeader, &kTableEntry, &kTable})
 
 BUSHD_LAYOUT(mcu_state_t, "llliisssssillnT", {&kMotor})
-BUSHD_LAYOUT(mcu_description_t, "llliissilsnT", {&kMotorDescription})
+BUSHD_LAYOUT(mcu_description_t, "llliissilssnT", {&kMotorDescription})
 BUSHD_LAYOUT(health_t, "lliissblllnLLnT", {&kMcuHealth})
 
 #undef BUSHD_LAYOUT

@@ -227,6 +227,7 @@ std::optional<DaemonMessage> decode_description(Payload payload) {
                    .address = message->address,
                    .tick_ns = message->tick_ns,
                    .emergency_stop = ramps ? api::StopMode::kRamp : api::StopMode::kImmediate,
+                   .port = message->port,
                    .motors = {}}};
   for (const motor_description_t& motor : message->motors) {
     auto one = description_of(motor);
@@ -328,6 +329,7 @@ bushd::Result<Packet> encode(const Part& part, const api::Description& descripti
   message.address = description.address;
   message.tick_ns = description.tick_ns;
   message.emergency_stop = word(description.emergency_stop);
+  message.port = description.port;
   for (const api::MotorDescription& motor : description.motors) {
     motor_description_t one{};
     one.name = motor.name;

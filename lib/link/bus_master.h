@@ -68,6 +68,9 @@ class BusMaster {
   virtual void reset_low_water() = 0;
   // Requests made by calls below are not yet answered, or not yet seen in a report.
   virtual bool busy(McuIndex mcu) const = 0;
+  // Something of this bus has answered since the port was opened: it is the right port. Kinds that
+  // nothing answers unasked take it for that.
+  virtual bool heard() const { return true; }
   // Another master was heard on this line within the last seconds.
   virtual bool two_masters(std::int64_t) const { return false; }
 

@@ -71,6 +71,7 @@ Master::Master(BusSetup setup, TickSource& source)
 
 void Master::port_opened(std::int64_t now_us) {
   port_open_ = true;
+  heard_ = false;
   transactions_.reset();
   writer_.reset(now_us);
   synchroniser_.port_opened(now_us);

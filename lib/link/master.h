@@ -62,6 +62,7 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   bool busy(McuIndex mcu) const override {
     return !connector_.queue(mcu).empty() || mcus_[mcu].poll_wanted || mcus_[mcu].answered;
   }
+  bool heard() const override { return heard_; }
   bool streams() const override { return true; }
   // By this master or by an MCU.
   bool two_masters(std::int64_t now_us) const override { return synchroniser_.two_masters(now_us); }
@@ -145,6 +146,7 @@ class Master final : public BusMaster, private Transactions::Listener, private C
   PerMcu<McuRecord> mcus_;
   std::vector<Event> events_;
   bool port_open_ = false;
+  bool heard_ = false;
   std::int64_t stepped_us_ = 0;
   FrameWriter writer_;
   Transactions transactions_;

@@ -30,6 +30,7 @@ void Master::overheard(std::int64_t now_us, const bushd_frame& frame) {
 }
 
 bool Master::answered(std::int64_t now_us, const Transactions::Answer& answer) {
+  heard_ = true;
   poller_.answered(answer.mcu);
   switch (answer.type) {
     case BUSHD_MSG_POLL: {

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <string>
+
 #include "tables/temp_directory.h"
 
 namespace bushd::config {
@@ -38,6 +41,18 @@ TEST(PortPattern, OnePortForTwoBusesIsSeenThroughPatterns) {
   EXPECT_FALSE(patterns_may_meet("/dev/ttyACM*", "/dev/ttyUSB*"));
   EXPECT_FALSE(patterns_may_meet("/by-id/*-hall", "/by-id/*-roof"));
   EXPECT_TRUE(patterns_may_meet("/by-id/*-hall", "/by-id/*-[hr]*"));
+}
+
+TEST(PortPattern, OnePortUnderTwoNamesIsOneDevice) {
+  const TempDirectory directory;
+  const std::string link = (directory.path() / "by-id").string();
+  std::filesystem::create_symlink("/dev/null", link);
+  EXPECT_TRUE(is_same_port("/dev/null", link)) << "a device";
+  EXPECT_FALSE(is_same_port("/dev/zero", link));
+  const std::string file = directory.write("port", "").string();
+  EXPECT_TRUE(is_same_port(file, directory.path() / "." / "port"));
+  EXPECT_FALSE(is_same_port(file, link));
+  EXPECT_FALSE(is_same_port("/dev/no-such-port", "/dev/no-such-port")) << "neither is there";
 }
 
 TEST(PortPattern, OddCharactersAreNoPatternOrHarmless) {

@@ -1,5 +1,6 @@
 """A serial port that is missing or goes away: the daemon stays, says so, and goes on when the port is back."""
 
+import os
 import signal
 import unittest
 
@@ -127,6 +128,24 @@ class Port(EndToEndTest):
         self.command("set", "a0", "5")
         self.command("move", "--wait", "a0", "--to", "0")
         self.assertEqual(self.bushd.end(), 0)
+
+    def test_a_foreign_device_under_a_lower_name(self):
+        self.write_config(port="tty[0-9]")
+        master, slave = os.openpty()
+        self.file("tty0").symlink_to(os.ttyname(slave))
+        self.start_bushsim(link="tty3")
+        self.bushd = self.start_bushd()
+        self.wait_until_ready()
+        silent = f"{self.file('tty0')}: nothing of this bus has answered within 5 s; trying {self.file('tty3')}"
+        self.assertIn(silent, self.bushd.said())
+        self.assertEqual({mcu["port"] for mcu in self.status()["mcus"]}, {str(self.file("tty3"))})
+        self.assertRegex(self.command("status").stdout, rf"BUS +PORT\nhall +{self.file('tty3')}\n")
+        doctor = self.bushctl("doctor", "--config", self.file("bushd.toml"))
+        self.assertIn(f"hall: {self.file('tty3')}", doctor.stdout)
+        self.command("move", "--wait", "a0", "5")
+        self.assertEqual(self.bushd.end(), 0)
+        os.close(slave)
+        os.close(master)
 
     def test_no_serial_port_at_all(self):
         self.write_config()

@@ -471,6 +471,7 @@ TEST(Codec, SnapshotsArriveAsTheyAre) {
                                      .address = 1,
                                      .tick_ns = 2'560'000,
                                      .emergency_stop = api::StopMode::kImmediate,
+                                     .port = "/dev/ttyUSB1",
                                      .motors = {{.name = "theta",
                                                  .output = 15,
                                                  .group = "g",

@@ -337,6 +337,20 @@ TEST(Connect, PortLostIsOfflineWithItsCauseAndSendsNothing) {
   bus.connect();
 }
 
+// Of a pattern, the port at which nothing answers makes way for the next match.
+TEST(Connect, ABusIsHeardOnceAnMcuHasAnsweredSinceThePortWasOpened) {
+  FakeBus bus(2);
+  EXPECT_FALSE(bus.master->heard());
+  bus.connect();
+  EXPECT_TRUE(bus.master->heard());
+  bus.master->port_lost(bus.now_us, "unplugged");
+  bus.master->port_opened(bus.now_us);
+  EXPECT_FALSE(bus.master->heard());
+  bus.slaves.clear();
+  bus.run_for(3'000'000);
+  EXPECT_FALSE(bus.master->heard()) << "what it says itself is no answer";
+}
+
 // How often each of the MCUs was asked in the frames heard.
 std::map<int, int> polls_by_address(const FakeBus& bus) {
   std::map<int, int> polls;

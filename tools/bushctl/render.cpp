@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/json_text.h"
 #include "base/printable.h"
@@ -85,7 +86,8 @@ nlohmann::json mcu_json(const api::StateSnapshot& mcu, const api::Description& d
           {"boot", mcu.boot},
           {"tick", mcu.tick},
           {"tick_ns", description.tick_ns},
-          {"emergency_stop", word(description.emergency_stop)}};
+          {"emergency_stop", word(description.emergency_stop)},
+          {"port", description.port}};
 }
 
 }  // namespace
@@ -98,6 +100,9 @@ std::vector<std::string> table(const Status& status) {
               "LIMITS", "TRUST", ""});
   Grid mcus({kLeft, kLeft, kRight, kLeft});
   mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
+  Grid buses({kLeft, kLeft});
+  buses.row({"BUS", "PORT"});
+  std::set<std::string> told;
   for (std::size_t i = 0; i < status.states.size(); ++i) {
     const api::StateSnapshot& mcu = status.states[i].snapshot;
     const bool is_mcu = status.descriptions.at(i).snapshot.is_mcu();
@@ -116,10 +121,15 @@ std::vector<std::string> table(const Status& status) {
     if (!is_mcu) continue;
     mcus.row({bushd::printable(mcu.mcu), std::string(word(mcu.state)), fmt::to_string(mcu.boot),
               bushd::printable(mcu.detail)});
+    if (!told.insert(mcu.bus).second) continue;
+    const std::string& port = status.descriptions.at(i).snapshot.port;
+    buses.row({bushd::printable(mcu.bus), port.empty() ? "not open" : bushd::printable(port)});
   }
   std::vector<std::string> out = motors.lines();
   out.emplace_back();
   for (std::string& line : mcus.lines()) out.push_back(std::move(line));
+  out.emplace_back();
+  for (std::string& line : buses.lines()) out.push_back(std::move(line));
   return out;
 }
 

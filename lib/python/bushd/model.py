@@ -204,6 +204,7 @@ class Mcu:
     tick: int
     tick_ns: int
     emergency_stop: str  # how its motors stop then: "ramp" or "immediate"
+    port: str  # of its bus, that is open; "": none
 
 
 @dataclasses.dataclass(frozen=True)

@@ -104,6 +104,7 @@ def _mcu(state: Any, description: Any) -> model.Mcu:
         tick=state.tick,
         tick_ns=description.tick_ns,
         emergency_stop=description.emergency_stop,
+        port=description.port,
     )
 
 

@@ -53,6 +53,23 @@ TEST(Render, AStalePositionHasItsTime) {
   EXPECT_EQ(shown["uncertain_reason"], "lost");
 }
 
+TEST(Render, ABusHasItsPort) {
+  auto status = status_of({.name = "theta"});
+  status.states.push_back(status.states.front());
+  status.descriptions.push_back(status.descriptions.front());
+  for (auto& description : status.descriptions) {
+    description.snapshot.address = 1;
+    description.snapshot.port = "/dev/ttyUSB1";
+  }
+  const auto lines = table(status);
+  ASSERT_GE(lines.size(), 2u);
+  EXPECT_THAT(lines.end()[-2], testing::StartsWith("BUS"));
+  EXPECT_EQ(lines.back(), "hall  /dev/ttyUSB1") << "once for all of its MCUs";
+  EXPECT_EQ(nlohmann::json::parse(json(status))["mcus"][0]["port"], "/dev/ttyUSB1");
+  for (auto& description : status.descriptions) description.snapshot.port.clear();
+  EXPECT_EQ(table(status).back(), "hall  not open");
+}
+
 // 400 steps are a mm, user positions fall where steps rise; -10 .. 30 mm for the user.
 bushd::client::Status stage_at(double user, std::int64_t steps) {
   bushd::client::Status status = status_of({.name = "x",

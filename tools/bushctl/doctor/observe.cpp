@@ -201,6 +201,16 @@ std::string configuration_to_examine(const Scope& scope) {
   return kSystemConfig;
 }
 
+// Of a pattern, the match that the daemon has open; "": none is, or nobody says.
+std::string port_in_use(const DaemonSeen& daemon, const std::string& bus) {
+  for (const auto& description : daemon.status.descriptions) {
+    if (description.snapshot.bus == bus && !description.snapshot.port.empty()) {
+      return description.snapshot.port;
+    }
+  }
+  return "";
+}
+
 std::uint64_t drops_of(const LcmSeen& lcm) {
   std::uint64_t drops = 0;
   for (const UdpSocket& socket : lcm.sockets) drops += socket.drops;
@@ -219,9 +229,6 @@ Observations observe(const Scope& as_asked) {
   seen.serving = serving_user(scope.config_path, seen.asking);
   seen.configuration = configuration_of(scope.config_path, config);
   seen.adapters = serial_adapters();
-  if (config) {
-    for (const auto& bus : config->buses) seen.ports.push_back(port_seen(bus.name, bus.port));
-  }
   seen.lcm = lcm_seen(bushd::client::lcm_url(config ? config->lcm.url : scope.client.url));
   seen.clock = clock_seen();
   seen.folders = folders_of(config);
@@ -232,6 +239,11 @@ Observations observe(const Scope& as_asked) {
   const std::uint64_t no_room = datagrams_without_room(text_of("/proc/net/snmp"));
   const std::uint64_t drops = drops_of(seen.lcm);
   seen.daemon = daemon_seen(scope);
+  if (config) {
+    for (const auto& bus : config->buses) {
+      seen.ports.push_back(port_seen(bus.name, bus.port, port_in_use(seen.daemon, bus.name)));
+    }
+  }
   // The kernel counts for a socket also what the filter of its program refuses, and for all
   // programs of this PC what found no room: of the sockets at this port it is what both have
   // counted.

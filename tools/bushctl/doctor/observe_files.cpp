@@ -81,9 +81,11 @@ std::vector<std::uint32_t> groups_of_account(const std::string& name) {
   return {groups.begin(), groups.begin() + count};
 }
 
-PortSeen port_seen(const std::string& bus, const std::string& configured) {
+PortSeen port_seen(const std::string& bus, const std::string& configured,
+                   const std::string& in_use) {
   PortSeen seen{.bus = bus, .configured = configured};
-  for (const std::string& path : bushd::config::ports_matching(configured)) {
+  for (const std::string& path :
+       bushd::config::ports_matching(in_use.empty() ? configured : in_use)) {
     const auto file = file_at(path);
     if (!file) continue;
     std::error_code error;
