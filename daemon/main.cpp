@@ -15,6 +15,7 @@
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
+#include "config/host_check.h"
 #include "control/path.h"
 #include "daemon/channel_claim.h"
 #include "daemon/event_loop.h"
@@ -229,6 +230,10 @@ int main(int argc, char** argv) {
   const auto config = bushd::config::load(check ? check_path : config_path);
   if (!config) {
     fmt::print(stderr, "{}\n", bushd::printable(config.error().text()));
+    return 1;
+  }
+  if (const auto fits = bushd::config::check_host(*config); !fits) {
+    fmt::print(stderr, "{}\n", bushd::printable(fits.error().text()));
     return 1;
   }
   if (check) {

@@ -46,6 +46,30 @@ void add_inputs(link::McuSetup& setup, const config::Motor& motor, bool one_inpu
   setup.motor_inputs.push_back(numbers);
 }
 
+// Where what the MCU may have no room for stands in the file.
+void add_places(link::McuSetup& setup, const config::Bus& bus, const config::Mcu& mcu) {
+  using enum link::SetupKey;
+  setup.places[{kAddress, 0}] = mcu.places.at("address");
+  setup.places[{kFormat, 0}] = bus.places.at("format");
+  setup.places[{kTick, 0}] = bus.places.at("tick_us");
+}
+
+void add_places(link::McuSetup& setup, const config::Motor& motor) {
+  using enum link::SetupKey;
+  const unsigned output = motor.output.value;
+  setup.places[{kOutput, output}] = motor.places.at("output");
+  setup.places[{kTable, output}] = motor.places.at("group");
+  setup.places[{kCurrents, output}] = motor.places.at("currents");
+  setup.places[{kVelocity, output}] = motor.places.at("velocity");
+  setup.places[{kKeypad, output}] = motor.places.at("keypad");
+  const Error inputs = motor.places.at(motor.places.written("inputs") ? "inputs" : "output");
+  setup.places[{kMotorInputs, output}] = inputs;
+  const config::MotorInputs& its = motor.inputs;
+  for (const auto& input : {its.positive, its.negative, its.home, its.step, its.own}) {
+    if (input) setup.places.try_emplace({kInput, input->number}, inputs);
+  }
+}
+
 // Rounded up: 0 would be no limit.
 std::uint16_t keypad_ticks(const config::Config& config, const config::Mcu& mcu) {
   const std::uint32_t tick_us = config.bus_of(mcu).tick_us;
@@ -72,6 +96,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const TableOf& t
   setup.outputs = mcu.outputs;
   setup.outputs_at = mcu.outputs_at;
   setup.inputs = inputs_of(mcu);
+  add_places(setup, config.bus_of(mcu), mcu);
   setup.off_after_watchdog = mcu.enable_after_reset == config::EnableAfterReset::kNo;
   std::vector<const config::Motor*> motors;
   for (const config::Motor& motor : config.motors) {
@@ -86,6 +111,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const TableOf& t
   // Slots are given in the order of outputs.
   std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
   for (const config::Motor* motor : motors) {
+    add_places(setup, *motor);
     add_inputs(setup, *motor, drive_of(motor).input_open);
     if (drive_of(motor).local) setup.local.motors |= bit_of(motor->output);
     if (drive_of(motor).keypad) {

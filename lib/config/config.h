@@ -16,6 +16,7 @@
 #include "base/ids.h"
 #include "base/result.h"
 #include "config/drive.h"
+#include "config/key_places.h"
 #include "config/setting.h"
 #include "engine/message.h"
 #include "fieldbus/emission_setup.h"
@@ -37,6 +38,7 @@ struct Control {
   // Empty: none. Without a value: where the daemon may make one (control/path.h).
   std::optional<std::string> path = {};
   std::string group = {};  // that may use it; empty: that of the daemon
+  Error group_at{};        // without a message
 };
 
 // What is kept over power cuts.
@@ -87,6 +89,8 @@ struct Bus {
   std::uint32_t start_hz = 0;   // F_start
   std::uint32_t answer_ms = 0;  // for an answer, beyond twice its delay
 
+  KeyPlaces places{};  // of `port`, `format`, `tick_us`
+
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };
 
@@ -112,6 +116,7 @@ struct Mcu {
   std::uint32_t enable_settle_ms = 0;         // from enabling them to the first step
   std::uint32_t keypad_ms = 500;  // that a key of its keypad counts; 0: until the next one
   bool stand_in = false;          // for a bus that has no MCUs
+  KeyPlaces places{};             // of `address`
 };
 
 struct Group {
@@ -153,6 +158,7 @@ struct Motor {
   bool has_one_input = false;  // that with the number of its output, which no other motor names
   bool never_disable = false;  // its MCU's drivers stay enabled at rest
   WrittenKeys written{};       // which settings the file has, also where it has a default
+  KeyPlaces places{};          // of `output`, `group`, `inputs`, `currents`, `velocity`, `keypad`
 };
 
 // A box with keys on a serial line of its own, which jogs a motor.
@@ -165,6 +171,7 @@ struct Keypad {
   std::uint32_t slower_us = 300;      // more with each key "slower"
   std::uint32_t slowest_us = 30'000;  // beyond it, the first one again
   std::uint32_t keepalive_ms = 500;   // 50..10000
+  Error port_at{};                    // without a message
 };
 
 struct PseudoAxis {

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "config/port_check.h"
 #include "config/words.h"
 
 namespace bushd::config {
@@ -37,12 +38,9 @@ Result<Keypad> read_keypad(const TomlReader& reader, const Config& config) {
   if (port->empty() || port->find('\0') != std::string::npos) {
     return refuse(reader, "port", "", kPortRule);
   }
-  const auto taken = [&](const auto& other) { return other.port == *port; };
-  if (std::ranges::any_of(config.buses, taken) || std::ranges::any_of(config.keypads, taken)) {
-    return fail(
-        reader.error("port", fmt::format("\"{}\" is already taken; allowed: each once", *port)));
-  }
+  if (auto free = check_keypad_port(reader, *port, config); !free) return fail(free.error());
   keypad.port = std::move(*port);
+  keypad.port_at = reader.error("port", "");
   const auto motor = reader.string("motor", "the name of a motor");
   if (!motor) return fail(motor.error());
   const auto found = std::ranges::find(config.motors, *motor, &Motor::name);

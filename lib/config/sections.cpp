@@ -157,6 +157,7 @@ Result<void> read_control(const TomlReader& root, Config* config) {
     auto group = reader.string("group", "the name of a group of users");
     if (!group) return fail(group.error());
     config->control.group = std::move(*group);
+    config->control.group_at = reader.error("group", "");
   }
   return {};
 }
@@ -178,7 +179,8 @@ Result<void> read_buses(Loading* loading) {
       return refuse(reader, "port", "", kPortRule);
     }
     bus.port = std::move(*port);
-    if (auto once = check_port(reader, bus, loading->config.buses); !once) return once;
+    if (auto once = check_bus_port(reader, bus.port, loading->config.buses); !once) return once;
+    bus.places = KeyPlaces(reader, {"port", "format", "tick_us"});
     if (auto read = read_manners(reader, &bus); !read) return read;
     loading->config.buses.push_back(std::move(bus));
   }
@@ -247,6 +249,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     Mcu mcu{.bus = *bus,
             .address = {static_cast<std::uint8_t>(*address)},
             .id = fmt::format("{}:{}", config->buses[bus->value].name, *address)};
+    mcu.places = KeyPlaces(reader, {"address"});
     auto emission = read_emission(reader);
     if (!emission) return fail(emission.error());
     mcu.emission = std::move(*emission);
@@ -402,6 +405,8 @@ Result<void> read_motors(Loading* loading) {
                 .mcu = *mcu,
                 .output = {static_cast<std::uint8_t>(*output)},
                 .group = *group};
+    motor.places =
+        KeyPlaces(reader, {"output", "group", "inputs", "currents", "velocity", "keypad"});
     if (auto read = read_output_levels(reader, motor.output, &config.mcus[mcu->value]); !read) {
       return read;
     }

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/message.h"
@@ -18,6 +20,20 @@ using fieldbus::McuAddress;
 struct TableRef {
   const bushd_table* table = nullptr;  // outlives the master
   std::uint32_t revision = 0;
+};
+
+// What an MCU may have no room for. Numbers: of outputs, with kInput of inputs, else 0.
+enum class SetupKey {
+  kAddress,
+  kFormat,
+  kTick,
+  kOutput,
+  kTable,
+  kCurrents,
+  kVelocity,
+  kKeypad,
+  kMotorInputs,
+  kInput
 };
 
 struct McuSetup {
@@ -38,6 +54,8 @@ struct McuSetup {
   std::uint16_t used_inputs = 0;
   bool off_after_watchdog = false;  // then drivers stay off until control() enables them
   bushd_local local{};              // motors that people move at it
+  // Where each of these stands in the configuration, for people; without messages.
+  std::map<std::pair<SetupKey, unsigned>, Error> places{};
 };
 
 struct BusSetup {

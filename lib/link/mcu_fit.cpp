@@ -15,6 +15,15 @@ constexpr unsigned kMinQueueTicks =
     2 * fieldbus::kMaxTicksPerFrame;           // one runs while the next arrives
 constexpr std::int64_t kMinQueueUs = 150'000;  // two lost answers and a frame
 
+// " (bushd.toml:31:1: motor[3].currents)"; nothing where nobody says.
+std::string at(const McuSetup& setup, SetupKey key, unsigned number = 0) {
+  const auto found = setup.places.find({key, number});
+  if (found == setup.places.end() || found->second.file.empty()) return "";
+  constexpr std::size_t kColon = 2;  // before the message that there is none of
+  const std::string place = found->second.text();
+  return " (" + place.substr(0, place.size() - kColon) + ")";
+}
+
 // No motor's table makes more steps in a tick than the emission has room for.
 Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
                         std::uint32_t tick_ns) {
@@ -30,7 +39,8 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
                 " steps of a motor in a tick, with its emission in " +
                 std::to_string(identity.slots) + " slots, but the table of output " +
                 std::to_string(output) + " makes up to " + std::to_string(steps) +
-                ": use a slower table, or less step_us or dir_setup_us");
+                ": use a slower table, or less step_us or dir_setup_us" +
+                at(setup, SetupKey::kTable, static_cast<unsigned>(output)));
   }
   for (const bushd_set_velocity& one : setup.velocities) {
     if (one.most == 0) continue;
@@ -41,7 +51,8 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
     return fail("has room for " + std::to_string(*room) +
                 " steps of a motor in a tick, but motor " + std::to_string(one.motor) +
                 " makes up to " + std::to_string(steps) +
-                " by its `velocity`: use a lower max_steps_per_s, or a shorter tick_us");
+                " by its `velocity`: use a lower max_steps_per_s, or a shorter tick_us" +
+                at(setup, SetupKey::kVelocity, one.motor));
   }
   return {};
 }
@@ -79,7 +90,8 @@ Result<void> check_currents(const McuSetup& setup, const bushd_identity& identit
   for (const bushd_currents& one : setup.currents) {
     if (one.ramp_ma == 0) continue;
     return fail("controls no currents of windings, but motor " + std::to_string(one.motor) +
-                " has `currents`: leave them out, or connect it to an MCU with a chopper");
+                " has `currents`: leave them out, or connect it to an MCU with a chopper" +
+                at(setup, SetupKey::kCurrents, one.motor));
   }
   return {};
 }
@@ -90,7 +102,8 @@ Result<void> check_velocities(const McuSetup& setup, const bushd_identity& ident
     if (one.most == 0) continue;
     return fail("moves no motor by the velocity loop, but motor " + std::to_string(one.motor) +
                 " has `velocity`: leave it out, so that local inputs move it by its table, or "
-                "connect it to an MCU that has the loop");
+                "connect it to an MCU that has the loop" +
+                at(setup, SetupKey::kVelocity, one.motor));
   }
   return {};
 }
@@ -109,9 +122,10 @@ Result<void> check_outputs(const McuSetup& setup, const bushd_identity& identity
 
 Result<void> check_keypad(const McuSetup& setup, const bushd_identity& identity) {
   if (setup.local.keypad == 0 || (identity.capabilities & BUSHD_CAN_KEYPAD) != 0) return {};
-  return fail("has no line for a keypad, but motor " +
-              std::to_string(std::countr_zero(setup.local.keypad)) +
-              " has `keypad`: leave it out, or connect the keypad to the PC as a [[keypad]]");
+  const auto motor = static_cast<unsigned>(std::countr_zero(setup.local.keypad));
+  return fail("has no line for a keypad, but motor " + std::to_string(motor) +
+              " has `keypad`: leave it out, or connect the keypad to the PC as a [[keypad]]" +
+              at(setup, SetupKey::kKeypad, motor));
 }
 
 // An MCU has as many inputs as motors.
@@ -120,13 +134,14 @@ Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity)
     if ((setup.used_inputs >> n & 1u) == 0) continue;
     return fail("has only " + std::to_string(identity.motors) + " inputs, but input " +
                 std::to_string(n) + " is configured: use inputs 0 to " +
-                std::to_string(identity.motors - 1));
+                std::to_string(identity.motors - 1) + at(setup, SetupKey::kInput, n));
   }
   if (setup.motor_inputs.empty() || (identity.capabilities & BUSHD_CAN_MOTOR_INPUTS) != 0) {
     return {};
   }
   return fail("knows one input a motor, but motor " + std::to_string(setup.motor_inputs[0].motor) +
-              " has others: leave out `inputs` of its motors, or update its firmware");
+              " has others: leave out `inputs` of its motors, or update its firmware" +
+              at(setup, SetupKey::kMotorInputs, setup.motor_inputs[0].motor));
 }
 
 }  // namespace
@@ -148,7 +163,7 @@ Result<void> check_room(const McuSetup& setup, const bushd_identity& identity,
   if (codes <= identity.table_codes) return check_time(setup, identity, tick_ns);
   return fail("has memory for " + std::to_string(identity.table_codes) +
               " table codes, but its motors' tables need " + std::to_string(codes) +
-              ": use shorter tables or fewer on this MCU");
+              ": use shorter tables or fewer on this MCU" + at(setup, SetupKey::kAddress));
 }
 
 Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_identity& identity) {
@@ -160,12 +175,13 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
   const bool fine = bus.format == BUSHD_FORMAT_FINE;
   if ((identity.capabilities & (fine ? BUSHD_CAN_FINE : BUSHD_CAN_COARSE)) == 0) {
     return fail(std::string("does not know the ") + (fine ? "fine" : "coarse") +
-                " format: choose the other one for this bus");
+                " format: choose the other one for this bus" + at(setup, SetupKey::kFormat));
   }
   for (unsigned m = identity.motors; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (setup.table_of_motor[m]) {
       return fail("has only " + std::to_string(identity.motors) + " outputs, but output " +
-                  std::to_string(m) + " is configured");
+                  std::to_string(m) + " is configured: connect the motor to another one" +
+                  at(setup, SetupKey::kOutput, m));
     }
   }
   if (auto inputs = check_inputs(setup, identity); !inputs) return inputs;
@@ -176,7 +192,8 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
     return fail("has a queue of " + std::to_string(identity.queue_ticks) + " ticks, " +
                 std::to_string(queue_us / 1000) + " ms; needed are " +
                 std::to_string(kMinQueueTicks) + " ticks and " +
-                std::to_string(kMinQueueUs / 1000) + " ms: use a longer tick");
+                std::to_string(kMinQueueUs / 1000) + " ms: use a longer tick" +
+                at(setup, SetupKey::kTick));
   }
   return {};
 }

@@ -5,8 +5,6 @@
 #include <linux/serial.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
-#include <sys/stat.h>
-#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -15,6 +13,7 @@
 #include <memory>
 #include <utility>
 
+#include "base/console.h"
 #include "serial/any_rate.h"
 
 namespace bushd::serial {
@@ -43,22 +42,11 @@ Error port_error(const std::string& path, const std::string& what, int error) {
   return {.message = what + ": " + std::strerror(error), .file = path};
 }
 
-// Consoles, virtual terminals and the like: ttys all of them, and people's, not a line's. Known by
-// their numbers (Documentation/admin-guide/devices.txt of Linux), without opening them.
-bool is_console(const struct stat& status) {
-  if (!S_ISCHR(status.st_mode)) return false;
-  constexpr unsigned kTerminals = 4;   // tty0 .. tty63; from 64 on ttyS0
-  constexpr unsigned kAlternates = 5;  // tty, console, ptmx, ttyprintk; from 64 on cua0
-  const unsigned kind = major(status.st_rdev);
-  return (kind == kTerminals || kind == kAlternates) && minor(status.st_rdev) < 64;
-}
-
 // Locked before anything is changed: a second program must not disturb the line of the first. And
 // only a tty that can be opened reaches libserial: a SerialPort whose Open failed half-way cannot
 // be destroyed.
 Result<int> open_and_lock(const std::string& path) {
-  struct stat status{};
-  if (::stat(path.c_str(), &status) == 0 && is_console(status)) {
+  if (is_console(path)) {
     return fail(Error{.message = "is a console, not a serial port; name the port that the line is "
                                  "connected to",
                       .file = path});

@@ -76,6 +76,16 @@ TEST(ConfigKeypads, WhatCannotBeIsRefused) {
   EXPECT_THAT(board_error(changed(kKeypad, "motor = \"m0\"", "motor = \"m1\"")),
               HasSubstr("keypad[0].motor: is \"m1\"; allowed: the name of a motor"));
   EXPECT_THAT(board_error(changed(kKeypad, "/dev/b", "/dev/a")), HasSubstr("is already taken"));
+  for (const char* spelling : {"/dev/../dev/a", "//dev/./a"}) {
+    EXPECT_THAT(board_error(changed(kKeypad, "/dev/b", spelling)),
+                HasSubstr("is already taken: it is, or may be, \"/dev/a\" of bus \"board\""))
+        << spelling;
+  }
+  EXPECT_THAT(
+      board_error(changed(changed(kKeypad, "/dev/a", "/dev/tty[ab]"), "/dev/b", "/dev/ttya")),
+      HasSubstr("is already taken: it is, or may be, \"/dev/tty[ab]\""));
+  EXPECT_THAT(board_error(kKeypad + "[[keypad]]\nport = \"/dev/../dev/b\"\nmotor = \"m0\"\n"),
+              HasSubstr("\"/dev/b\" of another [[keypad]]"));
   EXPECT_THAT(board_error(kKeypad + "mode = \"toggle\"\n"),
               HasSubstr("allowed: \"hold\" or \"latch\""));
   EXPECT_THAT(board_error(kKeypad + "baud = 1\n"), HasSubstr("50..4000000"));

@@ -9,6 +9,7 @@
 
 #include "config/config.h"
 #include "config/config_file.h"
+#include "config/host_check.h"
 
 namespace bushd::config {
 namespace {
@@ -115,6 +116,58 @@ TEST(ConfigTogether, OnePortUnderTwoSpellingsIsRefusedBeforeItIsThere) {
   ASSERT_FALSE(config.has_value());
   EXPECT_EQ(config.error().line, 12);
   EXPECT_EQ(config.error().key, "bus[1].port");
+}
+
+// Its target is unplugged: the port is absent, and still the same as the target.
+TEST(ConfigTogether, APortBehindADanglingLinkIsItsTarget) {
+  const TempDirectory directory;
+  const std::string port = directory.path() / "ttyUSB0";
+  const auto link = directory.path() / "by-id";
+  std::filesystem::create_symlink("ttyUSB0", link);
+  std::filesystem::create_symlink(link, directory.path() / "hall");
+  EXPECT_TRUE(ConfigFile(replaced(kGood, "/dev/no-such-port-a", link)).load().has_value());
+  const ConfigFile file(replaced(replaced(kGood, "/dev/no-such-port-a", port),
+                                 "/dev/no-such-port-b", (directory.path() / "hall").string()));
+  const auto config = file.load();
+  ASSERT_FALSE(config.has_value());
+  EXPECT_EQ(config.error().key, "bus[1].port");
+  // Links that lead to themselves lead nowhere.
+  std::filesystem::create_symlink("b", directory.path() / "a");
+  std::filesystem::create_symlink("a", directory.path() / "b");
+  EXPECT_TRUE(ConfigFile(replaced(kGood, "/dev/no-such-port-a", (directory.path() / "a").string()))
+                  .load()
+                  .has_value());
+}
+
+std::string host_error(const std::string& text) {
+  const auto config = ConfigFile(text).load();
+  if (!config) return "not loaded: " + config.error().text();
+  const auto fits = check_host(*config);
+  return fits ? "none" : fits.error().text();
+}
+
+TEST(ConfigHost, AConsoleIsNoPort) {
+  const TempDirectory directory;
+  const auto link = directory.path() / "panel";
+  std::filesystem::create_symlink("/dev/tty", link);
+  for (const std::string& console : {std::string("/dev/tty"), std::string("/dev/../dev/tty"),
+                                     std::string("/dev/tt[y]"), link.string()}) {
+    EXPECT_THAT(host_error(replaced(kGood, "/dev/no-such-port-b", console)),
+                HasSubstr(":12:8: bus[1].port: \"" + console + "\" is a console; allowed: "))
+        << console;
+  }
+  EXPECT_EQ(host_error(kGood), "none") << "an adapter may be unplugged";
+  EXPECT_EQ(host_error(replaced(kGood, "/dev/no-such-port-b", "/dev/null")), "none");
+}
+
+TEST(ConfigHost, AGroupOfUsersHasToBeThere) {
+  EXPECT_EQ(host_error("[control]\ngroup = \"root\"\n" + kGood), "none");
+  EXPECT_EQ(host_error("[control]\ngroup = \"\"\n" + kGood), "none");
+  EXPECT_EQ(host_error("[control]\npath = \"\"\ngroup = \"no-such-group\"\n" + kGood), "none")
+      << "no socket, nobody's";
+  EXPECT_THAT(host_error("[control]\ngroup = \"no-such-group\"\n" + kGood),
+              HasSubstr(":2:9: control.group: is \"no-such-group\", and this PC has no such group "
+                        "of users; allowed: "));
 }
 
 TEST(ConfigTogether, BusWithoutMcuIsRefused) {

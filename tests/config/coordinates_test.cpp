@@ -124,6 +124,31 @@ TEST(ConfigCoordinates, Backlash) {
   EXPECT_EQ(motor.settle_ms, 50);
 }
 
+// Every move and every homing would be refused later.
+TEST(ConfigCoordinates, ASpeedBelowAStepAnHourIsRefused) {
+  const std::string mm = "unit = \"mm\"\nsteps_per_unit = 400\n";
+  const auto home = [](const std::string& speed) {
+    return "home = { direction = \"negative\", most_steps = 9, speed = " + speed + " }\n";
+  };
+  for (const auto& [keys, reason] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"max_speed = 1e-9\n",
+            "37:13: motor[1].max_speed: 1e-09 steps/s would take 1e+09 s a "
+            "step; allowed: up to an hour a step, which is 0.000277778"},
+           {mm + "max_speed = 6e-7\n",
+            "39:13: motor[1].max_speed: 6e-07 mm/s would take 4166.67 s"},
+           {"max_speed = 1e-300\n", "motor[1].max_speed: "},
+           {home("1e-9"), "motor[1].home.speed: 1e-09 steps/s would take 1e+09 s a step"},
+           {mm + home("6e-7"), "motor[1].home.speed: 6e-07 mm/s would take 4166.67 s a step"}}) {
+    const auto config = ConfigFile(with_coordinates(keys)).load();
+    ASSERT_FALSE(config.has_value()) << keys;
+    EXPECT_THAT(config.error().text(), HasSubstr(reason)) << keys;
+  }
+  for (const std::string& keys : {mm + "max_speed = 7e-7\n", mm + home("7e-7")}) {
+    const auto config = ConfigFile(with_coordinates(keys)).load();
+    EXPECT_TRUE(config.has_value()) << config.error().text();
+  }
+}
+
 TEST(ConfigCoordinates, ABadBacklashIsRefusedWithItsLine) {
   const std::string mm = "unit = \"mm\"\nsteps_per_unit = 400\n";
   for (const auto& [keys, reason] : std::initializer_list<std::pair<std::string, std::string>>{
@@ -133,6 +158,9 @@ TEST(ConfigCoordinates, ABadBacklashIsRefusedWithItsLine) {
            {"backlash = nan\n", "37:12: motor[1].backlash: "},
            {"backlash_speed = 5\n", "motor[1].backlash_speed: needs `backlash`"},
            {"backlash = 5\nbacklash_speed = 0\n", "motor[1].backlash_speed: is 0"},
+           {"backlash = 5\nbacklash_speed = 1e-9\n",
+            "38:18: motor[1].backlash_speed: 1e-09 steps/s would take 1e+09 s a step; allowed: up "
+            "to an hour a step"},
            {"settle_ms = -1\n", "37:13: motor[1].settle_ms: "},
            {"settle_ms = 60001\n", "37:13: motor[1].settle_ms: "}}) {
     const auto config = ConfigFile(with_coordinates(keys)).load();

@@ -51,6 +51,8 @@ TEST(EmissionKeys, EachModeHasItsKeys) {
   EXPECT_EQ(staggered.settle_us, 0) << "measured";
   EXPECT_EQ(settings_of("emission = \"staggered\"\nstep_us = 300\nsettle_us = 518\n").settle_us,
             518);
+  EXPECT_EQ(settings_of("emission = \"staggered\"\nstep_us = 300\nsettle_us = 0\n").settle_us, 0)
+      << "none is said: measured too";
   const bushd_emission phases = settings_of("emission = \"phases\"\n");
   EXPECT_EQ(phases.sequence, BUSHD_PHASES_FULL);
   EXPECT_TRUE(phases.hold_current);

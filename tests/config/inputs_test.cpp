@@ -66,6 +66,14 @@ TEST(ConfigInputs, DriversAreDisabledAtRest) {
   EXPECT_EQ(config->mcus[1].idle_disable_s, 2.5);
   EXPECT_EQ(config->mcus[1].enable_settle_ms, 300u);
   EXPECT_TRUE(config->motors[1].never_disable);
+  // 0 is none, which local inputs and motors that are always held have nothing against.
+  for (const char* key : {"never_disable = true\n", "local = true\n"}) {
+    const auto never = ConfigFile(replaced(with_mcu("idle_disable_s = 0\n"), "output = 15\n",
+                                           "output = 15\n" + std::string(key)))
+                           .load();
+    ASSERT_TRUE(never.has_value()) << never.error().text();
+    EXPECT_FALSE(never->mcus[1].idle_disable_s);
+  }
 }
 
 TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {

@@ -58,6 +58,21 @@ class Configuration(EndToEndTest):
                 started = self.run_program(program("BUSHD"), "--config", self.file("bushd.toml"))
                 self.assertEqual((started.returncode, started.stderr), (1, ran.stderr))
 
+    def test_what_this_pc_does_not_have_is_refused_at_the_start_too(self):
+        good = configuration(self.file("port"), control=self.file("control"))
+        slow = good.replace('name = "a0"', 'name = "a0"\nmax_speed = 1e-9', 1)
+        for text, message in [
+            (good.replace("[control]", '[control]\ngroup = "no-such-group"', 1), r"control\.group: is \"no-such-group\""),
+            (good.replace(f'port = "{self.file("port")}"', 'port = "/dev/tty"', 1), r"bus\[0\]\.port: \"/dev/tty\" is a console"),
+            (slow, r"motor\[0\]\.max_speed: 1e-09 steps/s would take"),
+        ]:
+            with self.subTest(message):
+                ran = self.check(text)
+                self.assertEqual((ran.returncode, ran.stdout), (1, ""))
+                self.assertRegex(ran.stderr, rf"bushd\.toml:\d+:\d+: {message}.*allowed: ")
+                started = self.run_program(program("BUSHD"), "--config", self.file("bushd.toml"))
+                self.assertEqual((started.returncode, started.stderr), (1, ran.stderr))
+
     @staticmethod
     def first_difference(good, bad):
         lines = zip(good.splitlines(), bad.splitlines())

@@ -8,6 +8,7 @@ namespace bushd::test {
 namespace {
 
 using link::McuPhase;
+using testing::EndsWith;
 using testing::HasSubstr;
 
 struct Misfit {
@@ -79,6 +80,14 @@ TEST(Connect, AnMcuWithoutAChopperIsNamedWhereCurrentsAreSet) {
   EXPECT_EQ(bus.master->view(McuIndex{0}).phase, McuPhase::kOffline);
   EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
               HasSubstr("controls no currents of windings, but motor 1 has `currents`"));
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail, EndsWith("an MCU with a chopper"));
+  // And where that stands, if the setup says so.
+  setup.places[{link::SetupKey::kCurrents, 1}] = {
+      .message = {}, .file = "b.toml", .line = 31, .key = "motor[3].currents", .column = 12};
+  bus.master->reconfigure(McuIndex{0}, setup);
+  bus.run_for(3'000'000);
+  EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
+              EndsWith("an MCU with a chopper (b.toml:31:12: motor[3].currents)"));
 }
 
 TEST(Connect, AnMcuWithoutTheVelocityLoopIsNamedWhereVelocityIsSet) {
