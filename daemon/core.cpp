@@ -44,7 +44,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
             carry_out(now_us, asker, request);
           },
           [this] { return moves_.begins(); },
-          [this](const api::Move& move) { return moves_.would_take(move); }),
+          [this](const api::Request& request) { return would_take(request); }),
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return departures_.holds(motor); }),
@@ -165,6 +165,18 @@ void Core::request(std::int64_t now, const api::Asker& who, const api::Request& 
     return open_moves_.not_begun(asker, *by);
   }
   if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);
+}
+
+// Paths, arrays and lines for the trigger are found out about when they are carried out: their
+// points are many, or their MCUs have yet to get a table.
+bool Core::would_take(const api::Request& request) const {
+  return std::visit(Overloaded{[&](const api::Move& r) { return moves_.would_take(r); },
+                               [&](const api::MoveLine& r) { return lines_.would_take(r); },
+                               [&](const api::Arm& r) { return trigger_.would_take(r); },
+                               [&](const api::Jog& r) { return jogs_.would_take(r); },
+                               [&](const api::SetPosition& r) { return positions_.would_take(r); },
+                               [](const auto&) { return true; }},
+                    request);
 }
 
 void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Request& request) {

@@ -104,6 +104,7 @@ class Core {
  private:
   void end_overtaken(std::int64_t now_us);
   void carry_out(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
+  bool would_take(const api::Request& request) const;
 
   Outputs& outputs_;
   Installation installation_;

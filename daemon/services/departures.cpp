@@ -66,10 +66,8 @@ bool Departures::any_held(const std::vector<MotorId>& motors) const {
 
 bool Departures::is_refused_anyway(const api::Request& request,
                                    const std::vector<MotorId>& motors) const {
-  const auto* move = std::get_if<api::Move>(&request);
   const auto changes = [this](MotorId motor) { return kept_.being_restored(motor); };
-  return move != nullptr && !any_held(motors) && std::ranges::none_of(motors, changes) &&
-         !may_begin_(*move);
+  return !any_held(motors) && std::ranges::none_of(motors, changes) && !would_take_(request);
 }
 
 Result<bool> Departures::make_ready(std::int64_t now_us, Held& held) {

@@ -23,11 +23,11 @@ class Departures final : public Service {
  public:
   using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
   // `busy`: what was carried out before is still being begun; all that is held waits for it.
-  // `may_begin`: whether a move would be taken as things stand.
+  // `would_take`: whether the request would be taken as things stand, as far as that is known.
   Departures(const Installation& installation, const Interlocks& interlocks,
              const OpenMoves& open_moves, KeptPositions& kept, IdleDrivers& idle_drivers,
              LineTables& line_tables, CarryOut carry_out, std::function<bool()> busy,
-             std::function<bool(const api::Move&)> may_begin)
+             std::function<bool(const api::Request&)> would_take)
       : installation_(installation),
         interlocks_(interlocks),
         open_moves_(open_moves),
@@ -36,7 +36,7 @@ class Departures final : public Service {
         line_tables_(line_tables),
         carry_out_(std::move(carry_out)),
         busy_(std::move(busy)),
-        may_begin_(std::move(may_begin)) {}
+        would_take_(std::move(would_take)) {}
 
   // Whether the request is kept here. It is carried out, or refused, in a later step.
   bool hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
@@ -76,7 +76,7 @@ class Departures final : public Service {
   LineTables& line_tables_;
   CarryOut carry_out_;
   std::function<bool()> busy_;
-  std::function<bool(const api::Move&)> may_begin_;
+  std::function<bool(const api::Request&)> would_take_;
   std::list<Held> held_;
 };
 

@@ -48,6 +48,11 @@ void Jogs::request(std::int64_t now_us, const api::Asker& asker, const api::Jog&
   run(now_us, asker, *motor, request);
 }
 
+bool Jogs::would_take(const api::Jog& request) const {
+  const auto motor = installation_.find(request.motor);
+  return motor && in_range(request) && course_of(*motor, request);
+}
+
 // Whoever holds a key pressed does not notice that others have stopped the motor: it stays at rest.
 Result<void> Jogs::may_jog(std::int64_t now_us, MotorId motor, const api::Asker& asker) {
   for (Barred& barred : barred_) {

@@ -24,6 +24,8 @@ class Jogs final : public Service {
       : installation_(installation), interlocks_(interlocks), moves_(moves), open_(open_moves) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Jog& request);
+  // As things stand, whoever asks.
+  bool would_take(const api::Jog& request) const;
 
   void step(std::int64_t now_us) override;
   std::int64_t next_wake_us() const;

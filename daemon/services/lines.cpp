@@ -30,6 +30,16 @@ void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
   start(now_us, asker, std::move(*line));
 }
 
+bool Lines::would_take(const api::MoveLine& request) const {
+  const auto motors = installation_.find(request.motors);
+  if (!motors) return false;
+  if (std::ranges::any_of(*motors, [this](MotorId id) { return installation_[id].has_plan(); })) {
+    return true;
+  }
+  const Line line{.motors = *motors, .points = {}, .way = {}, .by = request.by};
+  return may_be_one_line(*motors) && points_of(line, request);
+}
+
 const std::string& Lines::limiting(const Line& line) const {
   return installation_[line.motors[line.way.limiting()]].name();
 }

@@ -44,6 +44,9 @@ class Lines final : public Service {
   void request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request);
   void request(std::int64_t now_us, const api::Asker& asker, const api::MovePath& request);
   void request(const api::Asker& asker, const api::ArmLine& request);
+  // As things stand: its ends can be reached. The line itself is not planned for that, and one that
+  // leads on from another is not looked at.
+  bool would_take(const api::MoveLine& request) const;
 
   // The table of the line that is asked for, if the line is to wait until it has been uploaded to
   // these MCUs: they rest, have room for it, and make the line's run then, as those do that have it

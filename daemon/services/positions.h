@@ -32,6 +32,8 @@ class Positions final : public Service {
   using Answerer = std::function<void(const api::Asker&, api::Completed)>;
   void set_answerer(Answerer answerer) { answerer_ = std::move(answerer); }
 
+  // As things stand.
+  bool would_take(const api::SetPosition& request) const { return plan_of(request).has_value(); }
   // What was asked for is not yet done.
   bool being_set(MotorId motor) const;
   // Likewise, and it is the MCU's counter.

@@ -29,6 +29,8 @@ class Trigger final : public Service {
 
   void request(const api::Asker& asker, const api::Arm& request);
   void request(const api::Asker& asker, const api::Disarm& request);
+  // As things stand.
+  bool would_take(const api::Arm& request) const { return motors_of(request).has_value(); }
 
   void reports(std::int64_t, Mcu&) override { follow(); }
   void step(std::int64_t) override { follow(); }

@@ -164,6 +164,27 @@ TEST(KeptPositions, WhatIsRefusedWhateverTheDiskSaysLeavesNoMarkThere) {
   const auto number = lab.send(Ask::kMoveBy, {"m01"}, {3'000'000'000});
   ASSERT_FALSE(lab.replies(number).empty()) << "it waits for no disk";
   EXPECT_THAT(lab.last_reply(number).reason, HasSubstr("is beyond +-2147483647 steps"));
+  const std::vector<api::MotorAmount> far = {{"m01", std::int64_t{3'000'000'000}}};
+  const std::vector<api::MotorAmount> near = {{"m01", std::int64_t{100}}};
+  const auto slowly = api::Speed{.per_s = 1e-9, .in_steps = true};
+  for (const auto& [request, why] : std::initializer_list<std::pair<api::Request, const char*>>{
+           {api::MoveLine{.motors = far}, "is beyond +-2147483647 steps"},
+           {api::MoveLine{.motors = near, .speed = slowly}, "up to an hour a step"},
+           {api::Arm{.delay_us = 1000, .motors = far}, "is beyond +-2147483647 steps"},
+           {api::Arm{.delay_us = 1, .motors = near}, "after the trigger; allowed: "},
+           {api::Jog{.motor = "m01", .per_s = 1e-9, .in_steps = true}, "up to an hour a step"},
+           {api::Jog{.motor = "m01", .per_s = 100, .keepalive_ms = 1}, "keepalive time of 1 ms"},
+           {api::SetPosition{.motors = far}, "positions lie within"}}) {
+    const auto asked = lab.send(request);
+    ASSERT_FALSE(lab.replies(asked).empty()) << why << ": it waits for no disk";
+    EXPECT_EQ(lab.last_reply(asked).result, "refused") << why;
+    EXPECT_THAT(lab.last_reply(asked).reason, HasSubstr(why));
+  }
+  // An MCU that loses its power now stands where it stood.
+  lab.run_for(0.2);
+  lab.bus(0).reboot(0);
+  lab.reconnect();
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
 }
 
