@@ -13,9 +13,17 @@ namespace {
 
 constexpr Tick kNever = INT64_MAX / 2;
 
-constexpr const char* kStoppedImmediately =
-    "it was stopped immediately by an emergency stop and may have overrun";
 constexpr const char* kUnpowered = "its drivers were disabled by overcurrent while it moved";
+
+// Precondition: one of the two has stopped it.
+std::string stopper(const bushd_report& report, const std::string& mcu) {
+  const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
+  return commanded ? "an emergency stop" : "the emergency input of MCU " + mcu;
+}
+
+std::string stopped_immediately(const bushd_report& report, const std::string& mcu) {
+  return "it was stopped immediately by " + stopper(report, mcu) + " and may have overrun";
+}
 
 bool has_bit(unsigned mask, Output output) {
   return (mask >> output.value & 1) != 0;
@@ -157,7 +165,7 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
   const bool immediate = stops_immediately(report);
   const bool unpowered = (report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
   if ((immediate || unpowered) && (first || position_ != before)) {
-    uncertain_reason_ = immediate ? kStoppedImmediately : kUnpowered;
+    uncertain_reason_ = immediate ? stopped_immediately(report, setup_.mcu) : kUnpowered;
   }
   take_limits(report);
   follow_autonomous(report, false);
@@ -195,7 +203,7 @@ void Motor::follow_asked_for() {
 void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output()));
   if (before && !autonomous_) {
-    if (stops_immediately(report)) uncertain_reason_ = kStoppedImmediately;
+    if (stops_immediately(report)) uncertain_reason_ = stopped_immediately(report, setup_.mcu);
     if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) uncertain_reason_ = kUnpowered;
   }
   const bool free = is<Resting>() || is<Local>();
@@ -436,10 +444,9 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
                            api::remedy("enable", name()));
   }
   if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
-    const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
-    const std::string by = commanded ? "an emergency stop" : "the emergency input of " + mcu;
+    const std::string by = stopper(report, setup_.mcu);
     const bool overran = stops_immediately(report) && stepped;
-    if (overran) uncertain_reason_ = kStoppedImmediately;
+    if (overran) uncertain_reason_ = stopped_immediately(report, setup_.mcu);
     return ended(Outcome::kStopped,
                  overran ? "stopped immediately by " + by +
                                "; it may have overrun, so check the position, and run " +

@@ -11,7 +11,16 @@ namespace bushd::sim {
 using TimeNs = std::int64_t;
 inline constexpr TimeNs kNsPerSecond = 1'000'000'000;
 
-enum class Signal : std::uint8_t { kStep, kDir, kEnable, kCommonDir, kPositionCompare };
+enum class Signal : std::uint8_t {
+  kStep,
+  kDir,
+  kEnable,
+  kCommonDir,
+  kPositionCompare,
+  // Inputs: high where a contact is closed.
+  kTrigger,
+  kEmergency
+};
 
 inline constexpr std::size_t kOutputsPerMcu = 16;
 
@@ -19,16 +28,18 @@ struct Edge {
   TimeNs time_ns;
   std::size_t mcu;  // position on the bus, in the order of Bus::add_mcu
   Signal signal;
-  std::uint8_t index;  // output 0..15; 0 for kEnable, kCommonDir and kPositionCompare
+  std::uint8_t index;  // output 0..15 of kStep and kDir, else 0
   bool level;
 };
 
-// What can be measured at an MCU: the current of a winding, in A.
+// What can be measured at an MCU: the current of a winding, in A, or of the supply, as its sensor
+// reads it: 0..1023.
 struct Sample {
+  static constexpr std::uint8_t kSupply = 4;
   TimeNs time_ns;
   std::size_t mcu;
-  std::uint8_t winding;
-  double current_a;
+  std::uint8_t winding;  // 0..3, or kSupply
+  double value;
 };
 
 // All pins are low when the simulation begins.

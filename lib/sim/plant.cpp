@@ -66,7 +66,7 @@ void Plant::report(TimeNs time_ns, std::size_t mcu, std::size_t output, const Mo
 }
 
 void Plant::edge(const Edge& edge) {
-  if (edge.signal == Signal::kPositionCompare) return;
+  if (edge.signal >= Signal::kPositionCompare) return;  // nothing of motors
   if (edge.signal == Signal::kEnable) {
     enabled_[edge.mcu] = edge.level;
     return;

@@ -1,6 +1,7 @@
 #include "sim/vcd.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cerrno>
 #include <charconv>
@@ -9,32 +10,26 @@
 namespace bushd::sim {
 namespace {
 
-constexpr std::size_t kWiresPerMcu = 2 * kOutputsPerMcu + 3;
+constexpr std::size_t kWiresPerMcu = 2 * kOutputsPerMcu + 5;
 constexpr std::size_t kWindings = 4;
+constexpr std::size_t kRealsPerMcu = kWindings + 1;  // and Sample::kSupply
 constexpr std::size_t kTextBytes = std::size_t{1} << 18;
+
+constexpr std::array<const char*, 5> kOthers = {"en", "common_dir", "position_compare", "trigger",
+                                                "emergency"};
 
 std::size_t wire_of(const Edge& edge) {
   const std::size_t first = edge.mcu * kWiresPerMcu;
-  switch (edge.signal) {
-    case Signal::kStep:
-      return first + edge.index;
-    case Signal::kDir:
-      return first + kOutputsPerMcu + edge.index;
-    case Signal::kEnable:
-      return first + 2 * kOutputsPerMcu;
-    case Signal::kCommonDir:
-      return first + 2 * kOutputsPerMcu + 1;
-    case Signal::kPositionCompare:
-      break;
-  }
-  return first + 2 * kOutputsPerMcu + 2;
+  if (edge.signal == Signal::kStep) return first + edge.index;
+  if (edge.signal == Signal::kDir) return first + kOutputsPerMcu + edge.index;
+  static_assert(static_cast<std::size_t>(Signal::kEnable) == 2);
+  return first + 2 * kOutputsPerMcu + static_cast<std::size_t>(edge.signal) - 2;
 }
 
 std::string wire_name(std::size_t wire) {
   if (wire < kOutputsPerMcu) return "step" + std::to_string(wire);
   if (wire < 2 * kOutputsPerMcu) return "dir" + std::to_string(wire - kOutputsPerMcu);
-  if (wire == 2 * kOutputsPerMcu) return "en";
-  return wire == 2 * kOutputsPerMcu + 1 ? "common_dir" : "position_compare";
+  return kOthers.at(wire - 2 * kOutputsPerMcu);
 }
 
 // The standard allows any printable characters; short codes keep the file small.
@@ -60,14 +55,15 @@ Error write_error(const std::string& path, const char* what, int error_number) {
 Result<std::unique_ptr<VcdWriter>> VcdWriter::create(const std::string& path,
                                                      std::span<const std::uint8_t> addresses,
                                                      const std::set<std::uint8_t>& measured,
-                                                     const std::string& comment) {
+                                                     const std::string& comment,
+                                                     const std::set<std::uint8_t>& supplied) {
   File file(std::fopen(path.c_str(), "we"));
   if (!file) return fail(write_error(path, "the trace cannot be created", errno));
   // Text is gathered here already; a second buffer would only delay the news of a full disk.
   std::setvbuf(file.get(), nullptr, _IONBF, 0);
   std::unique_ptr<VcdWriter> writer(new VcdWriter(path, std::move(file), addresses.size()));
   if (!comment.empty()) writer->text_ += "$comment " + comment + " $end\n";
-  writer->write_head(addresses, measured);
+  writer->write_head(addresses, measured, supplied);
   writer->flush_text();
   if (writer->error_) return fail(*writer->error_);
   return writer;
@@ -78,12 +74,13 @@ VcdWriter::VcdWriter(std::string path, File file, std::size_t mcus)
   for (std::size_t wire = 0; wire < mcus * kWiresPerMcu; ++wire) {
     identifiers_.push_back(identifier(wire));
   }
-  currents_.resize(mcus * kWindings);
+  reals_.resize(mcus * kRealsPerMcu);
   text_.reserve(kTextBytes + 64);
 }
 
 void VcdWriter::write_head(std::span<const std::uint8_t> addresses,
-                           const std::set<std::uint8_t>& measured) {
+                           const std::set<std::uint8_t>& measured,
+                           const std::set<std::uint8_t>& supplied) {
   std::size_t next = identifiers_.size();
   text_ += "$version bushd virtual bus $end\n$timescale 1 ns $end\n";
   for (std::size_t mcu = 0; mcu < addresses.size(); ++mcu) {
@@ -92,17 +89,21 @@ void VcdWriter::write_head(std::span<const std::uint8_t> addresses,
       text_ += "$var wire 1 " + identifiers_[mcu * kWiresPerMcu + wire] + " " + wire_name(wire) +
                " $end\n";
     }
+    const auto name_real = [&](std::size_t index, const std::string& name) {
+      std::string& code = reals_[mcu * kRealsPerMcu + index] = identifier(next++);
+      text_ += "$var real 64 " + code + " " + name + " $end\n";
+    };
     for (std::size_t w = 0; w < kWindings && measured.contains(addresses[mcu]); ++w) {
-      std::string& code = currents_[mcu * kWindings + w] = identifier(next++);
-      text_ += "$var real 64 " + code + " current" + std::to_string(w) + "_a $end\n";
+      name_real(w, "current" + std::to_string(w) + "_a");
     }
+    if (supplied.contains(addresses[mcu])) name_real(Sample::kSupply, "supply");
     text_ += "$upscope $end\n";
   }
   text_ += "$enddefinitions $end\n";
   write_time(0);
   text_ += "$dumpvars\n";
   for (std::size_t wire = 0; wire < identifiers_.size(); ++wire) write_value(wire, false);
-  for (const std::string& code : currents_) {
+  for (const std::string& code : reals_) {
     if (!code.empty()) text_ += "r0 " + code + "\n";
   }
   text_ += "$end\n";
@@ -126,20 +127,22 @@ void VcdWriter::write_value(std::size_t wire, bool level) {
 }
 
 void VcdWriter::sample(const Sample& sample) {
-  if (currents_[sample.mcu * kWindings + sample.winding].empty()) return;
-  pending_.push_back({{sample.time_ns, sample.mcu, {}, sample.winding, false}, sample.current_a});
+  if (reals_[sample.mcu * kRealsPerMcu + sample.winding].empty()) return;
+  // A sensor is read for a whole tick at once, which may have been written already.
+  const TimeNs time_ns = std::max(sample.time_ns, last_time_ns_);
+  pending_.push_back({{time_ns, sample.mcu, {}, sample.winding, false}, sample.value});
 }
 
 // To 0.1 mA.
-void VcdWriter::write_current(const Change& change) {
+void VcdWriter::write_real(const Change& change) {
   char digits[32];
-  const auto end = std::to_chars(std::begin(digits), std::end(digits), *change.current_a,
+  const auto end = std::to_chars(std::begin(digits), std::end(digits), *change.value,
                                  std::chars_format::fixed, 4)
                        .ptr;
   text_ += 'r';
   text_.append(digits, end);
   text_ += ' ';
-  text_ += currents_[change.edge.mcu * kWindings + change.edge.index];
+  text_ += reals_[change.edge.mcu * kRealsPerMcu + change.edge.index];
   text_ += '\n';
 }
 
@@ -153,8 +156,8 @@ void VcdWriter::write_pending(TimeNs until_ns) {
   });
   for (auto change = pending_.begin(); change != rest; ++change) {
     write_time(change->edge.time_ns);
-    if (change->current_a) {
-      write_current(*change);
+    if (change->value) {
+      write_real(*change);
     } else {
       write_value(wire_of(change->edge), change->edge.level);
       ++edges_written_;

@@ -2,8 +2,10 @@
 // tools/check-trace.
 //
 //     $timescale 1 ns $end
-//     scopes `mcu<address>`, in each the wires `step0`..`step15`, `dir0`..`dir15`, `en`; where
-//     windings are measured the real variables `current0_a`..`current3_a` too
+//     scopes `mcu<address>`, in each the wires `step0`..`step15`, `dir0`..`dir15`, `en`,
+//     `common_dir`, `position_compare`, and the inputs `trigger` and `emergency` (1: closed); where
+//     windings are measured the real variables `current0_a`..`current3_a` too, and where the supply
+//     is, `supply`: what the sensor reads, 0..1023
 //
 // Time stamps rise strictly: edges of all MCUs are merged. Those of one ns stand in the order of
 // the MCUs on the bus, those of one MCU in the order in which they were made.
@@ -27,11 +29,13 @@ class VcdWriter final : public EdgeSink {
  public:
   // Creates (or empties) the file and writes its head. `addresses` in the order of the MCUs on the
   // bus.
-  // Those of `measured` have windings. `comment`: for the head, if not empty.
+  // Those of `measured` have windings, those of `supplied` a sensor of their supply. `comment`: for
+  // the head, if not empty.
   static Result<std::unique_ptr<VcdWriter>> create(const std::string& path,
                                                    std::span<const std::uint8_t> addresses,
                                                    const std::set<std::uint8_t>& measured = {},
-                                                   const std::string& comment = {});
+                                                   const std::string& comment = {},
+                                                   const std::set<std::uint8_t>& supplied = {});
 
   // A writer that was not closed leaves a file without its end; call close() to know that all is
   // written.
@@ -58,15 +62,16 @@ class VcdWriter final : public EdgeSink {
   using File = std::unique_ptr<std::FILE, FileCloser>;
 
   VcdWriter(std::string path, File file, std::size_t mcus);
-  // An edge, or if it has a current that of the winding `edge.index`.
+  // An edge, or if it has a value that of what is measured as `edge.index`.
   struct Change {
     Edge edge;
-    std::optional<double> current_a;
+    std::optional<double> value;
   };
-  void write_head(std::span<const std::uint8_t> addresses, const std::set<std::uint8_t>& measured);
+  void write_head(std::span<const std::uint8_t> addresses, const std::set<std::uint8_t>& measured,
+                  const std::set<std::uint8_t>& supplied);
   void write_time(TimeNs time_ns);
   void write_value(std::size_t wire, bool level);
-  void write_current(const Change& change);
+  void write_real(const Change& change);
   void write_pending(TimeNs until_ns);
   void flush_text();
   void fail_with(int error_number);
@@ -74,7 +79,7 @@ class VcdWriter final : public EdgeSink {
   std::string path_;
   File file_;
   std::vector<std::string> identifiers_;  // one per wire, kWiresPerMcu for each MCU
-  std::vector<std::string> currents_;     // one per winding, kWindings for each MCU; "": none
+  std::vector<std::string> reals_;        // kRealsPerMcu for each MCU; "": none
   std::vector<Change> pending_;
   std::string text_;
   TimeNs last_time_ns_ = -1;

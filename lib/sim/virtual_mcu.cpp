@@ -1,5 +1,7 @@
 #include "sim/virtual_mcu.h"
 
+#include <algorithm>
+
 #include "sim/disabled_capabilities.h"
 
 namespace bushd::sim {
@@ -65,7 +67,13 @@ void VirtualMcu::on_edge(void* context, std::int64_t time_ns, bushd_virtual_sign
 }
 
 std::uint16_t VirtualMcu::on_current(void* context, std::int64_t time_ns) {
-  return static_cast<const VirtualMcu*>(context)->supply_->reading(time_ns);
+  auto& self = *static_cast<VirtualMcu*>(context);
+  const std::uint16_t reading = std::max(self.supply_->reading(time_ns), self.port_.current);
+  if (self.sink_ != nullptr && reading != self.supply_told_) {
+    self.supply_told_ = reading;
+    self.sink_->sample({time_ns, self.index_, Sample::kSupply, static_cast<double>(reading)});
+  }
+  return reading;
 }
 
 void VirtualMcu::attach_switch(std::size_t output, const SwitchOptions& options) {

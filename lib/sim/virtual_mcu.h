@@ -31,8 +31,10 @@ struct McuOptions {
       0;  // out of reset here: until then deaf. Its ticks begin here too, so this is their phase.
   std::int32_t clock_ppm = 0;  // > 0: its clock is fast
   std::uint32_t turnaround_ns = 20'000;
-  std::uint64_t unique_id = 0;          // 0: made of its place on the bus
-  std::optional<SupplyRules> supply{};  // what its current sensor sees; else set_current says it
+  std::uint64_t unique_id = 0;  // 0: made of its place on the bus
+  // What its current sensor sees; set_current says what it reads at least. Without it, what it
+  // reads.
+  std::optional<SupplyRules> supply{};
 };
 
 class VirtualMcu final : public Mcu {
@@ -92,6 +94,7 @@ class VirtualMcu final : public Mcu {
   Driver& driver_;
   EdgeSink* sink_;
   std::optional<SupplyCurrent> supply_;
+  std::uint16_t supply_told_ = 0;  // to the sink
   std::vector<std::int16_t> queue_;
   std::vector<std::uint16_t> codes_;
   bushd_mcu_scratch scratch_{};

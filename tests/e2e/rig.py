@@ -74,12 +74,12 @@ def go_first(pid):
 class Running:
     """A program under way; what it says goes to a file. `urgent`: before others, where that is allowed."""
 
-    def __init__(self, command, log, urgent=False, env=None, stderr=None):
+    def __init__(self, command, log, urgent=False, env=None, stderr=None, stdin=subprocess.DEVNULL):
         """`stderr`: where that goes in place of the file."""
         self._log = log
         with open(log, "wb") as file:
             errors = file if stderr is None else stderr
-            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=errors, env=env)
+            self.process = subprocess.Popen(command, stdin=stdin, stdout=file, stderr=errors, env=env)
         if urgent:
             go_first(self.process.pid)
 
@@ -141,8 +141,8 @@ class EndToEndTest(unittest.TestCase):
     def file(self, name):
         return self.folder / name
 
-    def start(self, command, log, urgent=False):
-        running = Running(command, self.file(log), urgent)
+    def start(self, command, log, urgent=False, stdin=subprocess.DEVNULL):
+        running = Running(command, self.file(log), urgent, stdin=stdin)
         self.programs.append(running)
         return running
 
@@ -150,9 +150,9 @@ class EndToEndTest(unittest.TestCase):
         text = configuration(self.file(port), displacement_format, bus_lines, self.file("control"), lcm_lines, state)
         self.file("bushd.toml").write_text(text)
 
-    def start_bushsim(self, trace="trace.vcd", link="port", options=()):
-        command = [program("BUSHSIM"), "--config", self.file("bushd.toml"), "--link", self.file(link), *options]
-        bushsim = self.start([*command, "--trace", self.file(trace)], f"bushsim-{len(self.programs)}.log", True)
+    def start_bushsim(self, trace="trace.vcd", link="port", options=(), stdin=subprocess.DEVNULL):
+        command = [program("BUSHSIM"), "--config", self.file("bushd.toml"), "--link", self.file(link), *map(str, options)]
+        bushsim = self.start([*command, "--trace", self.file(trace)], f"bushsim-{len(self.programs)}.log", True, stdin)
         self.wait_until("bushsim to offer its port", lambda: "bushsim: ready" in bushsim.said())
         return bushsim
 

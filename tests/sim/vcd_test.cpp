@@ -26,7 +26,7 @@ TEST_F(Vcd, HeadNamesAllWiresAndGivesTheirFirstValues) {
   ASSERT_TRUE((*writer)->close(1'000'000));
   const VcdFile file = read_vcd(path);
   EXPECT_EQ(file.timescale, "1ns");
-  EXPECT_EQ(file.wires.size(), 3u * 35u);
+  EXPECT_EQ(file.wires.size(), 3u * 37u);
   for (const char* name : {"mcu1.step0", "mcu2.dir15", "mcu200.en"}) {
     ASSERT_TRUE(file.wires.contains(name)) << name;
     ASSERT_EQ(file.wires.at(name).size(), 1u);
@@ -70,6 +70,27 @@ TEST_F(Vcd, CurrentsAreRealVariablesOfTheMcuThatHasThem) {
   EXPECT_EQ(file.reals.at("mcu2.current3_a"), (Values{{0, 0.0}, {100, 0.25}}));
   EXPECT_EQ(file.reals.at("mcu2.current0_a"), (Values{{0, 0.0}, {200, 1.5}}));
   EXPECT_EQ(file.stamps, (std::vector<std::int64_t>{0, 100, 200, 1000}));
+}
+
+TEST_F(Vcd, InputsAndTheSupplyAreThereToo) {
+  auto writer = *VcdWriter::create(path, std::array<std::uint8_t, 2>{1, 2}, {}, "", {2});
+  writer->edge({100, 0, Signal::kTrigger, 0, true});
+  writer->edge({100, 1, Signal::kEmergency, 0, true});
+  writer->sample({150, 1, Sample::kSupply, 1023});
+  writer->settled(200);
+  writer->sample({180, 1, Sample::kSupply, 512});  // of a tick that has been written
+  writer->edge({200, 0, Signal::kTrigger, 0, false});
+  ASSERT_TRUE(writer->close(1000));
+  const VcdFile file = read_vcd(path);
+  ASSERT_EQ(file.wires.at("mcu1.trigger").size(), 3u);
+  EXPECT_EQ(file.wires.at("mcu1.trigger").at(1).time, 100);
+  EXPECT_EQ(file.wires.at("mcu1.trigger").at(2).time, 200);
+  EXPECT_EQ(file.wires.at("mcu1.position_compare").size(), 1u);
+  EXPECT_EQ(file.wires.at("mcu2.emergency").at(1).time, 100);
+  EXPECT_EQ(file.wires.at("mcu1.emergency").size(), 1u);
+  using Values = std::vector<std::pair<std::int64_t, double>>;
+  EXPECT_EQ(file.reals.size(), 1u);
+  EXPECT_EQ(file.reals.at("mcu2.supply"), (Values{{0, 0.0}, {150, 1023}, {180, 512}}));
 }
 
 TEST_F(Vcd, FileHoldsWhatTheBusDid) {

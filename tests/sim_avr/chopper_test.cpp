@@ -86,7 +86,7 @@ Figures Chopper::figures() const {
   for (const Edge& edge : recorder_.edges) {
     if (edge.signal != Signal::kStep || edge.index >= PowerStage::kWindings) continue;
     for (; sample != recorder_.samples.end() && sample->time_ns <= edge.time_ns; ++sample) {
-      now_a[sample->winding] = sample->current_a;
+      now_a[sample->winding] = sample->value;
     }
     const std::size_t w = edge.index;
     if (!edge.level) {

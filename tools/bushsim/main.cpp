@@ -79,7 +79,8 @@ int run(int argc, char** argv) {
       ->required()
       ->allow_extra_args(false);
   app.add_option("--trace", options.trace,
-                 "Write all edges of STEP, DIR, EN and position compare outputs to this VCD file");
+                 "Write all edges of STEP, DIR, EN and position compare outputs, and of the inputs "
+                 "trigger and emergency, to this VCD file, and currents that are measured");
   std::vector<std::uint8_t> doubled;
   app.add_option("--doubled", doubled, "Add a second MCU with this address: a fault to try")
       ->check(CLI::Range(1, 255))
@@ -102,8 +103,10 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
   app.add_option("--console", options.console,
                  "What is typed is pressed at this MCU: F and R hold its inputs FORWARD and "
-                 "REVERSE, X releases them; f, r, s, x are keys of a keypad at a line of its own, "
-                 "and what that would show is printed")
+                 "REVERSE, X releases them; E presses its emergency input, O shorts its supply as "
+                 "its current sensor sees it, and both end that when typed again; P resets it, W "
+                 "does so as its watchdog (of a virtual MCU only); f, r, s, x are keys of a keypad "
+                 "at a line of its own, and what that would show is printed")
       ->check(CLI::Range(1, 255));
   bool keypad = false;
   app.add_flag("--keypad", keypad,

@@ -31,12 +31,14 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
                 .positive_off = candidate.serial_pulse.positive_off,
                 .addresses = {},
                 .measuring = {},
+                .emergency_open = {},
                 .board_start_hz = candidate.start_hz,
                 .first_unique_id = (std::uint64_t{i} << 32) + 1};
     for (const auto& mcu : config->mcus) {
       if (mcu.bus.value != i) continue;
       setup.addresses.push_back(mcu.address.value);
       if (mcu.emission.measures()) setup.measuring.insert(mcu.address.value);
+      if (mcu.emergency_active_open) setup.emergency_open.insert(mcu.address.value);
     }
     return setup;
   }

@@ -19,8 +19,10 @@ struct Setup {
   bool positive_off = false;            // of it: its direction line is off in that direction
   std::vector<std::uint8_t> addresses;  // at least one
   std::set<std::uint8_t> measuring;     // of these, the MCUs that measure their supply current
-  std::uint32_t board_start_hz = 0;     // F_start of a commutator board; 0: it is none
-  std::uint64_t first_unique_id = 1;    // of its MCUs: other buses have others
+  // Those whose emergency input is active when it is open: closed unless somebody presses.
+  std::set<std::uint8_t> emergency_open{};
+  std::uint32_t board_start_hz = 0;   // F_start of a commutator board; 0: it is none
+  std::uint64_t first_unique_id = 1;  // of its MCUs: other buses have others
 };
 
 // `bus` may be empty if the configuration has one bus only.

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <iterator>
 #include <set>
+#include <utility>
 
 #ifdef BUSHSIM_AVR
 #include "sim_avr/avr_mcu.h"
@@ -139,7 +140,10 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
     for (const auto& [address, image] : options.images) {
       if (image.chip == "atmega1284p") measured.insert(address);
     }
-    auto created = bushd::sim::VcdWriter::create(options.trace, options.setup.addresses, measured);
+    std::set<std::uint8_t> supplied = options.setup.measuring;
+    if (options.console) supplied.insert(*options.console);
+    auto created = bushd::sim::VcdWriter::create(options.trace, options.setup.addresses, measured,
+                                                 "", supplied);
     if (!created) return fail(created.error());
     trace = std::move(*created);
   }
@@ -161,6 +165,8 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
 }
 
 void Simulator::start() {
+  closed_.resize(bus_.mcu_count());
+  drive_inputs();
   const TimeNs head_start_ns = has_images_ ? kRealHeadStartNs : kHeadStartNs;
   bus_.advance_to(head_start_ns);
   start_ns_ = monotonic_ns() - head_start_ns;
@@ -197,24 +203,73 @@ Result<void> Simulator::take_signals() {
   return {};
 }
 
+// Contacts, closed or open. Those of a chain are closed until somebody presses.
 void Simulator::drive_inputs() {
-  const std::uint8_t system = triggered_ ? BUSHD_INPUT_TRIGGER : 0;
+  using bushd::sim::Signal;
   for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
-    const bool pressed = typed_ && i == console_;
-    bus_.node(i).set_inputs({0, static_cast<std::uint8_t>(pressed ? system | buttons_ : system)});
+    std::uint8_t closed = triggered_ ? BUSHD_INPUT_TRIGGER : 0;
+    if (i == console_) closed |= buttons_;
+    if (setup_.emergency_open.contains(setup_.addresses[i])) closed ^= BUSHD_INPUT_EMERGENCY;
+    bus_.node(i).set_inputs({0, closed});
+    const unsigned changed = closed ^ std::exchange(closed_[i], closed);
+    for (const auto& [input, signal] : {std::pair{BUSHD_INPUT_TRIGGER, Signal::kTrigger},
+                                        std::pair{BUSHD_INPUT_EMERGENCY, Signal::kEmergency}}) {
+      if (!trace_ || (changed & input) == 0) continue;
+      trace_->edge({bus_.now_ns(), i, signal, 0, (closed & input) != 0});
+    }
   }
+}
+
+// The sensor of its supply shows as much as it can, as at a short.
+void Simulator::overload(bool on) {
+  overloaded_ = on;
+  const std::uint16_t reading = on ? BUSHD_MAX_CURRENT : 0;
+  bus_.node(*console_).set_current(reading);
+  if (!trace_) return;
+  trace_->sample({bus_.now_ns(), *console_, bushd::sim::Sample::kSupply, double{1} * reading});
+}
+
+// It boots again at once. An image boots as after a pulse at its RESET pin.
+void Simulator::reset(bool by_watchdog) {
+  if (by_watchdog && !is_virtual_[*console_]) {
+    fmt::print(stderr, "bushsim: W is for virtual MCUs; P resets this one\n");
+    return;
+  }
+  if (by_watchdog) bus_.mcu(*console_).set_reset_cause(BUSHD_RESET_WATCHDOG);
+  bus_.reboot(*console_);
 }
 
 void Simulator::press(char key) {
-  if (const auto byte = keypad_byte_of(key)) {
-    bus_.node(console_).keypad_byte(*byte, bus_.now_ns());
-  } else if (key == 'F' || key == 'R' || key == 'X') {
-    buttons_ = key == 'F' ? BUSHD_INPUT_FORWARD : key == 'R' ? BUSHD_INPUT_REVERSE : 0;
+  constexpr unsigned kHeld = BUSHD_INPUT_FORWARD | BUSHD_INPUT_REVERSE;
+  const auto hold = [this](unsigned buttons) {
+    buttons_ = static_cast<std::uint8_t>((buttons_ & ~kHeld) | buttons);
     drive_inputs();
+  };
+  if (const auto byte = keypad_byte_of(key)) {
+    bus_.node(*console_).keypad_byte(*byte, bus_.now_ns());
+    return;
+  }
+  switch (key) {
+    case 'F':
+      return hold(BUSHD_INPUT_FORWARD);
+    case 'R':
+      return hold(BUSHD_INPUT_REVERSE);
+    case 'X':
+      return hold(0);
+    case 'E':  // it locks
+      buttons_ ^= BUSHD_INPUT_EMERGENCY;
+      return drive_inputs();
+    case 'O':
+      return overload(!overloaded_);
+    case 'P':
+    case 'W':
+      return reset(key == 'W');
+    default:
+      return;
   }
 }
 
-// Whoever types no more holds nothing.
+// Whoever types no more holds no button; what locks stays as it is.
 Result<void> Simulator::take_keys() {
   const auto keys = typed_->read();
   if (!keys) return fail(keys.error());
@@ -226,7 +281,7 @@ Result<void> Simulator::take_keys() {
 }
 
 void Simulator::show() {
-  const std::string text = bus_.node(console_).take_keypad_display();
+  const std::string text = bus_.node(*console_).take_keypad_display();
   if (text.empty()) return;
   fmt::print("{}", text);
   std::fflush(stdout);

@@ -51,6 +51,8 @@ class Simulator {
   bushd::Result<void> take_signals();
   bushd::Result<void> take_keys();
   void press(char key);
+  void overload(bool on);
+  void reset(bool by_watchdog);
   void show();
   void drive_inputs();
   bushd::sim::TimeNs wall_time_ns() const;
@@ -77,8 +79,10 @@ class Simulator {
   bool ended_ = false;      // by a signal
   bool triggered_ = false;  // the trigger inputs are active
   std::optional<TypedKeys> typed_;
-  std::size_t console_ = 0;   // its MCU
-  std::uint8_t buttons_ = 0;  // that are held there
+  std::optional<std::size_t> console_;  // at which MCU
+  std::uint8_t buttons_ = 0;            // that are held there: BUSHD_INPUT_*
+  bool overloaded_ = false;             // its supply
+  std::vector<std::uint8_t> closed_;    // by MCU: contacts as told last, BUSHD_INPUT_*
 };
 
 }  // namespace bushsim

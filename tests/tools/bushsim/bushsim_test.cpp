@@ -208,7 +208,7 @@ TEST_F(Bushsim, BothMcusAnswerAndTheTraceIsWholeAfterSigterm) {
   EXPECT_THAT(read_file(out), HasSubstr("collisions 0, corrupted bytes 0, dropped bytes 0"));
   const bushd::sim::VcdFile vcd = bushd::sim::read_vcd(trace);
   EXPECT_EQ(vcd.timescale, "1ns");
-  EXPECT_EQ(vcd.wires.size(), 2u * 35u);  // STEP and DIR of 16, EN, common DIR, position compare
+  EXPECT_EQ(vcd.wires.size(), 2u * 37u);  // STEP and DIR of 16, and five others
   EXPECT_TRUE(vcd.wires.contains("mcu1.step15"));
   EXPECT_TRUE(vcd.wires.contains("mcu2.en"));
   EXPECT_GT(vcd.stamps.back(), 0);
