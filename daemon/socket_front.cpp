@@ -79,7 +79,7 @@ void SocketFront::on_packet(Connection connection, control::View packet,
     client.subscription = *subscription;
     return;
   }
-  if (!known(connection, client, message->id.client_id)) return;
+  if (!known(connection, client, message->id)) return;
   const lcm::RequestId& id = message->id;
   if (const auto* hello = std::get_if<lcm::Hello>(&message->content)) {
     on_hello(connection, *hello);
@@ -108,13 +108,19 @@ void SocketFront::on_closed(Connection connection) {
 }
 
 // A connection has one name for its life: answers and logs name it.
-bool SocketFront::known(Connection connection, Client& client, const std::string& client_id) {
-  if (!client.session && api::is_client_id(client_id)) {
-    client.session =
-        std::make_shared<SocketSession>(*this, connection, client_id, client.credentials);
+bool SocketFront::known(Connection connection, Client& client, const lcm::RequestId& id) {
+  if (!api::is_client_id(id.client_id)) {
+    server_.reject(connection);
+    return false;
   }
-  if (client.session && client.session->client_id() == client_id) return true;
-  server_.reject(connection);
+  if (!client.session) {
+    client.session =
+        std::make_shared<SocketSession>(*this, connection, id.client_id, client.credentials);
+  }
+  if (client.session->client_id() == id.client_id) return true;
+  answer(connection, id.client_id, id.number,
+         api::Refused{"this connection is that of client_id " + client.session->client_id() +
+                      ", by its first request; open one for each client_id, or use one name"});
   return false;
 }
 

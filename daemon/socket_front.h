@@ -51,7 +51,7 @@ class SocketFront : public Listener {
   void on_closed(Connection connection);
   void seen(bool in_place);
   void on_hello(Connection connection, const lcm::Hello& hello);
-  bool known(Connection connection, Client& client, const std::string& client_id);
+  bool known(Connection connection, Client& client, const lcm::RequestId& id);
   void send(Connection connection, const lcm::Packet& packet);
   void answer(Connection connection, const std::string& client_id, std::int64_t number,
               const api::Reply& reply);

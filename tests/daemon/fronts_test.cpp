@@ -353,7 +353,21 @@ TEST_F(SocketFrontTest, AConnectionKeepsItsName) {
   say(scan, lcm::encode(0, {.client_id = "other", .number = 2}, api::Request(api::Stop{})));
   say(scan, lcm::encode(0, {.client_id = "", .number = 3}, api::Request(api::Stop{})));
   EXPECT_THAT(carried_out_, ElementsAre("stop"));
-  EXPECT_EQ(front_->dropped(), 2u);
+  EXPECT_EQ(front_->dropped(), 1u) << "a name that is none cannot be answered";
+}
+
+TEST_F(SocketFrontTest, AnotherNameOnAConnectionIsRefusedWithAnAnswer) {
+  Client scan = connect();
+  say(scan, lcm::encode(0, {.client_id = "scan", .number = 1}, api::Request(api::Enable{})));
+  say(scan, lcm::encode(0, {.client_id = "other", .number = 7}, api::Request(api::Enable{})));
+  ASSERT_EQ(scan.heard.size(), 1u);
+  const auto& reply = std::get<lcm::ReplyMessage>(scan.heard[0]);
+  EXPECT_EQ(reply.id.client_id, "other");
+  EXPECT_EQ(reply.id.number, 7);
+  EXPECT_THAT(std::get<api::Refused>(reply.reply).reason,
+              HasSubstr("this connection is that of client_id scan"));
+  EXPECT_EQ(carried_out_.size(), 1u);
+  EXPECT_EQ(front_->dropped(), 0u);
 }
 
 // Stops are read first, and the kernel says what came first.
