@@ -73,6 +73,13 @@ class Layout(unittest.TestCase):
                 self.assertTrue(pathlib.Path(program).is_relative_to(self.prefix))
                 self.assertTrue(os.access(program, os.X_OK))
 
+    def test_the_service_may_open_serial_ports_and_no_consoles(self):
+        unit = next(self.prefix.rglob("bushd.service")).read_text()
+        allowed = re.findall(r"^DeviceAllow=(\S+) rw$", unit, re.MULTILINE)
+        # Majors 4 and 5 are consoles' too; of 4 the minors from 64 on are ttyS0 and those after it.
+        self.assertEqual([path for path in allowed if path.startswith("/")], [f"/dev/char/4:{minor}" for minor in range(64, 96)])
+        self.assertEqual({path for path in allowed if not path.startswith("/")}, {"char-188", "char-166", "char-204"})
+
     def test_programs_find_the_tables_of_this_prefix(self):
         command = [self.prefix / "bin/bushtab", "show", "none"]
         ran = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "BUSHD_TABLES_DIR": ""})
