@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "camac/block.h"
-#include "camac/memory_text.h"
+#include "heritage/camac/block.h"
+#include "heritage/camac/memory_text.h"
 #include "daemon/services/camac_motors.h"
 #include "daemon/services/camac_shutter.h"
 

@@ -6,11 +6,11 @@
 #include <memory>
 #include <vector>
 
-#include "camac/crate.h"
-#include "daemon/installation.h"
-#include "daemon/interlocks.h"
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "heritage/camac/crate.h"
+#include "daemon/model/installation.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/open_moves.h"

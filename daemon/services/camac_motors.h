@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "camac/bushd2.h"
-#include "daemon/interlocks.h"
-#include "daemon/outputs.h"
-#include "daemon/precedence.h"
+#include "heritage/camac/bushd2.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/precedence.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/tables_in_service.h"
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <utility>
 
-#include "camac/bushd1.h"
-#include "daemon/interlocks.h"
-#include "daemon/outputs.h"
-#include "daemon/precedence.h"
+#include "heritage/camac/bushd1.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/precedence.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/interlocks.h"
-#include "daemon/service.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/service.h"
 #include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/line_tables.h"

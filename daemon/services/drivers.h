@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/confirmation.h"
-#include "daemon/interlocks.h"
-#include "daemon/service.h"
+#include "daemon/model/confirmation.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/service.h"
 #include "daemon/services/emergency_stop.h"
 
 namespace bushd::daemon {

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "api/session.h"
-#include "daemon/installation.h"
-#include "link/rehearsal.h"
+#include "daemon/model/installation.h"
+#include "bus/rs485/rehearsal.h"
 
 namespace bushd::daemon {
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "daemon/confirmation.h"
+#include "daemon/model/confirmation.h"
 
 namespace bushd::daemon {
 namespace {

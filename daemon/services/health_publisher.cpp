@@ -1,6 +1,6 @@
 #include "daemon/services/health_publisher.h"
 
-#include "link/unique_id.h"
+#include "bus/rs485/unique_id.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "daemon/installation.h"
-#include "daemon/outputs.h"
+#include "daemon/model/installation.h"
+#include "daemon/model/outputs.h"
 
 namespace bushd::daemon {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 
 namespace bushd::daemon {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/by_id.h"
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 
 namespace bushd::daemon {
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "daemon/services/open_moves.h"
-#include "link/unique_id.h"
-#include "units/ratio.h"
+#include "bus/rs485/unique_id.h"
+#include "base/units/ratio.h"
 
 namespace bushd::daemon {
 namespace {

@@ -11,8 +11,8 @@
 #include <optional>
 #include <string>
 
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/positions.h"
 #include "state/keeper.h"

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/interlocks.h"
-#include "daemon/service.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/service.h"
 #include "daemon/services/dry_run.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "daemon/services/lines.h"
-#include "link/mcu_fit.h"
+#include "bus/rs485/mcu_fit.h"
 
 namespace bushd::daemon {
 namespace {

@@ -1,6 +1,6 @@
 #include "daemon/services/link_faults.h"
 
-#include "link/faults.h"
+#include "bus/rs485/faults.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {

@@ -2,8 +2,8 @@
 // purpose: the positions are read and every move has its result.
 #pragma once
 
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 #include "daemon/services/emergency_stop.h"
 
 namespace bushd::daemon {

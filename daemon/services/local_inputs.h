@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/by_id.h"
-#include "daemon/service.h"
+#include "daemon/model/service.h"
 
 namespace bushd::daemon {
 

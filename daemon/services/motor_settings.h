@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "config/setting.h"
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/positions.h"

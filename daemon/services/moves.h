@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/interlocks.h"
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 #include "daemon/services/dry_run.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/open_moves.h"

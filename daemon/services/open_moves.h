@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "api/session.h"
-#include "daemon/installation.h"
-#include "daemon/precedence.h"
+#include "daemon/model/installation.h"
+#include "daemon/model/precedence.h"
 #include "motion/move_book.h"
 
 namespace bushd::daemon {

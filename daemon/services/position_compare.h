@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <list>
 
-#include "daemon/confirmation.h"
-#include "daemon/service.h"
+#include "daemon/model/confirmation.h"
+#include "daemon/model/service.h"
 
 namespace bushd::daemon {
 

@@ -7,9 +7,9 @@
 #include <list>
 #include <vector>
 
-#include "daemon/confirmation.h"
-#include "daemon/interlocks.h"
-#include "daemon/service.h"
+#include "daemon/model/confirmation.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/service.h"
 #include "daemon/services/journal.h"
 
 namespace bushd::daemon {

@@ -13,7 +13,7 @@
 #include "api/request.h"
 #include "api/session.h"
 #include "api/snapshot.h"
-#include "daemon/installation.h"
+#include "daemon/model/installation.h"
 
 namespace bushd::daemon {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "daemon/installation.h"
-#include "daemon/outputs.h"
+#include "daemon/model/installation.h"
+#include "daemon/model/outputs.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/pseudo_axes.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/service.h"
+#include "daemon/model/service.h"
 #include "daemon/services/homing_queue.h"
 #include "daemon/services/local_inputs.h"
 #include "daemon/services/moves.h"

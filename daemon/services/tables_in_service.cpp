@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/nearest_name.h"
-#include "daemon/confirmation.h"
+#include "daemon/model/confirmation.h"
 #include "daemon/services/open_moves.h"
 #include "tables/profiles/diagnostics.h"
 

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/interlocks.h"
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 
 namespace bushd::daemon {
 

@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "daemon/interlocks.h"
-#include "daemon/outputs.h"
-#include "daemon/service.h"
+#include "daemon/model/interlocks.h"
+#include "daemon/model/outputs.h"
+#include "daemon/model/service.h"
 #include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/open_moves.h"

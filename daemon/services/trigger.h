@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/service.h"
+#include "daemon/model/service.h"
 #include "daemon/services/moves.h"
 
 namespace bushd::daemon {

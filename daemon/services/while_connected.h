@@ -6,7 +6,7 @@
 #include <list>
 #include <vector>
 
-#include "daemon/service.h"
+#include "daemon/model/service.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 

@@ -1,5 +1,5 @@
 // What the core believes of itself, checked wherever it is simulated. Images have no room for it:
-// they are watched from outside (lib/sim_avr/memory_watch.h).
+// they are watched from outside (lib/sim/avr/memory_watch.h).
 #ifndef BUSHD_FIRMWARE_CORE_ASSERTION_H
 #define BUSHD_FIRMWARE_CORE_ASSERTION_H
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "api/words.h"
-#include "camac/naf.h"
+#include "heritage/camac/naf.h"
 #include "tables/table.h"
 
 namespace bushd::api {

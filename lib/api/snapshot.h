@@ -11,7 +11,7 @@
 #include "api/reply.h"
 #include "api/words.h"
 #include "base/ids.h"
-#include "units/coordinates.h"
+#include "base/units/coordinates.h"
 
 namespace bushd::api {
 

@@ -11,7 +11,7 @@
 #include "engine/emission.h"
 #include "engine/run.h"
 #include "engine/slots.h"
-#include "fieldbus/line_budget.h"
+#include "bus/line_budget.h"
 #include "tables/gentler.h"
 
 namespace bushd::config {

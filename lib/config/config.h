@@ -19,11 +19,11 @@
 #include "config/key_places.h"
 #include "config/setting.h"
 #include "engine/message.h"
-#include "fieldbus/emission_setup.h"
-#include "pseudo/curved_axis.h"
-#include "pseudo/linear_axes.h"
+#include "bus/emission_setup.h"
+#include "motion/pseudo/curved_axis.h"
+#include "motion/pseudo/linear_axes.h"
 #include "tables/table.h"
-#include "units/coordinates.h"
+#include "base/units/coordinates.h"
 
 namespace bushd::config {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "base/result.h"
-#include "fieldbus/emission_setup.h"
+#include "bus/emission_setup.h"
 #include "tables/toml_reader.h"
 
 namespace bushd::config {

@@ -10,7 +10,7 @@
 
 #include "config/coordinates.h"
 #include "config/words.h"
-#include "csv/number_csv.h"
+#include "base/csv/number_csv.h"
 #include "tables/toml_file.h"
 
 namespace bushd::config {

@@ -10,7 +10,7 @@
 
 #include "base/result.h"
 #include "config/drive.h"
-#include "units/coordinates.h"
+#include "base/units/coordinates.h"
 
 namespace bushd::config {
 

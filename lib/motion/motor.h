@@ -15,7 +15,7 @@
 #include "base/result.h"
 #include "engine/message.h"
 #include "motion/axis.h"
-#include "units/coordinates.h"
+#include "base/units/coordinates.h"
 
 namespace bushd::motion {
 

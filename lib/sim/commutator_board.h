@@ -1,6 +1,6 @@
 // A commutator board of BUSHD-2 as one would build it, for simulations: bytes come in at times, and
 // after each delay the windings of the selected motor are switched on. It shares no code with
-// lib/commutator, which drives it.
+// lib/heritage/commutator, which drives it.
 //
 // Each motor has four windings, two of them on at a time: 0011, 0110, 1100, 1001 going right. What
 // a motor does is seen from its windings alone (position()).

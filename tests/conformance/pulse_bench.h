@@ -1,4 +1,4 @@
-// A serial port that makes pulses (lib/serial_pulse) as a controller of one motor, against the
+// A serial port that makes pulses (lib/heritage/serial_pulse) as a controller of one motor, against the
 // drive that bushsim plays (sim/pulse_drive.h), in simulated time: no daemon between them. What is
 // judged are the levels on the line; delays come from lists of codes here.
 #pragma once
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "motion/axis.h"
-#include "serial_pulse/master.h"
+#include "heritage/serial_pulse/master.h"
 #include "sim/pulse_drive.h"
 
 namespace bushd::test {

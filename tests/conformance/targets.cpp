@@ -5,10 +5,10 @@
 #include <vector>
 
 #ifdef AVR_IMAGES
-#include "sim_avr/avr_mcu.h"
+#include "sim/avr/avr_mcu.h"
 #endif
 #ifdef LM3S_IMAGES
-#include "sim_qemu/qemu_mcu.h"
+#include "sim/qemu/qemu_mcu.h"
 #endif
 
 namespace bushd::sim {

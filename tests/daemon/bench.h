@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/installation.h"
+#include "daemon/model/installation.h"
 #include "daemon/lab.h"
-#include "daemon/outputs.h"
+#include "daemon/model/outputs.h"
 
 namespace bushd::test {
 

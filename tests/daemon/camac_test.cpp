@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "camac/bushd2.h"
+#include "heritage/camac/bushd2.h"
 #include "daemon/camac_lab.h"
 
 namespace bushd::test::camac_test {

@@ -1,5 +1,5 @@
 // Requests that MCUs confirm.
-#include "daemon/confirmation.h"
+#include "daemon/model/confirmation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "client/link.h"
-#include "daemon/lcm_front.h"
-#include "daemon/request_log.h"
-#include "daemon/socket_front.h"
+#include "daemon/fronts/lcm_front.h"
+#include "daemon/core/request_log.h"
+#include "daemon/fronts/socket_front.h"
 #include "tables/temp_directory.h"
 
 namespace bushd::daemon {

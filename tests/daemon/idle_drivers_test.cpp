@@ -4,7 +4,7 @@
 
 #include "daemon/lab.h"
 #include "daemon/motor_keys.h"
-#include "fieldbus/line_times.h"
+#include "bus/line_times.h"
 
 namespace bushd::test {
 namespace {

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "daemon/bench.h"
-#include "link/mcu_fit.h"
+#include "bus/rs485/mcu_fit.h"
 
 namespace bushd::daemon {
 namespace {

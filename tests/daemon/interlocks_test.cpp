@@ -1,5 +1,5 @@
 // Who holds a motion back, and the reason that is told.
-#include "daemon/interlocks.h"
+#include "daemon/model/interlocks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // A keypad in the lab: bytes in, jogs of a motor, and what it shows.
-#include "daemon/keypad.h"
+#include "daemon/fronts/keypad.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core.h"
+#include "daemon/core/core.h"
 #include "sim/board_line.h"
 #include "sim/bus.h"
 #include "sim/pulse_drive.h"
-#include "sim_disk/sim_disk.h"
+#include "sim/disk/sim_disk.h"
 #include "state/store.h"
 
 // Failures print words.

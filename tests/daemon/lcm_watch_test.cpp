@@ -1,5 +1,5 @@
 // Trouble on LCM, told once when it begins and once when it is over.
-#include "daemon/lcm_watch.h"
+#include "daemon/fronts/lcm_watch.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

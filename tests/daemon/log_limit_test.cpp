@@ -1,5 +1,5 @@
 // Floods of lines: what is written of them, and that nothing else is lost.
-#include "daemon/log_limit.h"
+#include "daemon/shell/log_limit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // The file that moves are logged to: what is none is refused, what goes away is begun anew.
-#include "daemon/move_log.h"
+#include "daemon/shell/move_log.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

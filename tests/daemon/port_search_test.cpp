@@ -1,6 +1,6 @@
 // A port that is a pattern: which of its matches is opened, with ptys of the kernel, in simulated
 // time.
-#include "daemon/port_search.h"
+#include "daemon/shell/port_search.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <limits>
 #include <vector>
 
-#include "daemon/bus_port.h"
+#include "daemon/shell/bus_port.h"
 #include "tables/temp_directory.h"
 
 namespace bushd::daemon {

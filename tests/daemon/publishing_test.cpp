@@ -1,5 +1,5 @@
 // What is published when.
-#include "daemon/publishing.h"
+#include "daemon/fronts/publishing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // In which order requests reach the core, and how many may wait.
-#include "daemon/reception.h"
+#include "daemon/fronts/reception.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

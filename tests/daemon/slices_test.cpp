@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "daemon/lab.h"
-#include "daemon/reception.h"
+#include "daemon/fronts/reception.h"
 
 namespace bushd::test::slices_test {
 namespace {

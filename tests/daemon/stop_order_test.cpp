@@ -12,7 +12,7 @@
 
 #include "daemon/camac_lab.h"
 #include "daemon/lab.h"
-#include "daemon/reception.h"
+#include "daemon/fronts/reception.h"
 
 namespace bushd::test {
 namespace {

@@ -1,5 +1,5 @@
 // Tables asked for and set by other programs: the same files, checks and history as bushtab's.
-#include "daemon/table_service.h"
+#include "daemon/shell/table_service.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Lines that are written by a thread: none keeps anybody waiting, and none is lost unseen.
-#include "daemon/write_thread.h"
+#include "daemon/shell/write_thread.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/move_log_writer.h"
+#include "daemon/shell/move_log_writer.h"
 #include "tables/temp_directory.h"
 
 namespace bushd::daemon {

@@ -11,7 +11,7 @@
 
 #include "api/reply.h"
 #include "api/snapshot.h"
-#include "camac/bushd2.h"
+#include "heritage/camac/bushd2.h"
 #include "config/config.h"
 #include "module_registers.h"
 #include "request.h"

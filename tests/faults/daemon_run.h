@@ -9,10 +9,10 @@
 #include <optional>
 #include <string>
 
-#include "daemon/core.h"
-#include "daemon/lcm_front.h"
-#include "daemon/publishing.h"
-#include "daemon/reception.h"
+#include "daemon/core/core.h"
+#include "daemon/fronts/lcm_front.h"
+#include "daemon/fronts/publishing.h"
+#include "daemon/fronts/reception.h"
 #include "lcm/transport.h"
 
 namespace bushfaults {

@@ -171,7 +171,7 @@ void Host::end(TimeNs now_ns, TimeNs gone_ns) {
   step();
 }
 
-// As the daemon's own loop does it (daemon/event_loop.cpp).
+// As the daemon's own loop does it (daemon/shell/event_loop.cpp).
 bool Host::end_if_due() {
   if (!ends_at_ns_ || now_ns_ < *ends_at_ns_) return false;
   const bool rests =

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "fieldbus/line_budget.h"
+#include "bus/line_budget.h"
 #include "programs.h"
 #include "sim/random.h"
 #include "tables/table_file.h"

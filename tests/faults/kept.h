@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "config/config.h"
-#include "daemon/core.h"
+#include "daemon/core/core.h"
 #include "sim/line.h"
 #include "sim/random.h"
-#include "sim_disk/sim_disk.h"
+#include "sim/disk/sim_disk.h"
 #include "state/keeper.h"
 #include "state/store.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "api/snapshot.h"
-#include "camac/naf.h"
+#include "heritage/camac/naf.h"
 #include "sim/edge.h"
 
 namespace bushfaults {

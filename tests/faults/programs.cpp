@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
-#include "camac/bushd2.h"
-#include "camac/module.h"
+#include "heritage/camac/bushd2.h"
+#include "heritage/camac/module.h"
 #include "crate_model.h"
 #include "shutter_model.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "camac/naf.h"
+#include "heritage/camac/naf.h"
 #include "config/config.h"
 #include "request.h"
 #include "sim/random.h"

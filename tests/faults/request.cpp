@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "camac/module.h"
+#include "heritage/camac/module.h"
 
 namespace bushfaults {
 namespace {

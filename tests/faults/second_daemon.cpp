@@ -14,7 +14,7 @@ namespace {
 using bushd::sim::TimeNs;
 
 constexpr std::uint32_t kSecondDaemonStream = 405;  // of randomness
-constexpr TimeNs kLookNs = 750 * kMs;               // as daemon/channel_claim.cpp
+constexpr TimeNs kLookNs = 750 * kMs;               // as daemon/shell/channel_claim.cpp
 constexpr TimeNs kMovePeriodNs = 100 * kMs;         // of its clients
 
 }  // namespace

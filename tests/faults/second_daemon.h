@@ -3,7 +3,7 @@
 // for itself; neither of the two listens before it talks. After a while it is ended.
 //
 // Half of them share the network with the first one. Such a daemon looks for others on its channels
-// before it does anything else (daemon/channel_claim.h), and must find the first one there. The
+// before it does anything else (daemon/shell/channel_claim.h), and must find the first one there. The
 // others cannot know: what comes of them on the line the invariants of bushfaults tell, and they
 // hold without exception.
 //
@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core.h"
+#include "daemon/core/core.h"
 #include "recent.h"
 #include "sim/bus.h"
 #include "sim/random.h"

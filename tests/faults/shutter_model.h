@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "api/snapshot.h"
-#include "camac/naf.h"
+#include "heritage/camac/naf.h"
 #include "config/config.h"
 #include "module_registers.h"
 #include "sim/edge.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/keypad.h"
+#include "daemon/fronts/keypad.h"
 #include "daemon_run.h"
 #include "recent.h"
 #include "sim/random.h"

@@ -3,9 +3,9 @@
 // moves.
 //
 // Input: operations of four bytes, what, which and a number of 16 bits.
-#include "camac/bushd1.h"
-#include "camac/bushd2.h"
-#include "camac/crate.h"
+#include "heritage/camac/bushd1.h"
+#include "heritage/camac/bushd2.h"
+#include "heritage/camac/crate.h"
 #include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {

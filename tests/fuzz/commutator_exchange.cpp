@@ -3,7 +3,7 @@
 // understand.
 //
 // Input: operations of four bytes, what, which and a number of 16 bits.
-#include "commutator/exchange.h"
+#include "heritage/commutator/exchange.h"
 #include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {

@@ -8,7 +8,7 @@
 
 #include "config/config.h"
 #include "engine/run.h"
-#include "fieldbus/line_budget.h"
+#include "bus/line_budget.h"
 #include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {

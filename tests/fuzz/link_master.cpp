@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "fuzz/fuzz.h"
-#include "link/master.h"
+#include "bus/rs485/master.h"
 
 namespace bushd::fuzz {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <random>
 
-#include "sim_disk/sim_disk.h"
+#include "sim/disk/sim_disk.h"
 #include "state/keeper.h"
 #include "state/rules.h"
 #include "state/store.h"

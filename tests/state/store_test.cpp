@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "sim_disk/sim_disk.h"
+#include "sim/disk/sim_disk.h"
 #include "state/rules.h"
 
 namespace bushd::state::store_test {

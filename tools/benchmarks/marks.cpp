@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/worker.h"
+#include "daemon/shell/worker.h"
 #include "state/store.h"
 
 namespace {

@@ -30,9 +30,9 @@
 #include <vector>
 
 #include "client/link.h"
-#include "daemon/lcm_front.h"
-#include "daemon/reception.h"
-#include "daemon/socket_front.h"
+#include "daemon/fronts/lcm_front.h"
+#include "daemon/fronts/reception.h"
+#include "daemon/fronts/socket_front.h"
 #include "virtual_hall.h"
 
 namespace {

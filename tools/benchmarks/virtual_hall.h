@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "config/config.h"
-#include "daemon/core.h"
+#include "daemon/core/core.h"
 #include "sim/bus.h"
 
 namespace bench {

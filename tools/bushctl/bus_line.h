@@ -10,7 +10,7 @@
 
 #include "base/result.h"
 #include "engine/message.h"
-#include "serial/serial_port.h"
+#include "bus/port/serial_port.h"
 
 namespace bushctl {
 

@@ -8,7 +8,7 @@
 
 #include "base/printable.h"
 #include "commands.h"
-#include "csv/number_csv.h"
+#include "base/csv/number_csv.h"
 #include "render.h"
 #include "tables/text_file.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "tables/table.h"
-#include "units/coordinates.h"
+#include "base/units/coordinates.h"
 
 namespace bushctl {
 

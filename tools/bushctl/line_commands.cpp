@@ -13,7 +13,7 @@
 #include "bus_scan.h"
 #include "commands.h"
 #include "line_report.h"
-#include "link/unique_id.h"
+#include "bus/rs485/unique_id.h"
 
 namespace bushctl {
 namespace {

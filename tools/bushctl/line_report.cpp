@@ -8,8 +8,8 @@
 
 #include "base/json_text.h"
 #include "grid.h"
-#include "link/health.h"
-#include "link/unique_id.h"
+#include "bus/rs485/health.h"
+#include "bus/rs485/unique_id.h"
 
 namespace bushctl {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "base/shortened.h"
-#include "csv/number_csv.h"
+#include "base/csv/number_csv.h"
 
 namespace bushctl {
 namespace {

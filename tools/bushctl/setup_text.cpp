@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "link/unique_id.h"
+#include "bus/rs485/unique_id.h"
 
 namespace bushctl {
 namespace {

@@ -12,8 +12,8 @@
 #include <cstring>
 #include <iterator>
 
-#include "serial/any_rate.h"
-#include "serial/line_socket.h"
+#include "bus/port/any_rate.h"
+#include "bus/port/line_socket.h"
 
 namespace bushsim {
 namespace {

@@ -11,10 +11,10 @@
 #include <utility>
 
 #ifdef BUSHSIM_AVR
-#include "sim_avr/avr_mcu.h"
+#include "sim/avr/avr_mcu.h"
 #endif
 #ifdef BUSHSIM_QEMU
-#include "sim_qemu/qemu_mcu.h"
+#include "sim/qemu/qemu_mcu.h"
 #endif
 
 namespace bushsim {

@@ -7,7 +7,7 @@
 #include "commands.h"
 #include "engine/run.h"
 #include "open_table.h"
-#include "units/coordinates.h"
+#include "base/units/coordinates.h"
 
 namespace bushtab {
 namespace {

@@ -3,7 +3,7 @@
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_EMISSION_SLOTS_H
 
 // Registers that interrupts have to themselves: no C code of the image uses them
-// (cmake/warnings.cmake), and no library function that is linked (tests/sim_avr/registers). None of
+// (cmake/warnings.cmake), and no library function that is linked (tests/sim/avr/registers). None of
 // these interrupts lets others in while it uses them.
 #define SLOT_LOW r2  // where the masks of the next slot lie
 #define SLOT_HIGH r3
@@ -50,7 +50,7 @@ typedef struct emission_tick {
 
 // In the last slot of a tick the next one is taken, and the silent one waits in its place. These
 // are low bytes of addresses, so that a slot need not wait while one is written: all ticks lie
-// within one multiple of 256 bytes (EMISSION_TICKS; tests/sim_avr/one_page).
+// within one multiple of 256 bytes (EMISSION_TICKS; tests/sim/avr/one_page).
 extern volatile uint8_t emission_next;
 extern volatile uint8_t emission_taken;
 extern emission_tick emission_silent;

@@ -1,0 +1,117 @@
+#include "daemon/fronts/publishing.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace bushd::daemon {
+namespace {
+
+constexpr std::int64_t kNewestPeriodUs = 100'000;
+
+// The tick goes on while nothing else does.
+bool same(const api::StateSnapshot& a, const api::StateSnapshot& b) {
+  return a.bus == b.bus && a.mcu == b.mcu && a.state == b.state && a.detail == b.detail &&
+         a.inputs == b.inputs && a.boot == b.boot && a.motors == b.motors;
+}
+
+const char* word(Topic topic) {
+  return topic == Topic::kState ? "state" : topic == Topic::kDescription ? "description" : "health";
+}
+
+bool moves(const api::StateSnapshot& state) {
+  return std::any_of(state.motors.begin(), state.motors.end(),
+                     [](const api::MotorState& motor) { return motor.moving; });
+}
+
+}  // namespace
+
+Publishing::Publishing(std::int64_t run, std::size_t state_parts, std::size_t buses, Clocks clocks)
+    : run_(run),
+      clocks_(std::move(clocks)),
+      states_(state_parts),
+      descriptions_(state_parts),
+      healths_(buses) {}
+
+lcm::Part Publishing::part(std::size_t index, std::size_t parts) {
+  return {.utime_us = clocks_.unix_us(),
+          .run = run_,
+          .sequence = ++sequence_,
+          .part = static_cast<std::int32_t>(index),
+          .parts = static_cast<std::int32_t>(parts)};
+}
+
+template <class Snapshot>
+void Publishing::send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> packet) {
+  slot.sent_us = clocks_.now_us();
+  // A configuration is checked to have names that fit: this is a defect, which clients see as
+  // silence.
+  if (!packet) {
+    if (log_) log_(std::string("not published, ") + word(topic) + ": " + packet.error().text());
+    return;
+  }
+  slot.packet = std::move(*packet);
+  for (Listener* listener : listeners_) listener->hear(topic, *slot.packet);
+}
+
+void Publishing::publish(McuId mcu, const api::StateSnapshot& of_core) {
+  api::StateSnapshot state = of_core;
+  if (state.detail.empty()) state.detail = trouble_;
+  auto& slot = states_[mcu.value];
+  const bool changed = !slot.snapshot || !same(*slot.snapshot, state) || slot.dropped != dropped_;
+  const bool due = clocks_.now_us() - slot.sent_us >= kRestingPeriodUs;
+  if (!changed && !due && !moves(state)) return;
+  slot.snapshot = state;
+  slot.dropped = dropped_;
+  send(Topic::kState, slot, lcm::encode(part(mcu.value, states_.size()), dropped_, state));
+}
+
+void Publishing::publish(McuId mcu, const api::Description& description) {
+  auto& slot = descriptions_[mcu.value];
+  const bool due = clocks_.now_us() - slot.sent_us >= kDescriptionPeriodUs;
+  if (slot.snapshot == description && !due) return;
+  slot.snapshot = description;
+  send(Topic::kDescription, slot, lcm::encode(part(mcu.value, descriptions_.size()), description));
+}
+
+void Publishing::publish(BusId bus, const api::HealthSnapshot& health) {
+  auto& slot = healths_[bus.value];
+  send(Topic::kHealth, slot, lcm::encode(part(bus.value, healths_.size()), health));
+}
+
+void Publishing::publish_lam(const api::CamacLam& lam) {
+  const auto packet = lcm::encode(clocks_.unix_us(), lam);
+  if (!packet) return;
+  for (Listener* listener : listeners_) listener->hear(Topic::kState, *packet);
+}
+
+std::vector<const lcm::Packet*> Publishing::newest() {
+  if (refresh_) refresh_();
+  std::vector<const lcm::Packet*> all;
+  const auto add = [&all](const auto& slots) {
+    for (const auto& slot : slots) {
+      if (slot.packet) all.push_back(&*slot.packet);
+    }
+  };
+  add(descriptions_);
+  add(states_);
+  add(healths_);
+  return all;
+}
+
+void Publishing::publish_newest() {
+  const std::int64_t now_us = clocks_.now_us();
+  if (now_us - newest_sent_us_ < kNewestPeriodUs) return;
+  newest_sent_us_ = now_us;
+  if (refresh_) refresh_();
+  const auto again = [this](Topic topic, const auto& slots) {
+    for (const auto& slot : slots) {
+      if (!slot.packet) continue;
+      for (Listener* listener : listeners_) listener->hear(topic, *slot.packet);
+    }
+  };
+  again(Topic::kDescription, descriptions_);
+  again(Topic::kState, states_);
+  again(Topic::kHealth, healths_);
+}
+
+}  // namespace bushd::daemon

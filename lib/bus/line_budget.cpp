@@ -1,0 +1,38 @@
+#include "bus/line_budget.h"
+
+#include <algorithm>
+
+#include "bus/line_times.h"
+
+namespace bushd::fieldbus {
+namespace {
+
+// Every transmitter sends a delimiter first.
+constexpr double kFrameCost = BUSHD_FRAME_OVERHEAD + 1.0;
+constexpr double kSyncBytes = 19.0;
+constexpr double kPollEntryBytes = 3.0;
+
+}  // namespace
+
+double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
+                 std::span<const std::uint8_t> motors_per_mcu) {
+  const double tick_s = tick_ns * 1e-9;
+  const bool fine = format == BUSHD_FORMAT_FINE;
+  const double bytes_per_us = baud / 10.0 * 1e-6;
+  const double polls_per_s = 1.0 / (kPollPeriodUs * 1e-6);
+  double bytes_per_s = (kFrameCost + kSyncBytes) / (kSyncPeriodUs * 1e-6);
+  bytes_per_s += (kFrameCost + 1.0 + kFirstSlotUs * bytes_per_us) * polls_per_s;
+  for (const std::uint8_t motors : motors_per_mcu) {
+    const double report =
+        kPollEntryBytes + kFrameCost + BUSHD_REPORT_SIZE(motors) + kSlotGuardUs * bytes_per_us;
+    bytes_per_s += report * polls_per_s;
+    if (motors == 0) continue;
+    const double ticks = ticks_per_frame(motors, format, tick_ns);
+    const double frame =
+        kFrameCost + BUSHD_TICKS_HEADER + 2.0 * motors + ticks * motors * (fine ? 2.0 : 1.0);
+    bytes_per_s += frame / (ticks * tick_s);
+  }
+  return bytes_per_s * 10.0 / baud;
+}
+
+}  // namespace bushd::fieldbus

@@ -1,0 +1,25 @@
+#include "bus/rs485/bus_clock.h"
+
+#include <algorithm>
+
+namespace bushd::link {
+
+Tick BusClock::unwrap(std::uint32_t tick, std::int64_t now_us) const {
+  if (!valid()) return tick;
+  const Tick expected = tick_at(now_us);
+  return expected + static_cast<std::int32_t>(tick - static_cast<std::uint32_t>(expected));
+}
+
+void BusClock::sample(Tick tick, std::int64_t ns_in_tick, std::int64_t now_us) {
+  offset_ns_[samples_ % kWindow] = now_us * 1000 - (tick * tick_ns_ + ns_in_tick);
+  ++samples_;
+  const auto filled = static_cast<std::ptrdiff_t>(std::min(samples_, kWindow));
+  best_ns_ = *std::min_element(offset_ns_.begin(), offset_ns_.begin() + filled);
+}
+
+Tick BusClock::tick_at(std::int64_t now_us) const {
+  const std::int64_t bus_ns = now_us * 1000 - best_ns_;
+  return bus_ns >= 0 ? bus_ns / tick_ns_ : -((tick_ns_ - 1 - bus_ns) / tick_ns_);
+}
+
+}  // namespace bushd::link

@@ -1,0 +1,44 @@
+#include "bus/rs485/emergency_stop.h"
+
+#include <algorithm>
+#include <array>
+
+namespace bushd::link {
+namespace {
+
+constexpr int kFrames = 3;
+constexpr std::int64_t kRepeatUs = 20'000;
+constexpr std::int64_t kLongestUs = 2'000'000;  // after this an MCU that says nothing is left alone
+
+}  // namespace
+
+void EmergencyStop::begin(bushd_stop_mode mode) {
+  stop_ = Stop{.mode = mode, .until_us = {}};
+  // One that was latched before says nothing of this one.
+  for (McuRecord& mcu : mcus_) {
+    mcu.view.report.faults &= static_cast<std::uint8_t>(~BUSHD_FAULT_EMERGENCY);
+  }
+}
+
+bool EmergencyStop::send_due(std::int64_t now_us) {
+  if (!stop_) return false;
+  const bool open = std::any_of(mcus_.begin(), mcus_.end(), [](const McuRecord& mcu) {
+    return mcu.view.phase != McuPhase::kOffline &&
+           (mcu.view.report.faults & BUSHD_FAULT_EMERGENCY) == 0;
+  });
+  if (stop_->until_us && (!open || now_us >= *stop_->until_us)) {
+    stop_.reset();
+    return false;
+  }
+  if (now_us < stop_->due_us) return false;
+  if (!stop_->until_us) stop_->until_us = now_us + kLongestUs;
+  stop_->due_us = now_us + kRepeatUs;
+  const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(stop_->mode)};
+  for (int i = 0; i < kFrames; ++i) {
+    writer_.send(now_us, kBroadcast, BUSHD_MSG_EMERGENCY, payload);
+  }
+  for (McuRecord& mcu : mcus_) mcu.poll_wanted |= mcu.view.phase != McuPhase::kOffline;
+  return true;
+}
+
+}  // namespace bushd::link

@@ -1,0 +1,336 @@
+#include "bus/rs485/master.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <utility>
+
+#include "engine/run_plan.h"
+#include "bus/rs485/mcu_fit.h"
+
+namespace bushd::link {
+namespace {
+
+// A queue with less than this would be empty after some frames. However many stops are wanted, the
+// motors that they leave alone go on.
+constexpr std::int64_t kQueueCriticalUs = 40'000;
+// So long after a replacement queues are filled for the case that the program is held up; then it
+// is asked whether it was taken.
+constexpr std::int64_t kFollowFirstUs = 20'000;
+// Less than what replacements are planned ahead beyond the time that the line takes for them: those
+// that have theirs do not keep the others waiting.
+constexpr std::int64_t kCriticalMarginUs = 5'000;
+
+// Codes behind the end of a side are the cruise delay.
+bool makes_the_same_runs(const bushd_table& a, const bushd_table& b) {
+  if (a.cruise != b.cruise || a.time_unit_ns != b.time_unit_ns) return false;
+  for (std::uint32_t i = 0; i < std::max(a.accel.count, b.accel.count); ++i) {
+    if (bushd_table_accel(&a, i) != bushd_table_accel(&b, i)) return false;
+  }
+  for (std::uint32_t i = 0; i < std::max(a.decel.count, b.decel.count); ++i) {
+    if (bushd_table_decel(&a, i) != bushd_table_decel(&b, i)) return false;
+  }
+  return true;
+}
+
+PerMcu<McuRecord> records_of(const BusSetup& setup) {
+  PerMcu<McuRecord> records;
+  for (const McuSetup& mcu : setup.mcus)
+    records.push_back({.setup = mcu, .view = {}, .health = {}});
+  return records;
+}
+
+// The MCU takes the last number that it was given for the same frame again, whether it has reported
+// it or not.
+std::uint8_t next_trigger_number(McuRecord& mcu) {
+  std::uint8_t& number = mcu.trigger_number;
+  do {
+    number = static_cast<std::uint8_t>(number % 255 + 1);
+  } while (number == mcu.view.report.trigger_number);
+  return number;
+}
+
+}  // namespace
+
+Master::Master(BusSetup setup, TickSource& source)
+    : setup_(std::move(setup)),
+      mcus_(records_of(setup_)),
+      writer_(setup_.baud),
+      transactions_(writer_, *this),
+      connector_(setup_, mcus_, transactions_, writer_, *this),
+      synchroniser_(setup_, mcus_, writer_),
+      streams_({.setup = setup_,
+                .mcus = mcus_,
+                .clock = clock(),
+                .source = source,
+                .writer = writer_,
+                .events = events_}),
+      poller_(mcus_, transactions_, writer_),
+      emergency_(mcus_, writer_),
+      horizon_(clock(), transactions_.health().latency) {}
+
+void Master::port_opened(std::int64_t now_us) {
+  port_open_ = true;
+  heard_ = false;
+  transactions_.reset();
+  writer_.reset(now_us);
+  synchroniser_.port_opened(now_us);
+  connector_.port_opened(now_us);
+}
+
+void Master::port_lost(std::int64_t now_us, const std::string& cause) {
+  port_open_ = false;
+  transactions_.abandon();
+  for (const McuIndex i : mcus_.indices()) connector_.give_up(i, cause, now_us);
+  synchroniser_.port_lost();
+}
+
+void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+  notice_standing_still(now_us);
+  transactions_.receive(now_us, bytes);
+}
+
+// While an MCU is not offline it is asked again and again, unless nobody calls step(). Another
+// master may have taken the place of one that was silent for so long; answers that have waited
+// meanwhile are of a time that is over.
+void Master::notice_standing_still(std::int64_t now_us) {
+  const std::int64_t still_us = now_us - stepped_us_;
+  if (!port_open_ || still_us < Synchroniser::kOtherMasterUs) return;
+  transactions_.abandon();
+  for (McuRecord& mcu : mcus_) {
+    if (mcu.view.phase != McuPhase::kOnline) continue;
+    mcu.view.outdated_us = still_us;
+    mcu.poll_wanted = true;
+  }
+}
+
+std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
+  writer_.clear();
+  notice_standing_still(now_us);
+  stepped_us_ = now_us;
+  if (!port_open_) return {};
+  synchroniser_.lines_run(streams_.runs_line());
+  transactions_.expire(now_us);
+  streams_.fail_late_replacements(now_us);
+  // Nobody should be talking any more, and an answer that is late all the same may be lost.
+  if (transactions_.open() && now_us >= transactions_.quiet_us()) emergency_.send_due(now_us);
+  while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
+  }
+  return writer_.bytes();
+}
+
+// How long nothing may be sent, and then all others have their turn first: a poll whose last answer
+// is missing.
+std::int64_t Master::silence_us() const {
+  return poller_.cycle_us() + transactions_.patience_us() + streams_.round_us();
+}
+
+// By urgency: an emergency, also one that binds an MCU that has just come; queues that are all but
+// empty; replacements, what follows them, and the polls that confirm them; queues about to run
+// empty; reports; SYNCs; configuration; filling queues.
+bool Master::send_next(std::int64_t now_us) {
+  const std::int64_t target_us = horizon_.queue_target_us();
+  const auto below = [target_us](std::int64_t lead_us) {
+    return StreamScheduler::Filling{.lead_us = lead_us, .target_us = target_us};
+  };
+  const std::int64_t urgent_us = horizon_.queue_urgent_us(silence_us());
+  const StreamScheduler::Filling urgent = below(urgent_us);
+  // On a line that has little room more than enough would put off the poll for long.
+  const StreamScheduler::Filling follows = below(
+      streams_.confirmation_is_due(now_us - kFollowFirstUs) ? horizon_.queue_enough_us(silence_us())
+                                                            : urgent_us);
+  return emergency_.send_due(now_us) || connector_.send_stop(now_us) ||
+         streams_.send_critical(now_us, below(kQueueCriticalUs), kCriticalMarginUs) ||
+         streams_.send_due_replacement(now_us) || streams_.send_stream(now_us, follows) ||
+         poller_.send_wanted(now_us) || streams_.send_stream(now_us, urgent) ||
+         poller_.send_due(now_us) || synchroniser_.send_due(now_us) ||
+         connector_.send_due_identify(now_us) || connector_.send_request(now_us) ||
+         streams_.send_stream(now_us, below(target_us));
+}
+
+std::int64_t Master::next_wake_us() const {
+  if (!port_open_) return INT64_MAX;
+  if (transactions_.open()) {
+    const std::int64_t timeout_us = transactions_.timeout_us();
+    if (!emergency_.active()) return timeout_us;
+    return std::min(timeout_us, std::max(emergency_.due_us(), transactions_.quiet_us()));
+  }
+  std::int64_t wake = synchroniser_.due_us();
+  if (emergency_.active()) wake = std::min(wake, emergency_.due_us());
+  for (const McuIndex i : mcus_.indices()) wake = std::min(wake, wake_us(i));
+  return std::max(wake, writer_.room_from_us());
+}
+
+std::int64_t Master::wake_us(McuIndex mcu) const {
+  if (mcus_[mcu].view.phase == McuPhase::kOffline) return connector_.retry_due_us(mcu);
+  if (streams_.has_replacement_to_send(mcu) || mcus_[mcu].poll_wanted) return stepped_us_;
+  const bool open = streams_.has_ticks_to_send(mcu) || !connector_.queue(mcu).empty() ||
+                    connector_.scratch(mcu).under_way();
+  return std::min(poller_.due_us(mcu), open ? stepped_us_ + kStreamWakeUs : INT64_MAX);
+}
+
+std::vector<Event> Master::take_events() {
+  return std::exchange(events_, {});
+}
+
+Tick Master::earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const {
+  return std::max(horizon_.earliest_start(now_us), streams_.next_tick(mcu, motor));
+}
+
+Tick Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {
+  const StreamScheduler::LineUse use = {
+      .free_us = transactions_.open() ? transactions_.quiet_us() : now_us,
+      .margin_us = kCriticalMarginUs,
+      .confirm_us = kFollowFirstUs + streams_.round_us() + poller_.cycle_us()};
+  return horizon_.earliest_replace(now_us, streams_.carried_us(now_us, use, together));
+}
+
+Tick Master::earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
+                               Tick start) const {
+  return std::max(earliest_replace(now_us, together), start);
+}
+
+bool Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const {
+  return !streams_.replacement_open(mcu) &&
+         !streams_.behind(now_us, horizon_.queue_urgent_us(silence_us()));
+}
+
+void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
+  streams_.begin(mcu, motor, start);
+}
+
+void Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
+  streams_.begin_run(mcu, motor, start, run);
+}
+
+void Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) {
+  streams_.begin_run(mcu, motor, start, run);
+  synchroniser_.lines_run(true);
+}
+
+bool Master::can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+                          bool alone) const {
+  return makes_lines(mcu) && slot_of(mcu, table) && keeps_up_with(mcu, table, floor, alone);
+}
+
+bool Master::keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+                           bool alone) const {
+  if (!bushd_delay_is_code(floor)) return false;  // LINE_RUN cannot tell it
+  if (can(mcu, BUSHD_CAN_TABLE_TICKS)) return true;
+  return bushd_run_is_slow(&table, floor, setup_.tick_ns,
+                           alone ? BUSHD_SLOW_LINE_DELAY_NS : BUSHD_SHARED_LINE_DELAY_NS);
+}
+
+std::optional<std::uint8_t> Master::slot_of(McuIndex mcu, const bushd_table& table) const {
+  const std::vector<TableRef>& tables = mcus_[mcu].setup.tables;
+  for (std::size_t slot = 0; slot < tables.size(); ++slot) {
+    if (makes_the_same_runs(*tables[slot].table, table)) return static_cast<std::uint8_t>(slot);
+  }
+  const bushd_table* scratch = connector_.scratch(mcu).table();
+  if (scratch == nullptr || !makes_the_same_runs(*scratch, table)) return std::nullopt;
+  return BUSHD_SCRATCH_SLOT;
+}
+
+bool Master::can_upload(McuIndex mcu, const bushd_table& table) const {
+  const McuRecord& record = mcus_[mcu];
+  std::size_t codes = codes_of(table);
+  for (const TableRef& ref : record.setup.tables) codes += codes_of(*ref.table);
+  return can(mcu, BUSHD_CAN_SCRATCH) && codes <= record.view.identity.table_codes;
+}
+
+void Master::end_upload(McuIndex mcu) {
+  if (uploads(mcu)) connector_.scratch(mcu).clear();
+}
+
+void Master::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {
+  streams_.follow_run(mcu, motor, start, run);
+  if (std::holds_alternative<LineRun>(run)) synchroniser_.lines_run(true);
+}
+
+void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
+  streams_.replace(mcu, motors, first, stepped_us_);
+}
+
+std::optional<BusSnapshot> Master::snapshot(std::int64_t now_us) const {
+  return BusSnapshot{.setup = &setup_,
+                     .mcus = mcus_,
+                     .clock = clock(),
+                     .queue_us = horizon_.queue_target_us(),
+                     .now_us = now_us};
+}
+
+std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
+                         std::span<const Armed> moves) {
+  McuRecord& record = mcus_[mcu];
+  std::vector<bushd_table_run_entry> entries;
+  for (const Armed& move : moves) {
+    entries.push_back(
+        entry_of(move.motor, record.setup.table_of_motor[move.motor].value_or(0), move.run));
+  }
+  std::sort(entries.begin(), entries.end(),
+            [](const auto& a, const auto& b) { return a.motor < b.motor; });
+  const std::uint8_t number = next_trigger_number(record);
+  connector_.queue(mcu).arm(number, edge, delay_us, entries);
+  return number;
+}
+
+std::uint8_t Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
+                              std::span<const ArmedOnLine> parts) {
+  std::vector<bushd_line_entry> entries;
+  for (const auto& [motor, run] : parts) {
+    entries.push_back({motor, static_cast<std::int8_t>(run.direction), run.increment});
+  }
+  std::ranges::sort(entries, {}, &bushd_line_entry::motor);
+  const std::uint8_t number = next_trigger_number(mcus_[mcu]);
+  connector_.queue(mcu).arm_line({.number = number,
+                                  .edge = edge,
+                                  .delay_us = delay_us,
+                                  .line = line_part_of(parts.front().run)},
+                                 entries);
+  return number;
+}
+
+std::uint8_t Master::travel(McuIndex mcu, bushd_travel message) {
+  message.number = next_trigger_number(mcus_[mcu]);
+  connector_.queue(mcu).travel(message);
+  return message.number;
+}
+
+void Master::end_travel(McuIndex mcu, std::uint8_t motor) {
+  bushd_travel message{};
+  message.kind = BUSHD_TRAVEL_NONE;
+  message.motor = motor;
+  connector_.queue(mcu).travel(message);
+}
+
+void Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {
+  connector_.queue(mcu).position_compare(message);
+}
+
+void Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) {
+  connector_.queue(mcu).set_position(motor, position_steps);
+}
+
+void Master::emergency_stop(bushd_stop_mode mode) {
+  emergency_.begin(mode);
+  for (const McuIndex i : mcus_.indices()) streams_.drop_all(i);
+  connector_.emergency_stop(mode);
+}
+
+void Master::bind_to_stop(McuIndex mcu, bushd_stop_mode mode) {
+  connector_.bind_to_stop(mcu, mode);
+}
+
+void Master::reconfigure(McuIndex mcu, McuSetup setup) {
+  if (connector_.reconfigure(mcu, std::move(setup))) streams_.drop_all(mcu);
+}
+
+Result<void> Master::check_room(McuIndex mcu, const McuSetup& setup) const {
+  return connector_.check_room(mcu, setup);
+}
+
+void Master::reset_low_water() {
+  for (McuRecord& mcu : mcus_) mcu.health.low_water_ticks.reset();
+}
+
+}  // namespace bushd::link

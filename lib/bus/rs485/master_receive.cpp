@@ -1,0 +1,137 @@
+// What answers, their absence and changes of an MCU's phase mean, and for which machine.
+#include <algorithm>
+
+#include "bus/rs485/master.h"
+
+namespace bushd::link {
+namespace {
+
+template <class Message>
+bool decoded(const Transactions::Answer& answer,
+             bushd_status (*decode)(const std::uint8_t*, std::size_t, Message*), Message* message) {
+  return decode(answer.payload.data(), answer.payload.size(), message) == BUSHD_OK;
+}
+
+// The ticks from which an MCU has no data, unwrapped. Never before the present tick, whatever the
+// line says: ticks executed cannot be asked for again.
+void unwrap_known_until(McuView& view) {
+  const bushd_report& report = view.report;
+  for (unsigned m = 0; m < report.motor_count; ++m) {
+    const auto ahead = static_cast<std::int16_t>(report.motor[m].known_until -
+                                                 static_cast<std::uint16_t>(report.tick));
+    view.known_until[m] = view.tick + std::max<std::int16_t>(ahead, 0);
+  }
+}
+
+}  // namespace
+
+void Master::overheard(std::int64_t now_us, const bushd_frame& frame) {
+  synchroniser_.overheard(now_us, frame);
+}
+
+bool Master::answered(std::int64_t now_us, const Transactions::Answer& answer) {
+  heard_ = true;
+  poller_.answered(answer.mcu);
+  switch (answer.type) {
+    case BUSHD_MSG_POLL: {
+      bushd_report report;
+      if (!decoded(answer, bushd_decode_report, &report)) return false;
+      handle_report(now_us, answer, report);
+      return true;
+    }
+    case BUSHD_MSG_IDENTIFY: {
+      bushd_identity identity;
+      if (!decoded(answer, bushd_decode_identity, &identity)) return false;
+      connector_.identity(identity);
+      return true;
+    }
+    case BUSHD_MSG_TABLES: {
+      bushd_tables held;
+      if (!decoded(answer, bushd_decode_tables, &held)) return false;
+      connector_.tables(answer.mcu, held, !emergency_.active());
+      return true;
+    }
+    default: {
+      bushd_acknowledgement message;
+      if (!decoded(answer, bushd_decode_acknowledgement, &message)) return false;
+      connector_.acknowledged(now_us, answer.mcu, answer.type, message.status);
+      return true;
+    }
+  }
+}
+
+bool Master::unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
+  if (mcus_[mcu].view.phase == McuPhase::kOffline) {
+    connector_.not_found(now_us, mcu);
+    return false;
+  }
+  if (poller_.missed(now_us, mcu, type)) connector_.give_up_unanswering(now_us, mcu);
+  return true;
+}
+
+void Master::ended(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
+  if (type == BUSHD_MSG_IDENTIFY) connector_.identify_ended(now_us, mcu);
+}
+
+void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answer,
+                           const bushd_report& report) {
+  const McuIndex index = answer.mcu;
+  McuRecord& mcu = mcus_[index];
+  McuView& view = mcu.view;
+  if (view.phase == McuPhase::kOffline) return;
+  if (report.boot_number != view.identity.boot_number) {
+    ++mcu.health.restarts;
+    view.identity.boot_number = report.boot_number;
+    connector_.give_up(index, "restarted", now_us);
+    return;
+  }
+  view.report = report;
+  view.reported = true;
+  mcu.answered = false;
+  view.outdated_us = 0;
+  poller_.follow_report(index);
+  connector_.follow_stop(index);
+  if (report.faults & BUSHD_FAULT_OVERCURRENT) connector_.drivers_off(index);
+  const auto agreement = synchroniser_.follow_report(now_us, index, answer.line_us, answer.in_time);
+  if (agreement == Synchroniser::Agreement::kOtherTime && view.phase == McuPhase::kOnline) {
+    // Moves are planned in the bus's time: who counts otherwise has to be told it before it gets
+    // any, and of those it has got nothing holds.
+    connector_.give_up(index, "counts other ticks than before", now_us);
+    return;
+  }
+  unwrap_known_until(view);
+  const bool in_step = agreement == Synchroniser::Agreement::kInStep;
+  if (view.phase == McuPhase::kConnecting) {
+    const bool listens =
+        synchroniser_.perhaps_another(now_us) && !synchroniser_.two_masters(now_us);
+    connector_.follow_report(now_us, index, in_step && !listens);
+    return;
+  }
+  if (!in_step && (report.flags & BUSHD_FLAG_CONFIGURED) == 0) {
+    connector_.give_up(index, "lost its configuration", now_us);
+    return;
+  }
+  streams_.follow_report(index);
+  events_.push_back(McuReported{index});
+}
+
+void Master::found(std::int64_t now_us, McuIndex) {
+  synchroniser_.hurry(now_us);
+}
+
+void Master::came_online(McuIndex mcu) {
+  streams_.came_online(mcu);
+  events_.push_back(McuOnline{mcu});
+}
+
+void Master::went_offline(McuIndex mcu, bool was_online) {
+  poller_.went_offline(mcu);
+  streams_.drop_all(mcu);
+  if (was_online) events_.push_back(McuOffline{mcu});
+}
+
+void Master::refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) {
+  events_.push_back(RequestRefused{.mcu = mcu, .type = type, .status = status});
+}
+
+}  // namespace bushd::link

@@ -1,0 +1,46 @@
+// What is known of an MCU of a bus.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "engine/message.h"
+#include "bus/rs485/bus_setup.h"
+#include "bus/rs485/health.h"
+#include "bus/rs485/mcu_index.h"
+#include "bus/rs485/tick.h"
+
+namespace bushd::link {
+
+enum class McuPhase { kOffline, kConnecting, kOnline };
+
+struct McuView {
+  McuPhase phase = McuPhase::kOffline;
+  std::string detail = "not heard yet";  // why it is not online
+  bool identified = false;
+  bushd_identity identity{};
+  bool reported = false;  // the fields below are valid
+  bushd_report report{};
+  // How old the report was when this daemon, having stood still for very long, went on; 0: since
+  // then there has been another one.
+  std::int64_t outdated_us = 0;
+  Tick tick = 0;                                         // report.tick, unwrapped
+  std::array<Tick, BUSHD_MOTORS_PER_MCU> known_until{};  // likewise
+  std::string uncertain_reason{};                        // of the last PositionUncertain
+  std::string note{};  // what people should know of it while it is online
+  // An emergency stop that nobody has cleared binds it, whether it is there or not.
+  bool bound_by_stop = false;
+};
+
+// Common to the machines of a master. Each keeps for itself what only it needs to know.
+struct McuRecord {
+  McuSetup setup;
+  McuView view;
+  McuHealth health;
+  bool poll_wanted = false;         // its report is needed sooner than its turn would come
+  bool answered = false;            // something that was asked of it, since its last report
+  std::uint8_t trigger_number = 0;  // the last that it was given
+};
+
+}  // namespace bushd::link

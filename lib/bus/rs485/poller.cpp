@@ -1,0 +1,121 @@
+#include "bus/rs485/poller.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "bus/line_times.h"
+
+namespace bushd::link {
+namespace {
+
+using fieldbus::kFirstSlotUs;
+using fieldbus::kPollPeriodUs;
+using fieldbus::kSlotGuardUs;
+
+// Nothing else is sent meanwhile; queues that have run low must not wait for longer.
+constexpr std::int64_t kMaxCycleUs = 60'000;
+constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
+constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
+constexpr int kMaxMissedReplies = 10;  // about half a second
+
+}  // namespace
+
+Poller::Poller(PerMcu<McuRecord>& mcus, Transactions& transactions, const FrameWriter& writer)
+    : mcus_(mcus), transactions_(transactions), writer_(writer), polled_(mcus.size()) {}
+
+// Those whose turn comes soon are asked along, and all if one may miss its reply: somebody must
+// answer after it.
+std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
+  bool doubtful = false;
+  for (const McuIndex i : mcus_.indices()) {
+    doubtful |= mcus_[i].poll_wanted && polled_[i].missed_replies != 0;
+  }
+  std::vector<McuIndex> asked;
+  for (const McuIndex i : mcus_.indices()) {
+    const bool soon = doubtful || polled_[i].due_us <= now_us + kPollPeriodUs / 2;
+    const bool along = mcus_[i].view.phase != McuPhase::kOffline && soon;
+    if (mcus_[i].poll_wanted || along) asked.push_back(i);
+  }
+  std::stable_sort(asked.begin(), asked.end(), [this](McuIndex a, McuIndex b) {
+    const auto rank = [this](McuIndex i) {
+      return std::pair{polled_[i].missed_replies == 0, !mcus_[i].poll_wanted};
+    };
+    return rank(a) < rank(b);
+  });
+  return asked;
+}
+
+std::int64_t Poller::reply_us(const McuRecord& mcu) const {
+  return writer_.line_us(BUSHD_REPORT_SIZE(mcu.view.identity.motors) + BUSHD_FRAME_OVERHEAD + 1);
+}
+
+std::int64_t Poller::cycle_us() const {
+  std::int64_t answers_us = 0;
+  std::size_t entries = 0;
+  for (const McuRecord& mcu : mcus_) {
+    if (mcu.view.phase == McuPhase::kOffline) continue;
+    ++entries;
+    const std::int64_t with_us = answers_us + reply_us(mcu) + kSlotGuardUs;
+    if (answers_us == 0 || with_us <= kMaxCycleUs) answers_us = with_us;
+  }
+  constexpr std::size_t kEntryBytes = 3;
+  return writer_.line_us(2 + entries * kEntryBytes + BUSHD_FRAME_OVERHEAD) + kFirstSlotUs +
+         answers_us;
+}
+
+bool Poller::send_wanted(std::int64_t now_us) {
+  if (std::none_of(mcus_.begin(), mcus_.end(), [](const McuRecord& m) { return m.poll_wanted; })) {
+    return false;
+  }
+  std::vector<bushd_poll_entry> entries;
+  std::vector<Transactions::ReplySlot> slots;
+  std::int64_t begin_us = kFirstSlotUs;
+  for (const McuIndex i : choose(now_us)) {
+    const McuRecord& mcu = mcus_[i];
+    const std::int64_t end_us = begin_us + reply_us(mcu);
+    const bool full = entries.size() == BUSHD_POLL_MAX_ENTRIES || end_us > kMaxCycleUs;
+    if (full && !entries.empty()) break;
+    const auto units = static_cast<std::uint16_t>((begin_us + kUnitUs - 1) / kUnitUs);
+    entries.push_back({mcu.setup.address.value, units});
+    slots.push_back({.mcu = i, .address = mcu.setup.address, .end_us = end_us});
+    begin_us = end_us + kSlotGuardUs;
+  }
+  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+  const std::size_t size =
+      bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data());
+  transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, slots, kSlotGuardUs);
+  for (const Transactions::ReplySlot& slot : slots) {
+    mcus_[slot.mcu].poll_wanted = false;
+    polled_[slot.mcu].due_us = now_us + kPollPeriodUs;
+  }
+  return true;
+}
+
+bool Poller::send_due(std::int64_t now_us) {
+  bool due = false;
+  for (const McuIndex i : mcus_.indices()) {
+    if (mcus_[i].view.phase == McuPhase::kOffline || polled_[i].due_us > now_us) continue;
+    mcus_[i].poll_wanted = due = true;
+  }
+  return due && send_wanted(now_us);
+}
+
+bool Poller::missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
+  ++mcus_[mcu].health.timeouts;
+  if (++polled_[mcu].missed_replies >= kMaxMissedReplies) return true;
+  // Sooner than usual; but a dead MCU must not starve the others.
+  if (type == BUSHD_MSG_POLL) polled_[mcu].due_us = now_us + kPollAgainUs;
+  return false;
+}
+
+void Poller::follow_report(McuIndex mcu) {
+  polled_[mcu].counters.follow(mcus_[mcu].view.report, mcus_[mcu].health);
+}
+
+void Poller::went_offline(McuIndex mcu) {
+  polled_[mcu].missed_replies = 0;
+  mcus_[mcu].poll_wanted = mcus_[mcu].answered = false;
+}
+
+}  // namespace bushd::link

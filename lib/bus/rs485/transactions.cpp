@@ -1,0 +1,142 @@
+#include "bus/rs485/transactions.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace bushd::link {
+
+void Transactions::reset() {
+  receiver_ = {};
+  open_.reset();
+  expired_ = {};
+  patience_us_ = kMaxPatienceUs;
+}
+
+void Transactions::ask(std::int64_t now_us, const Request& request) {
+  const std::uint8_t sequence =
+      writer_.send(now_us, request.address, request.type, request.payload);
+  const std::int64_t end_us =
+      writer_.free_us() + writer_.line_us(request.reply_payload + BUSHD_FRAME_OVERHEAD + 1);
+  const std::int64_t quiet_us = end_us + request.reply_slots_us;
+  open_ = Open{.type = request.type,
+               .sequence = sequence,
+               .awaited = {{.mcu = request.mcu, .address = request.address, .expected_us = end_us}},
+               .sent_us = writer_.free_us(),
+               .quiet_us = quiet_us,
+               .timeout_us = quiet_us + patience_us_,
+               .several = request.reply_slots > 1};
+}
+
+void Transactions::ask_all(std::int64_t now_us, std::uint8_t type,
+                           std::span<const std::uint8_t> payload, std::span<const ReplySlot> slots,
+                           std::int64_t late_us) {
+  const std::uint8_t sequence = writer_.send(now_us, kBroadcast, type, payload);
+  const std::int64_t sent_us = writer_.free_us();
+  const std::int64_t quiet_us = sent_us + slots.back().end_us + late_us;
+  open_ = Open{.type = type,
+               .sequence = sequence,
+               .awaited = {},
+               .sent_us = sent_us,
+               .quiet_us = quiet_us,
+               .timeout_us = quiet_us + patience_us_,
+               .several = false};
+  for (const ReplySlot& slot : slots) {
+    open_->awaited.push_back(
+        {.mcu = slot.mcu, .address = slot.address, .expected_us = sent_us + slot.end_us});
+  }
+}
+
+void Transactions::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+  for (const std::uint8_t byte : bytes) {
+    bushd_frame frame;
+    switch (bushd_receive_byte(&receiver_, byte, &frame)) {
+      case BUSHD_RECEIVE_MORE:
+        break;
+      case BUSHD_RECEIVE_FRAME:
+        handle_frame(now_us, frame);
+        break;
+      case BUSHD_RECEIVE_BAD_CRC:
+      case BUSHD_RECEIVE_BAD_LENGTH:
+        ++health_.crc_errors;
+        break;
+    }
+  }
+}
+
+void Transactions::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
+  if ((frame.type & BUSHD_TYPE_REPLY) == 0) {
+    listener_.overheard(now_us, frame);
+    return;
+  }
+  Awaited* const from = awaited_from(frame);
+  if (from == nullptr) {
+    ++health_.stray_frames;
+    if (take_if_expired(frame)) be_more_patient();
+    return;
+  }
+  from->answered = true;
+  note_latency(now_us, *from);
+  const McuIndex mcu = from->mcu;
+  const Answer answer = {.mcu = mcu,
+                         .type = open_->type,
+                         .payload = {frame.payload, frame.payload_size},
+                         .line_us = from->expected_us - open_->sent_us,
+                         .in_time = now_us <= open_->timeout_us};
+  if (!listener_.answered(now_us, answer)) ++health_.crc_errors;
+  // Answers come in the order of their slots: after the last one nobody is waited for.
+  if (open_ && !open_->several && mcu == open_->awaited.back().mcu) finish(now_us);
+}
+
+Transactions::Awaited* Transactions::awaited_from(const bushd_frame& frame) {
+  const bool fits =
+      open_ && frame.sequence == open_->sequence && frame.type == (open_->type | BUSHD_TYPE_REPLY);
+  if (!fits) return nullptr;
+  const auto found = std::find_if(
+      open_->awaited.begin(), open_->awaited.end(),
+      [&](const Awaited& awaited) { return awaited.address == McuAddress{frame.address}; });
+  if (found == open_->awaited.end() || (found->answered && !open_->several)) return nullptr;
+  return &*found;
+}
+
+// That of another master may have the same type and sequence number: then less is lost than with
+// answers that are never awaited.
+bool Transactions::take_if_expired(const bushd_frame& frame) {
+  const auto found = std::ranges::find_if(expired_, [&](const std::optional<Expired>& request) {
+    return request && frame.sequence == request->sequence &&
+           frame.type == (request->type | BUSHD_TYPE_REPLY);
+  });
+  if (found == expired_.end()) return false;
+  found->reset();
+  return true;
+}
+
+void Transactions::be_more_patient() {
+  patience_us_ = std::min(2 * patience_us_, kMaxPatienceUs);
+}
+
+// In which of several slots an answer came is not known here.
+void Transactions::note_latency(std::int64_t now_us, const Awaited& from) {
+  if (open_->several) return;
+  const std::int64_t latency_us = std::max<std::int64_t>(now_us - from.expected_us, 0);
+  health_.latency.add(latency_us);
+  patience_us_ = std::clamp(std::max(4 * latency_us, patience_us_ - patience_us_ / 8),
+                            kMinPatienceUs, kMaxPatienceUs);
+}
+
+void Transactions::expire(std::int64_t now_us) {
+  if (!open_ || now_us < open_->timeout_us) return;
+  std::ranges::rotate(expired_, expired_.begin() + 1);
+  expired_.back() = Expired{.type = open_->type, .sequence = open_->sequence};
+  finish(now_us);
+}
+
+void Transactions::finish(std::int64_t now_us) {
+  const Open over = *std::exchange(open_, std::nullopt);
+  for (const Awaited& awaited : over.awaited) {
+    if (awaited.answered || !listener_.unanswered(now_us, awaited.mcu, over.type)) continue;
+    be_more_patient();
+  }
+  listener_.ended(now_us, over.awaited.front().mcu, over.type);
+}
+
+}  // namespace bushd::link

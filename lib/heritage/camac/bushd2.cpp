@@ -1,0 +1,141 @@
+#include "heritage/camac/bushd2.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace bushd::camac {
+namespace {
+
+// Bits of the control register.
+constexpr int kOverflowEnabled = 5;
+constexpr int kFaultEnabled = 6;
+constexpr int kEndEnabled = 7;
+constexpr int kDirection = 8;
+constexpr int kMotorMask = 0x1F;
+
+// Of the status.
+constexpr unsigned kRightLimit = 0x01;
+constexpr unsigned kLeftLimit = 0x02;
+constexpr unsigned kSupplyMissing = 0x04;
+constexpr unsigned kNotConnected = 0x08;
+constexpr unsigned kStepDone = 0x10;
+constexpr int kStatusBits = 8;
+constexpr std::uint32_t kReceivedMask = 3;
+
+}  // namespace
+
+std::uint8_t code_of_step(const Program& program, std::uint32_t step) {
+  const std::uint32_t last = static_cast<std::uint32_t>(program.codes.size()) - 1;
+  return program.codes[std::min({step, program.steps - 1 - step, last})];
+}
+
+bool Bushd2::lam() const {
+  return (overflow_ && is_enabled(kOverflowEnabled) && !is_moving()) ||
+         (fault_ && is_enabled(kFaultEnabled)) || (ended_ && is_enabled(kEndEnabled));
+}
+
+std::uint32_t Bushd2::request_register() const {
+  return status_ | received_ << kStatusBits;
+}
+
+void Bushd2::clear_lam() {
+  overflow_ = false;
+  fault_ = false;
+  ended_ = false;
+}
+
+void Bushd2::clear_requests() {
+  clear_lam();
+  status_ = 0;
+  received_ = 0;
+}
+
+Program Bushd2::program() const {
+  Program program;
+  program.motor = control() & kMotorMask;
+  program.page = program.motor / kMotorsPerPage;
+  program.left = is_enabled(kDirection);
+  const std::size_t page = static_cast<std::size_t>(program.page) * kPageBytes;
+  program.steps = programs().word_at(page);
+  const auto codes = programs().bytes().subspan(page + kFirstCode, kCodes);
+  for (const std::uint8_t code : codes) program.codes.push_back(std::max<std::uint8_t>(code, 1));
+  return program;
+}
+
+void Bushd2::start(std::int64_t now_us) {
+  if (is_moving()) return;
+  Exchange exchange{.program = program()};
+  status_ = 0;
+  received_ = 0;
+  if (exchange.program.steps == 0) {
+    ended_ = true;
+    return;
+  }
+  const MotorStatus status = motors_.status(exchange.program.motor);
+  if (status.bars(exchange.program.left)) {
+    receive(1, status, false);
+    fault_ = true;
+  } else if (!motors_.move(exchange.program)) {
+    fault_ = true;
+  } else {
+    exchange.deadline_us = next_deadline_us(now_us, exchange);
+    exchange_ = std::move(exchange);
+  }
+}
+
+void Bushd2::stop() {
+  if (!exchange_ || exchange_->stopping) return;
+  exchange_->stopping = true;
+  motors_.stop(exchange_->program.motor);
+}
+
+void Bushd2::receive(std::uint32_t messages, const MotorStatus& status, bool step_done) {
+  const unsigned bits = (status.right_limit ? kRightLimit : 0) |
+                        (status.left_limit ? kLeftLimit : 0) |
+                        (status.supply_missing ? kSupplyMissing : 0) |
+                        (status.not_connected ? kNotConnected : 0) | (step_done ? kStepDone : 0);
+  status_ = static_cast<std::uint8_t>(bits);
+  received_ = (received_ + messages) & kReceivedMask;
+}
+
+void Bushd2::answer(std::int64_t now_us, std::uint32_t steps, const MotorStatus& status) {
+  if (!exchange_) return;
+  Exchange& exchange = *exchange_;
+  const std::uint32_t made = std::min(steps, exchange.program.steps - exchange.answered);
+  receive(std::max(made, 1U), status, made > 0);
+  exchange.answered += made;
+  const bool all = exchange.answered == exchange.program.steps;
+  if (all || status.bars(exchange.program.left)) {
+    ended_ |= all && !exchange.stopping;
+    fault_ |= !all;
+    exchange_.reset();
+    return;
+  }
+  exchange.deadline_us = next_deadline_us(now_us, exchange);
+}
+
+void Bushd2::ends(const MotorStatus& status) {
+  if (!exchange_) return;
+  if (status.any()) receive(1, status, false);
+  fault_ |= !exchange_->stopping || status.bars(exchange_->program.left);
+  exchange_.reset();
+}
+
+std::int64_t Bushd2::next_deadline_us(std::int64_t now_us, const Exchange& exchange) const {
+  const std::int64_t code = code_of_step(exchange.program, exchange.answered);
+  const std::int64_t delay_us = code * 1'000'000 / (kCodesPerStartPeriod * setup_.f_start_hz);
+  return now_us + 2 * delay_us + setup_.answer_us;
+}
+
+std::int64_t Bushd2::deadline_us() const {
+  return exchange_ && !exchange_->stopping ? exchange_->deadline_us : kNever;
+}
+
+void Bushd2::watch(std::int64_t now_us) {
+  if (now_us < deadline_us()) return;
+  status_ = kNotConnected;
+  fault_ = true;
+  stop();
+}
+
+}  // namespace bushd::camac

@@ -1,0 +1,92 @@
+// BUSHD-2: a motor performs a given number of steps by a program in the module's memory.
+//
+// Memory of 1024 bytes, a page of 256 for each of four groups of eight motors:
+//
+//     0, 1      number of steps, the low byte first
+//     2..239    238 delay codes; a code lasts code / (250 F_start), so 250 is F_start, 10 is
+//               25 F_start; 0 counts as 1
+//     240..255  free, for the positions of motors
+//
+// Control register: bits 1..5 number of the motor, bit 5 enables address overflow as well; 6
+// enables the request from the motor, 7 that at the end of motion; 8 is the direction, 1: left.
+// Request register: bits 1..8 the status that the motor has told last (1 right limit, 2 left limit,
+// 3 supply missing, 4 not connected, 5 step done), 9 and 10 how many were received, modulo 4.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "heritage/camac/motion_module.h"
+#include "heritage/camac/motors.h"
+
+namespace bushd::camac {
+
+class Bushd2 final : public MotionModule {
+ public:
+  static constexpr std::size_t kMemoryBytes = 1024;
+  static constexpr std::size_t kPageBytes = 256;
+  static constexpr std::size_t kCodes = 238;
+  static constexpr std::size_t kFirstCode = 2;  // in its page
+  static constexpr int kMotors = 32;
+  static constexpr int kMotorsPerPage = 8;
+  static constexpr std::int64_t kCodesPerStartPeriod = 250;  // 250 of them last 1 / F_start
+  static constexpr std::int64_t kAnswerUs = 100'000;
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+
+  struct Setup {
+    int f_start_hz = 40;                 // 1..100
+    std::int64_t answer_us = kAnswerUs;  // for an answer, beyond twice its delay
+  };
+  // `motors` outlive the module.
+  Bushd2(Setup setup, Motors& motors)
+      : MotionModule(kMemoryBytes), setup_(setup), motors_(motors) {}
+
+  bool lam() const override;
+
+  // The motor that moves has told its status after each of so many more steps; 0: without a step.
+  // What comes while none moves is ignored, here and below.
+  void answer(std::int64_t now_us, std::uint32_t steps, const MotorStatus& status);
+  // It stands although not all steps are made, because it was stopped or for what its status says.
+  void ends(const MotorStatus& status);
+  // The motor does not answer: to be called at this time, kNever if none is awaited.
+  std::int64_t deadline_us() const;
+  void watch(std::int64_t now_us);
+
+  bool is_moving() const { return exchange_.has_value(); }
+
+ private:
+  // With the commutator, from F26A0 until the motor stands.
+  struct Exchange {
+    Program program;
+    std::uint32_t answered = 0;
+    std::int64_t deadline_us = 0;
+    bool stopping = false;
+  };
+
+  std::uint32_t request_register() const override;
+  void clear_lam() override;
+  void clear_requests() override;
+  void address_overflows() override { overflow_ = true; }
+  void start(std::int64_t now_us) override;
+  void stop() override;
+
+  Program program() const;
+  void receive(std::uint32_t messages, const MotorStatus& status, bool step_done);
+  std::int64_t next_deadline_us(std::int64_t now_us, const Exchange& exchange) const;
+
+  const Setup setup_;
+  Motors& motors_;
+  std::uint8_t status_ = 0;
+  std::uint32_t received_ = 0;
+  // Each raises L if it is enabled.
+  bool overflow_ = false;
+  bool fault_ = false;
+  bool ended_ = false;
+  std::optional<Exchange> exchange_;
+};
+
+// The code before step `step`, from 0, of `steps`. Precondition: step < steps.
+std::uint8_t code_of_step(const Program& program, std::uint32_t step);
+
+}  // namespace bushd::camac

@@ -1,0 +1,126 @@
+#include "sim/avr/avr_keypad.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+#include <stdexcept>
+
+extern "C" {
+#include <avr_ioport.h>
+#include <sim_avr.h>
+#include <sim_elf.h>
+#include <sim_io.h>
+}
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kKeypadHz = 16'000'000;
+constexpr int kKeys = 4;
+// Of port B: segment g, and the digits from bit 1 on. Of port D: segments a to f from bit 2 on.
+constexpr int kFirstDigit = 1;
+constexpr int kFirstSegment = 2;
+
+// As a data sheet of such a display draws them: a at the top, clockwise to f, g in the middle.
+constexpr std::array<std::pair<std::uint8_t, char>, 12> kCharacters{{{0b0111111, '0'},
+                                                                     {0b0000110, '1'},
+                                                                     {0b1011011, '2'},
+                                                                     {0b1001111, '3'},
+                                                                     {0b1100110, '4'},
+                                                                     {0b1101101, '5'},
+                                                                     {0b1111101, '6'},
+                                                                     {0b0000111, '7'},
+                                                                     {0b1111111, '8'},
+                                                                     {0b1101111, '9'},
+                                                                     {0b1000000, '-'},
+                                                                     {0, ' '}}};
+
+void never_sleep(avr_t*, avr_cycle_count_t) {}
+
+}  // namespace
+
+AvrKeypad::AvrKeypad(const std::string& image) {
+  elf_firmware_t firmware{};
+  if (elf_read_firmware(image.c_str(), &firmware) != 0) {
+    throw std::runtime_error(image + ": not an image for an AVR");
+  }
+  avr_ = avr_make_mcu_by_name("atmega328p");
+  if (avr_ == nullptr) throw std::runtime_error("simavr: no atmega328p");
+  avr_init(avr_);
+  avr_->frequency = firmware.frequency = kKeypadHz;
+  avr_load_firmware(avr_, &firmware);
+  avr_->sleep = never_sleep;
+  avr_->log = LOG_ERROR;
+  line_ = std::make_unique<AvrUartLine>(avr_, '0', [this](std::uint64_t cycle, std::uint8_t byte) {
+    if (on_byte) on_byte(static_cast<TimeNs>(cycle) * 125 / 2, byte);
+  });
+  for (std::size_t i = 0; i < pins_.size(); ++i) {
+    const bool is_b = i < 8;
+    pins_[i] = {this, is_b ? &port_b_ : &port_d_, static_cast<std::uint8_t>(1 << i % 8)};
+    avr_irq_register_notify(
+        avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(is_b ? 'B' : 'D'), static_cast<int>(i % 8)),
+        on_pin, &pins_[i]);
+  }
+  hold(0);
+}
+
+AvrKeypad::~AvrKeypad() {
+  avr_terminate(avr_);
+  std::free(avr_);
+}
+
+// Keys close to ground.
+void AvrKeypad::hold(std::uint8_t keys) {
+  avr_ioport_external_t external{};
+  external.name = 'C';
+  external.mask = (1 << kKeys) - 1;
+  external.value = static_cast<std::uint8_t>(~keys) & ((1 << kKeys) - 1);
+  avr_ioctl(avr_, AVR_IOCTL_IOPORT_SET_EXTERNAL('C'), &external);
+  for (int key = 0; key < kKeys; ++key) {
+    avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ('C'), key), (keys >> key & 1) == 0);
+  }
+}
+
+TimeNs AvrKeypad::time_ns() const {
+  return static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+}
+
+void AvrKeypad::advance(TimeNs now_ns) {
+  while (time_ns() < now_ns) {
+    line_->step();
+    const auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
+    avr_->run_cycle_limit = left;
+    avr_->run_cycle_count = std::min(avr_->run_cycle_count, left);
+    if (avr_run(avr_) == cpu_Crashed) {
+      throw std::runtime_error("simavr: the keypad's image has crashed");
+    }
+  }
+}
+
+// An edge calls twice, with other bits above the level.
+void AvrKeypad::on_pin(avr_irq_t*, std::uint32_t value, void* param) {
+  const auto& pin = *static_cast<Pin*>(param);
+  *pin.port =
+      static_cast<std::uint8_t>((value & 1) != 0 ? *pin.port | pin.bit : *pin.port & ~pin.bit);
+  if (pin.port == &pin.keypad->port_b_ && (value & 1) != 0) pin.keypad->light(pin.bit);
+}
+
+// Pins of a port change one after the other, from bit 0 on: those of segments before their digit.
+void AvrKeypad::light(std::uint8_t bit) {
+  const int digit = std::countr_zero(bit) - kFirstDigit;
+  if (digit < 0 || digit >= static_cast<int>(segments_.size())) return;
+  segments_[static_cast<std::size_t>(digit)] =
+      static_cast<std::uint8_t>((port_d_ >> kFirstSegment & 0x3F) | (port_b_ & 1) << 6);
+}
+
+std::string AvrKeypad::shown() const {
+  std::string text;
+  for (const std::uint8_t lit : segments_) {
+    const auto* found =
+        std::ranges::find(kCharacters, lit, &decltype(kCharacters)::value_type::first);
+    text += found != kCharacters.end() ? found->second : '?';
+  }
+  return text;
+}
+
+}  // namespace bushd::sim

@@ -1,0 +1,46 @@
+// The line's budget against what master and slaves really put on the line.
+#include <vector>
+
+#include "bus/line_budget.h"
+#include "bus/rs485/slave.h"
+
+namespace bushd::test {
+namespace {
+
+// All motors accelerate, so running delays change from frame to frame, for ten seconds.
+TEST(LineBudget, IsACloseUpperBoundOfWhatIsSent) {
+  for (const bushd_format format : {BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE}) {
+    for (const int slaves : {1, 2}) {
+      for (const int motors : {1, 3, 8, 16}) {
+        FakeBus bus(slaves, motors, format);
+        if (format == BUSHD_FORMAT_COARSE) {
+          bus.source.displacement = [](std::uint8_t, link::Tick t) {
+            return std::int16_t(t % 256);
+          };
+        }
+        bus.connect();
+        for (std::size_t i = 0; i < bus.slaves.size(); ++i) {
+          for (std::uint8_t m = 0; m < motors; ++m) {
+            bus.master->begin(McuIndex{i}, m,
+                              bus.master->earliest_start(bus.now_us, McuIndex{i}, m));
+          }
+        }
+        bus.run_for(1'000'000);
+        const std::int64_t before = bus.master_bytes + bus.slave_bytes;
+        bus.run_for(10'000'000);
+        const auto bytes = static_cast<double>(bus.master_bytes + bus.slave_bytes - before);
+        // Twenty times a second the line is quiet before each answer.
+        const double quiet_s = 20 * (1e-3 + slaves * 0.6e-3);
+        const double sent = bytes * 10 / FakeBus::kBaud / 10.0 + quiet_s;
+        const std::vector<std::uint8_t> all(bus.slaves.size(), static_cast<std::uint8_t>(motors));
+        const double budget = fieldbus::line_load(FakeBus::kBaud, FakeBus::kTickNs, format, all);
+        EXPECT_LE(sent, budget * 1.002) << "one frame more or less: 0.2 % of ten seconds";
+        EXPECT_GE(sent, budget * 0.9) << format << ' ' << slaves << ' ' << motors;
+        EXPECT_EQ(bus.count<link::StartMissed>(), 0);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bushd::test

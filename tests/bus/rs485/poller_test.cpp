@@ -1,0 +1,140 @@
+// Whose turn it is, in which slots, and what becomes of those who do not answer.
+#include "bus/rs485/poller.h"
+
+#include <gmock/gmock.h>
+
+#include "bus/rs485/machines.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::ElementsAre;
+
+struct Nobody : link::Transactions::Listener {
+  bool answered(std::int64_t, const link::Transactions::Answer&) override { return true; }
+  bool unanswered(std::int64_t, McuIndex, std::uint8_t) override { return true; }
+  void ended(std::int64_t, McuIndex, std::uint8_t) override {}
+  void overheard(std::int64_t, const bushd_frame&) override {}
+};
+
+class Polling : public testing::Test {
+ protected:
+  explicit Polling(std::size_t count = 4) : mcus(online_mcus(count)) {}
+
+  // The addresses asked by the last poll, and when their slots begin.
+  std::vector<int> asked() {
+    std::vector<int> addresses;
+    begins_us.clear();
+    for (const Sent& frame : take_sent(writer)) {
+      EXPECT_EQ(frame.type, BUSHD_MSG_POLL);
+      EXPECT_EQ(frame.address, link::kBroadcast);
+      for (std::size_t i = 1; i + 2 < frame.payload.size(); i += 3) {
+        addresses.push_back(frame.payload[i]);
+        begins_us.push_back(bushd_get_u16(&frame.payload[i + 1]) * 10);
+      }
+    }
+    transactions.abandon();
+    return addresses;
+  }
+
+  PerMcu<McuRecord> mcus;
+  link::FrameWriter writer{kBaud};
+  Nobody nobody;
+  link::Transactions transactions{writer, nobody};
+  link::Poller poller{mcus, transactions, writer};
+  std::vector<int> begins_us;
+};
+
+TEST_F(Polling, AllAreAskedByOneFrame) {
+  ASSERT_TRUE(poller.send_due(1'000'000));
+  EXPECT_TRUE(transactions.open());
+  EXPECT_THAT(asked(), ElementsAre(1, 2, 3, 4));
+  // 10 + 32 + 6 bytes for each motor at 20 us, and the guard.
+  const int slot_us = begins_us[1] - begins_us[0];
+  EXPECT_GE(begins_us[0], 1'000);
+  EXPECT_GE(slot_us, (BUSHD_FRAME_OVERHEAD + 1 + int{BUSHD_REPORT_SIZE(4)}) * 20 + 600);
+  EXPECT_EQ(poller.due_us(kFirst), 1'050'000);
+  EXPECT_FALSE(poller.send_due(1'049'999));
+  EXPECT_TRUE(poller.send_due(1'050'000));
+}
+
+TEST_F(Polling, WantedOneIsAskedAtOnceAndFirst) {
+  poller.send_due(1'000'000);
+  asked();
+  EXPECT_FALSE(poller.send_wanted(1'010'000));
+  mcus[McuIndex{2}].poll_wanted = true;
+  ASSERT_TRUE(poller.send_wanted(1'010'000));
+  EXPECT_THAT(asked(), ElementsAre(3)) << "the turn of the others is 40 ms off";
+  EXPECT_FALSE(mcus[McuIndex{2}].poll_wanted);
+  mcus[McuIndex{3}].poll_wanted = true;
+  ASSERT_TRUE(poller.send_wanted(1'030'000));
+  EXPECT_THAT(asked(), ElementsAre(4, 1, 2)) << "those whose turn comes soon are asked along";
+}
+
+TEST_F(Polling, WhoMissedItsReplyAnswersFirstAndNotAlone) {
+  poller.send_due(1'000'000);
+  asked();
+  EXPECT_FALSE(poller.missed(1'010'000, kSecond, BUSHD_MSG_POLL));
+  EXPECT_EQ(poller.due_us(kSecond), 1'030'000) << "sooner than usual";
+  mcus[kSecond].poll_wanted = true;
+  ASSERT_TRUE(poller.send_wanted(1'012'000));
+  EXPECT_THAT(asked(), ElementsAre(2, 1, 3, 4)) << "though their turn is 38 ms off";
+  poller.answered(kSecond);
+  ASSERT_TRUE(poller.send_due(1'062'000));
+  EXPECT_THAT(asked(), ElementsAre(1, 2, 3, 4));
+}
+
+TEST_F(Polling, TenMissedRepliesInARowAreTooMany) {
+  for (int i = 0; i < 9; ++i) EXPECT_FALSE(poller.missed(0, kFirst, BUSHD_MSG_CONTROL));
+  poller.answered(kFirst);
+  for (int i = 0; i < 9; ++i) EXPECT_FALSE(poller.missed(0, kFirst, BUSHD_MSG_CONTROL));
+  EXPECT_TRUE(poller.missed(0, kFirst, BUSHD_MSG_CONTROL));
+  EXPECT_EQ(mcus[kFirst].health.timeouts, 19u);
+}
+
+TEST_F(Polling, OfflineMcusAreNotAsked) {
+  mcus[kFirst].view.phase = link::McuPhase::kOffline;
+  mcus[kFirst].poll_wanted = true;
+  poller.went_offline(kFirst);
+  ASSERT_TRUE(poller.send_due(1'000'000));
+  EXPECT_THAT(asked(), ElementsAre(2, 3, 4));
+}
+
+TEST_F(Polling, CountersOfReportsAddUpOverRestarts) {
+  bushd_report& report = mcus[kFirst].view.report;
+  report.low_water_ticks = UINT16_MAX;
+  for (const std::uint16_t bad :
+       std::initializer_list<std::uint16_t>{5, 7, 2}) {  // the third by another boot
+    report.bad_frames = bad;
+    report.ramp_downs = 1;
+    poller.follow_report(kFirst);
+  }
+  EXPECT_EQ(mcus[kFirst].health.crc_errors, 9u);
+  EXPECT_EQ(mcus[kFirst].health.ramp_downs, 1u);
+  EXPECT_FALSE(mcus[kFirst].health.low_water_ticks);
+  report.low_water_ticks = 12;
+  poller.follow_report(kFirst);
+  report.low_water_ticks = 40;
+  poller.follow_report(kFirst);
+  EXPECT_EQ(mcus[kFirst].health.low_water_ticks, 12);
+}
+
+class ManyPolling : public Polling {
+ protected:
+  ManyPolling() : Polling(60) {
+    for (McuRecord& mcu : mcus) mcu.view.identity.motors = BUSHD_MOTORS_PER_MCU;
+  }
+};
+
+// Nothing else is sent meanwhile, so queues may run low.
+TEST_F(ManyPolling, CycleIsBoundedAndTheOthersComeNext) {
+  ASSERT_TRUE(poller.send_due(1'000'000));
+  const std::vector<int> first = asked();
+  EXPECT_LT(begins_us.back(), 60'000);
+  EXPECT_LT(first.size(), 60u);
+  ASSERT_TRUE(poller.send_wanted(1'000'000));
+  EXPECT_EQ(asked().front(), first.back() + 1);
+}
+
+}  // namespace
+}  // namespace bushd::test

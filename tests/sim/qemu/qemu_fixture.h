@@ -1,0 +1,36 @@
+// The image for LM3S6965 alone on a bus.
+#pragma once
+
+#include <string>
+
+#include "sim/mcu_alone.h"
+#include "sim/qemu/qemu_mcu.h"
+
+namespace bushd::sim {
+
+class QemuAlone : public McuAlone {
+ protected:
+  static constexpr std::uint16_t kBoots = 41;
+  static constexpr TimeNs kBootNs = 100'000'000;
+
+  explicit QemuAlone(std::uint32_t baud = kBaud) : QemuAlone(baud, image_path(baud)) {}
+  QemuAlone(std::uint32_t baud, const std::string& image) : McuAlone(baud, kBootNs) {
+    QemuOptions options;
+    options.image = image;
+    options.memory_owners = LM3S_MEMORY_OWNERS;
+    options.address = kAddress;
+    options.boots = kBoots;
+    qemu_ = add<QemuMcu>(options);
+  }
+
+  // Some faults of the chip must be there before it boots: those of a constructor are.
+  void SetUp() override { pass(kBootNs); }
+
+  static std::string image_path(std::uint32_t baud) {
+    return LM3S_IMAGES "-" + std::to_string(baud) + ".elf";
+  }
+
+  QemuMcu* qemu_ = nullptr;
+};
+
+}  // namespace bushd::sim
