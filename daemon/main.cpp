@@ -17,9 +17,9 @@
 #include "base/standard_output.h"
 #include "config/host_check.h"
 #include "control/path.h"
+#include "daemon/example_config.h"
 #include "daemon/shell/channel_claim.h"
 #include "daemon/shell/event_loop.h"
-#include "daemon/example_config.h"
 #include "daemon/shell/service_manager.h"
 #include "daemon/shell/state_folder.h"
 

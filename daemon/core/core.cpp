@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "base/overloaded.h"
-#include "daemon/model/name_patterns.h"
 #include "daemon/core/request_log.h"
+#include "daemon/model/name_patterns.h"
 
 namespace bushd::daemon {
 

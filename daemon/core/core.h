@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "api/session.h"
+#include "daemon/core/supervisor.h"
 #include "daemon/model/outputs.h"
 #include "daemon/services/arrays.h"
 #include "daemon/services/camac.h"
@@ -41,7 +42,6 @@
 #include "daemon/services/travels.h"
 #include "daemon/services/trigger.h"
 #include "daemon/services/while_connected.h"
-#include "daemon/core/supervisor.h"
 
 namespace bushd::daemon {
 

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "daemon/fronts/lcm_front.h"
-#include "daemon/model/outputs.h"
 #include "daemon/fronts/publishing.h"
+#include "daemon/model/outputs.h"
 
 namespace bushd::daemon {
 

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "heritage/commutator/master.h"
 #include "bus/rs485/master.h"
+#include "heritage/commutator/master.h"
 #include "heritage/serial_pulse/master.h"
 
 namespace bushd::daemon {

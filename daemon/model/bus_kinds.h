@@ -3,9 +3,9 @@
 
 #include <memory>
 
-#include "config/config.h"
 #include "bus/rs485/bus_master.h"
 #include "bus/rs485/tick_source.h"
+#include "config/config.h"
 
 namespace bushd::daemon {
 

@@ -16,10 +16,10 @@
 #include "base/by_id.h"
 #include "base/ids.h"
 #include "base/result.h"
+#include "bus/rs485/bus_master.h"
 #include "config/config.h"
 #include "daemon/model/bus_kinds.h"
 #include "daemon/model/mcu_setup.h"
-#include "bus/rs485/bus_master.h"
 #include "motion/motor.h"
 #include "tables/gentler.h"
 

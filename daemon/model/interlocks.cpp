@@ -1,7 +1,7 @@
 #include "daemon/model/interlocks.h"
 
-#include "api/remedy.h"
 #include "motion/report_words.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 
@@ -42,7 +42,7 @@ Result<void> Interlocks::may_move_by(const Mcu& mcu) const {
   }
   if ((mcu.report().flags & BUSHD_FLAG_ENABLED) == 0 && !mcu.asleep) {
     return fail("the drivers of MCU " + mcu.name() + " are disabled; run " +
-                api::remedy("enable", installation_[mcu.motors().front()].name()));
+                words::remedy("enable", installation_[mcu.motors().front()].name()));
   }
   const Bus& bus = installation_.bus_of(mcu);
   if (bus.two_masters) {

@@ -4,8 +4,8 @@
 #include <functional>
 
 #include "base/by_id.h"
-#include "config/config.h"
 #include "bus/rs485/bus_setup.h"
+#include "config/config.h"
 
 namespace bushd::daemon {
 

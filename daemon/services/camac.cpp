@@ -4,10 +4,10 @@
 #include <string>
 #include <utility>
 
-#include "heritage/camac/block.h"
-#include "heritage/camac/memory_text.h"
 #include "daemon/services/camac_motors.h"
 #include "daemon/services/camac_shutter.h"
+#include "heritage/camac/block.h"
+#include "heritage/camac/memory_text.h"
 
 namespace bushd::daemon {
 namespace {

@@ -6,7 +6,6 @@
 #include <memory>
 #include <vector>
 
-#include "heritage/camac/crate.h"
 #include "daemon/model/installation.h"
 #include "daemon/model/interlocks.h"
 #include "daemon/model/outputs.h"
@@ -16,6 +15,7 @@
 #include "daemon/services/open_moves.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
+#include "heritage/camac/crate.h"
 
 namespace bushd::daemon {
 

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "heritage/camac/bushd2.h"
 #include "daemon/model/interlocks.h"
 #include "daemon/model/outputs.h"
 #include "daemon/model/precedence.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/tables_in_service.h"
+#include "heritage/camac/bushd2.h"
 
 namespace bushd::daemon {
 

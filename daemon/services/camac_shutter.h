@@ -9,13 +9,13 @@
 #include <string>
 #include <utility>
 
-#include "heritage/camac/bushd1.h"
 #include "daemon/model/interlocks.h"
 #include "daemon/model/outputs.h"
 #include "daemon/model/precedence.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
+#include "heritage/camac/bushd1.h"
 
 namespace bushd::daemon {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "api/remedy.h"
 #include "motion/report_words.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 namespace {
@@ -34,7 +34,7 @@ Drivers::Drivers(Installation& installation, Interlocks& interlocks,
     const Mcu& mcu = installation_.mcu_of(motor);
     if (!being_disabled(mcu.id)) return {};
     return fail("the drivers of MCU " + mcu.name() + " are being disabled; run " +
-                api::remedy("enable", installation_[motor].name()));
+                words::remedy("enable", installation_[motor].name()));
   });
 }
 
@@ -129,7 +129,7 @@ Result<void> Drivers::may(std::uint8_t action, const std::vector<McuId>& mcus) c
       if (installation_[motor].is<motion::Resting>()) continue;
       const bool armed = installation_[motor].is<motion::Armed>();
       return fail(installation_[motor].busy_text() + "; run " +
-                  api::remedy(armed ? "disarm" : "stop", installation_[motor].name()) + " first");
+                  words::remedy(armed ? "disarm" : "stop", installation_[motor].name()) + " first");
     }
   }
   return {};

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "api/session.h"
-#include "daemon/model/installation.h"
 #include "bus/rs485/rehearsal.h"
+#include "daemon/model/installation.h"
 
 namespace bushd::daemon {
 

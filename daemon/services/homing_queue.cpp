@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "api/remedy.h"
 #include "motion/report_words.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 namespace {
@@ -141,11 +141,11 @@ Result<void> HomingQueue::may_home(MotorId id) const {
   }
   if (auto may = interlocks_.may_move(id); !may) return may;
   if (installation_[id].has_plan()) {
-    return fail("it moves; run " + api::remedy("stop", installation_[id].name()) + " first");
+    return fail("it moves; run " + words::remedy("stop", installation_[id].name()) + " first");
   }
   if (!mcu.can_home()) {
     return fail("MCU " + mcu.name() + " cannot home; find out where it stands and run " +
-                api::set_remedy(installation_[id].name()));
+                words::set_remedy(installation_[id].name()));
   }
   const bushd_home message = message_for({.motor = id, .floor = 0});
   return installation_[id].may_be_moved_within(std::int64_t{message.most_steps} +

@@ -3,9 +3,9 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/services/open_moves.h"
-#include "bus/rs485/unique_id.h"
 #include "base/units/ratio.h"
+#include "bus/rs485/unique_id.h"
+#include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
 namespace {

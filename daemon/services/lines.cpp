@@ -8,7 +8,7 @@
 #include <iterator>
 #include <utility>
 
-#include "api/remedy.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 
@@ -20,7 +20,7 @@ void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
   for (const MotorId motor : *motors) {
     if (!installation_[motor].is<motion::Armed>()) continue;
     return asker.answer(api::Refused{installation_[motor].busy_text() + "; run " +
-                                     api::remedy("disarm", installation_[motor].name()) +
+                                     words::remedy("disarm", installation_[motor].name()) +
                                      " first, or wait for it"});
   }
   if (moves) return redirect(now_us, asker, *motors, request);
@@ -207,7 +207,7 @@ Result<std::uint64_t> Lines::number_of(const std::vector<MotorId>& motors) const
         fmt::format("{} motors move on this line and {} are named; name all of them, or "
                     "run {} first",
                     whole->second.motors.size(), motors.size(),
-                    api::remedy("stop", installation_[motors.front()].name())));
+                    words::remedy("stop", installation_[motors.front()].name())));
   }
   return whole->first;
 }
@@ -246,7 +246,7 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
           fmt::format("{}: {} is beyond the ends of the line that is under way; run {} first, "
                       "or wait for its result",
                       motor.name(), motor.coordinates().text(targets[i].whole),
-                      api::remedy("stop", motor.name())));
+                      words::remedy("stop", motor.name())));
     }
     const auto s = static_cast<std::uint32_t>(*step);
     const std::int64_t on_way = line.way.position_at(i, s);
@@ -255,7 +255,7 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
         fmt::format("{}: {} is not on the line that is under way, which leads through {} "
                     "there; run {} first, or wait for its result",
                     motor.name(), motor.coordinates().text(targets[i].whole),
-                    motor.coordinates().text(on_way), api::remedy("stop", motor.name())));
+                    motor.coordinates().text(on_way), words::remedy("stop", motor.name())));
   }
   return static_cast<std::uint32_t>(*step);
 }
@@ -271,7 +271,7 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   const auto number = number_of(motors);
   if (!number) return refuse(number.error().text());
   Line& line = lines_.at(*number);
-  const std::string stop = "run " + api::remedy("stop", name) + " first";
+  const std::string stop = "run " + words::remedy("stop", name) + " first";
   if (line.path) return refuse(name + " moves on a path; " + stop + ", or wait for its result");
   if (line.points.size() > 1) {
     return refuse("the line ends in a last approach for backlash; " + stop);

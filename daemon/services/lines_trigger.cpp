@@ -7,9 +7,9 @@
 #include <map>
 #include <utility>
 
-#include "api/remedy.h"
 #include "daemon/services/lines.h"
 #include "daemon/services/trigger.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 
@@ -40,7 +40,7 @@ Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
     const motion::Motor& motor = installation_[id];
     if (!motor.has_plan()) continue;
     return fail(motor.busy_text() + "; run " +
-                api::remedy(motor.moves() ? "stop" : "disarm", motor.name()) + " first");
+                words::remedy(motor.moves() ? "stop" : "disarm", motor.name()) + " first");
   }
   if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
   auto line = line_of(as_move(request));
@@ -68,7 +68,7 @@ Result<void> Lines::may_wait(const Line& line) const {
       if (motor.is<motion::Armed>()) {
         return fail(fmt::format("{} waits for the trigger of MCU {} already{}; run {} first",
                                 motor.name(), mcu.name(), open_.asked_for_by(other),
-                                api::remedy("disarm", motor.name())));
+                                words::remedy("disarm", motor.name())));
       }
       if (motor.is<motion::OnLine>() && motor.axis().line() && motor.axis().line()->in_mcus) {
         return fail(fmt::format(

@@ -1,8 +1,8 @@
 // Which table a line waits for, and which MCUs get it (LineTables sees to that).
 #include <algorithm>
 
-#include "daemon/services/lines.h"
 #include "bus/rs485/mcu_fit.h"
+#include "daemon/services/lines.h"
 
 namespace bushd::daemon {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "api/remedy.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 namespace {
@@ -23,7 +23,7 @@ Pauses::Pauses(Installation& installation, Interlocks& interlocks, Moves& moves,
       local_inputs_(local_inputs) {
   interlocks_.add([this](MotorId motor) -> Result<void> {
     if (!installation_[motor].is_held()) return {};
-    return fail("it is held; run " + api::remedy("release", installation_[motor].name()));
+    return fail("it is held; run " + words::remedy("release", installation_[motor].name()));
   });
 }
 

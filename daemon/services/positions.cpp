@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "api/remedy.h"
 #include "daemon/services/open_moves.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 
@@ -85,7 +85,7 @@ Result<void> Positions::add(MotorId id, const api::Amount& position, bool dial, 
     if (motor.uncertain_reason()) {
       return fail(
           "its position is uncertain, because " + *motor.uncertain_reason() +
-          "; home it, or say where it stands on the dial: " + api::set_remedy(motor.name()));
+          "; home it, or say where it stands on the dial: " + words::set_remedy(motor.name()));
     }
     auto moved = coordinates.with_user(user->value, motor.position_steps());
     if (!moved) return fail(moved.error());

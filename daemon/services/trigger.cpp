@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "api/remedy.h"
+#include "words/remedy.h"
 
 namespace bushd::daemon {
 
@@ -90,7 +90,7 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps, const api::Arm& re
   const Mcu& mcu = installation_.mcu_of(id);
   if (steps == 0) return fail(motor.name() + ": a move of no steps");
   if (motor.has_plan()) {
-    return fail(motor.name() + " moves; run " + api::remedy("stop", motor.name()) + " first");
+    return fail(motor.name() + " moves; run " + words::remedy("stop", motor.name()) + " first");
   }
   if (!mcu.can_trigger() || !mcu.can_run_tables()) {
     return fail(motor.name() + ": MCU " + mcu.name() +
@@ -106,7 +106,7 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps, const api::Arm& re
     if (!installation_[other].is<motion::Armed>()) continue;
     return fail(installation_[other].name() + " waits for the trigger of MCU " + mcu.name() +
                 " already" + open_moves_.asked_for_by(other) + "; run " +
-                api::remedy("disarm", installation_[other].name()) + " first");
+                words::remedy("disarm", installation_[other].name()) + " first");
   }
   return {};
 }

@@ -5,9 +5,9 @@
 #include <string>
 #include <utility>
 
-#include "config/port_pattern.h"
 #include "bus/port/pulse_port.h"
 #include "bus/port/serial_port.h"
+#include "config/port_pattern.h"
 
 namespace bushd::daemon {
 namespace {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "base/result.h"
+#include "bus/rs485/pulse_port.h"
 #include "config/config.h"
 #include "daemon/shell/port_search.h"
-#include "bus/rs485/pulse_port.h"
 
 namespace bushd::daemon {
 

@@ -3,9 +3,9 @@
 
 #include "base/json_text.h"
 #include "base/printable.h"
+#include "daemon/core/request_log.h"
 #include "daemon/shell/event_loop.h"
 #include "daemon/shell/process.h"
-#include "daemon/core/request_log.h"
 #include "daemon/shell/service_manager.h"
 
 namespace bushd::daemon {

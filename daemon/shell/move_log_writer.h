@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "daemon/shell/move_log.h"
 #include "daemon/model/outputs.h"
+#include "daemon/shell/move_log.h"
 #include "daemon/shell/write_thread.h"
 
 namespace bushd::daemon {

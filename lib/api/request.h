@@ -20,26 +20,10 @@
 
 namespace bushd::api {
 
-// In the motor's unit, on the user's scale (units/coordinates.h). Of a motor without a unit: steps.
-struct UserUnits {
-  double value = 0;
-  friend bool operator==(const UserUnits&, const UserUnits&) = default;
-};
-// A position or a distance, in steps or in the motor's unit: the nearest step counts. Within
-// +-(2^31 - 1) steps.
-using Amount = std::variant<std::int64_t, UserUnits>;
-
 struct MotorAmount {
   std::string motor{};
   Amount amount{};
   friend bool operator==(const MotorAmount&, const MotorAmount&) = default;
-};
-
-// A speed not to be exceeded, per second, above 0: in each motor's unit, or in steps.
-struct Speed {
-  double per_s = 0;
-  bool in_steps = false;
-  friend bool operator==(const Speed&, const Speed&) = default;
 };
 
 using MotorNames = std::vector<std::string>;

@@ -70,8 +70,8 @@ struct Asker {
 
   std::shared_ptr<Session> session;
   std::int64_t number = 0;  // of the request, by the client's own count
-  // When the request arrived: after so many that end motion (daemon/model/precedence.h). Of one that ends
-  // motion itself, that one is among them.
+  // When the request arrived: after so many that end motion (daemon/model/precedence.h). Of one
+  // that ends motion itself, that one is among them.
   std::uint64_t after_stops = kNotCounted;
 
   void answer(const Reply& reply) const {

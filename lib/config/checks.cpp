@@ -7,11 +7,11 @@
 #include <set>
 #include <string>
 
+#include "bus/line_budget.h"
 #include "config/motor_inputs.h"
 #include "engine/emission.h"
 #include "engine/run.h"
 #include "engine/slots.h"
-#include "bus/line_budget.h"
 #include "tables/gentler.h"
 
 namespace bushd::config {

@@ -15,15 +15,15 @@
 
 #include "base/ids.h"
 #include "base/result.h"
+#include "base/units/coordinates.h"
+#include "bus/emission_setup.h"
 #include "config/drive.h"
 #include "config/key_places.h"
 #include "config/setting.h"
 #include "engine/message.h"
-#include "bus/emission_setup.h"
 #include "motion/pseudo/curved_axis.h"
 #include "motion/pseudo/linear_axes.h"
 #include "tables/table.h"
-#include "base/units/coordinates.h"
 
 namespace bushd::config {
 

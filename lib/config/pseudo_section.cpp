@@ -8,9 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "base/csv/number_csv.h"
 #include "config/coordinates.h"
 #include "config/words.h"
-#include "base/csv/number_csv.h"
 #include "tables/toml_file.h"
 
 namespace bushd::config {

@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "base/result.h"
-#include "config/drive.h"
 #include "base/units/coordinates.h"
+#include "config/drive.h"
 
 namespace bushd::config {
 

@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <utility>
 
-#include "api/remedy.h"
 #include "motion/report_words.h"
+#include "words/remedy.h"
 
 namespace bushd::motion {
 namespace {
@@ -420,7 +420,7 @@ event::Ended Motor::end_at_limit() {
   if (setup_.limit_immediate && position_ != axis_.from_steps()) {
     uncertain_reason_ = "it was stopped immediately at its limit switch and may have overrun";
     reason += "; stopped immediately, it may have overrun, so check the position, and run " +
-              api::set_remedy(name());
+              words::set_remedy(name());
   }
   return ended(Outcome::kLimit, std::move(reason));
 }
@@ -432,16 +432,16 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   const std::string mcu = "MCU " + setup_.mcu;
   if (moves() && moving()->position_mismatch) {
     return ended(Outcome::kFault,
-                 *uncertain_reason_ + "; check the position, and run " + api::set_remedy(name()));
+                 *uncertain_reason_ + "; check the position, and run " + words::set_remedy(name()));
   }
   if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
     const std::string why = mcu + " disabled its drivers because " + stop_cause(report);
     if (stepped) uncertain_reason_ = kUnpowered;
     return ended(Outcome::kFault,
                  stepped
-                     ? why + "; check the position, and run " + api::set_remedy(name())
+                     ? why + "; check the position, and run " + words::set_remedy(name())
                      : "it did not move: " + why + "; find the cause, run 'bushctl clear', then " +
-                           api::remedy("enable", name()));
+                           words::remedy("enable", name()));
   }
   if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
     const std::string by = stopper(report, setup_.mcu);
@@ -450,7 +450,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
     return ended(Outcome::kStopped,
                  overran ? "stopped immediately by " + by +
                                "; it may have overrun, so check the position, and run " +
-                               api::set_remedy(name())
+                               words::set_remedy(name())
                          : "stopped by " + by);
   }
   if (is<Armed>()) {

@@ -9,17 +9,17 @@
 #include <variant>
 #include <vector>
 
-#include "api/request.h"
-#include "api/words.h"
 #include "base/ids.h"
 #include "base/result.h"
+#include "base/units/coordinates.h"
 #include "engine/message.h"
 #include "motion/axis.h"
-#include "base/units/coordinates.h"
+#include "words/amount.h"
+#include "words/words.h"
 
 namespace bushd::motion {
 
-using api::Outcome;
+using words::Outcome;
 
 struct MotorSetup {
   std::string name;
@@ -88,7 +88,7 @@ struct Report {
 
 // What its position is worth.
 struct PositionTrust {
-  api::Trust trust;
+  words::Trust trust;
   std::string reason;                            // why it is not known; "" while it is
   std::optional<std::int64_t> heard_utime_us{};  // if stale
 };
@@ -201,12 +201,12 @@ class Motor {
   Result<std::vector<Leg>> legs_to(std::int64_t target, bushd_delay floor) const;
   // The floor of runs at max_speed and at this speed, whichever is slower. Error: no speed, or one
   // slower than any delay.
-  Result<bushd_delay> floor_at(const std::optional<api::Speed>& speed) const;
+  Result<bushd_delay> floor_at(const std::optional<words::Speed>& speed) const;
   // An amount in steps. Errors: not finite, beyond what is counted.
-  Result<std::int64_t> steps_of_position(const api::Amount& position) const;
+  Result<std::int64_t> steps_of_position(const words::Amount& position) const;
   // The same, not rounded.
-  Result<units::Steps> position_of(const api::Amount& position) const;
-  Result<units::Steps> distance_of(const api::Amount& distance) const;
+  Result<units::Steps> position_of(const words::Amount& position) const;
+  Result<units::Steps> distance_of(const words::Amount& distance) const;
   // Where it may be, by its soft limits, or as far as positions are counted.
   std::int64_t lowest() const;
   std::int64_t highest() const;
@@ -306,7 +306,7 @@ class Motor {
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   void follow_end_of_line(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
-  Result<void> is_amount(const api::Amount& amount) const;
+  Result<void> is_amount(const words::Amount& amount) const;
   // Steps within the soft limits; there are some.
   struct Range {
     std::int64_t low;

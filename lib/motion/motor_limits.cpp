@@ -5,19 +5,19 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "api/remedy.h"
 #include "motion/motor.h"
 #include "motion/report_words.h"
+#include "words/remedy.h"
 
 namespace bushd::motion {
 
 Result<void> Motor::may_be_used() const {
   if (is<Armed>()) {
-    return fail("waits for the trigger; run " + api::remedy("disarm", name()) + " first");
+    return fail("waits for the trigger; run " + words::remedy("disarm", name()) + " first");
   }
   if (is<Homing>()) return fail("it is being homed; wait for that result");
   if (is<Travelling>()) {
-    return fail("it travels by itself, for a CAMAC module; run " + api::remedy("stop", name()) +
+    return fail("it travels by itself, for a CAMAC module; run " + words::remedy("stop", name()) +
                 " first");
   }
   if (is<Local>() && !autonomous_) {
@@ -33,23 +33,23 @@ Result<void> Motor::may_be_used() const {
 Result<void> Motor::may_move_to(std::int64_t target, bushd_delay floor) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
-                (setup_.has_home ? "run " + api::remedy("home", name()) + ", or " : "") +
-                "find out where it stands and run " + api::set_remedy(name()) + ", or " +
-                api::remedy("confirm", name()) + " if it stands where it is shown");
+                (setup_.has_home ? "run " + words::remedy("home", name()) + ", or " : "") +
+                "find out where it stands and run " + words::set_remedy(name()) + ", or " +
+                words::remedy("confirm", name()) + " if it stands where it is shown");
   }
   if (is<OnLine>()) {
-    return fail("it moves on a line, or by a CAMAC program; run " + api::remedy("stop", name()) +
+    return fail("it moves on a line, or by a CAMAC program; run " + words::remedy("stop", name()) +
                 " first, then move it by itself");
   }
   if (follows()) {
-    return fail("it follows an array; run " + api::remedy("stop", name()) +
+    return fail("it follows an array; run " + words::remedy("stop", name()) +
                 " first, then move it by itself");
   }
   if (restored_reason_ && setup_.restored_refused) {
     return fail("its position is only restored, because " + *restored_reason_ +
                 ", and restored = \"refuse\" keeps it there; run " +
-                (setup_.has_home ? api::remedy("home", name()) + " or " : "") +
-                api::set_remedy(name()) + ", or " + api::remedy("confirm", name()) +
+                (setup_.has_home ? words::remedy("home", name()) + " or " : "") +
+                words::set_remedy(name()) + ", or " + words::remedy("confirm", name()) +
                 " if it is right");
   }
   const std::int64_t steps = target - position_;
@@ -83,7 +83,7 @@ Result<void> Motor::may_be_moved_within(std::int64_t steps) const {
   return fail(fmt::format(
       "it stands at {}, and may make up to {} steps to either side, which would lead beyond +-{}, "
       "where no more are counted; run {}, then home it",
-      position_, steps, kMaxPosition, api::remedy("set", name(), "--dial 0")));
+      position_, steps, kMaxPosition, words::remedy("set", name(), "--dial 0")));
 }
 
 Result<units::Steps> Motor::distance_from() const {
@@ -101,7 +101,7 @@ Result<std::int64_t> Motor::rounded_distance_from() const {
   if (is_paused()) {
     return fail("it is paused on its way to " + coordinates().text(target_steps()) +
                 ", so a distance could count from there or from where it is; run " +
-                api::remedy("stop", name()) + " first, or move it to a position");
+                words::remedy("stop", name()) + " first, or move it to a position");
   }
   if (axis_.stopping()) {
     if (axis_.is_planned()) return axis_.end_steps();
@@ -115,7 +115,7 @@ Result<std::int64_t> Motor::rounded_distance_from() const {
   return target_steps();
 }
 
-Result<bushd_delay> Motor::floor_at(const std::optional<api::Speed>& speed) const {
+Result<bushd_delay> Motor::floor_at(const std::optional<words::Speed>& speed) const {
   bushd_delay floor = 0;
   if (setup_.max_speed) {
     const auto slowest = setup_.coordinates.delay_at(*setup_.max_speed, axis_.time_unit_ns());
@@ -157,7 +157,7 @@ Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, bushd_delay floor) 
   }
   bushd_delay slow = floor;
   if (setup_.backlash_speed) {
-    const auto approach = floor_at(api::Speed{.per_s = *setup_.backlash_speed});
+    const auto approach = floor_at(words::Speed{.per_s = *setup_.backlash_speed});
     if (!approach) return fail("backlash_speed: " + approach.error().message);
     slow = std::max(floor, *approach);
   }
@@ -217,29 +217,29 @@ Result<void> Motor::stands_within_soft_limits() const {
 }
 
 // Of a motor without a unit nothing is rounded.
-Result<void> Motor::is_amount(const api::Amount& amount) const {
-  const auto* user = std::get_if<api::UserUnits>(&amount);
+Result<void> Motor::is_amount(const words::Amount& amount) const {
+  const auto* user = std::get_if<words::UserUnits>(&amount);
   if (user == nullptr || setup_.coordinates.has_unit()) return {};
   if (std::trunc(user->value) == user->value) return {};
   return fail(fmt::format("{} is no whole number of steps, and it has no unit", user->value));
 }
 
-Result<std::int64_t> Motor::steps_of_position(const api::Amount& position) const {
+Result<std::int64_t> Motor::steps_of_position(const words::Amount& position) const {
   if (auto good = is_amount(position); !good) return fail(good.error());
   if (const auto* steps = std::get_if<std::int64_t>(&position)) return *steps;
-  return setup_.coordinates.steps_of_user(std::get<api::UserUnits>(position).value);
+  return setup_.coordinates.steps_of_user(std::get<words::UserUnits>(position).value);
 }
 
-Result<units::Steps> Motor::position_of(const api::Amount& position) const {
+Result<units::Steps> Motor::position_of(const words::Amount& position) const {
   if (auto good = is_amount(position); !good) return fail(good.error());
   if (const auto* steps = std::get_if<std::int64_t>(&position)) return units::Steps{*steps};
-  return setup_.coordinates.unrounded_of_user(std::get<api::UserUnits>(position).value);
+  return setup_.coordinates.unrounded_of_user(std::get<words::UserUnits>(position).value);
 }
 
-Result<units::Steps> Motor::distance_of(const api::Amount& distance) const {
+Result<units::Steps> Motor::distance_of(const words::Amount& distance) const {
   if (auto good = is_amount(distance); !good) return fail(good.error());
   if (const auto* steps = std::get_if<std::int64_t>(&distance)) return units::Steps{*steps};
-  return setup_.coordinates.unrounded_of_distance(std::get<api::UserUnits>(distance).value);
+  return setup_.coordinates.unrounded_of_distance(std::get<words::UserUnits>(distance).value);
 }
 
 }  // namespace bushd::motion

@@ -30,7 +30,7 @@ void Motor::position_is_unconfirmed() {
 }
 
 PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
-  using api::Trust;
+  using words::Trust;
   const std::string mcu = "MCU " + setup_.mcu;
   if (!boot_number_) return {Trust::kUnknown, mcu + " has not reported where it stands yet"};
   if (boot_number && *boot_number != *boot_number_) {

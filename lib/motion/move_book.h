@@ -9,12 +9,12 @@
 #include <unordered_map>
 #include <vector>
 
-#include "api/words.h"
 #include "base/ids.h"
+#include "words/words.h"
 
 namespace bushd::motion {
 
-using api::Outcome;
+using words::Outcome;
 
 struct MotorOutcome {
   MotorId motor;

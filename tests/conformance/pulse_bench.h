@@ -1,6 +1,6 @@
-// A serial port that makes pulses (lib/heritage/serial_pulse) as a controller of one motor, against the
-// drive that bushsim plays (sim/pulse_drive.h), in simulated time: no daemon between them. What is
-// judged are the levels on the line; delays come from lists of codes here.
+// A serial port that makes pulses (lib/heritage/serial_pulse) as a controller of one motor, against
+// the drive that bushsim plays (sim/pulse_drive.h), in simulated time: no daemon between them. What
+// is judged are the levels on the line; delays come from lists of codes here.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "motion/axis.h"
 #include "heritage/serial_pulse/master.h"
+#include "motion/axis.h"
 #include "sim/pulse_drive.h"
 
 namespace bushd::test {

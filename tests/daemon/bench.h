@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/model/installation.h"
 #include "daemon/lab.h"
+#include "daemon/model/installation.h"
 #include "daemon/model/outputs.h"
 
 namespace bushd::test {

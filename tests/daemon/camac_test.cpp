@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "heritage/camac/bushd2.h"
 #include "daemon/camac_lab.h"
+#include "heritage/camac/bushd2.h"
 
 namespace bushd::test::camac_test {
 namespace {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "client/link.h"
-#include "daemon/fronts/lcm_front.h"
 #include "daemon/core/request_log.h"
+#include "daemon/fronts/lcm_front.h"
 #include "daemon/fronts/socket_front.h"
 #include "tables/temp_directory.h"
 

@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bus/line_times.h"
 #include "daemon/lab.h"
 #include "daemon/motor_keys.h"
-#include "bus/line_times.h"
 
 namespace bushd::test {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <tuple>
 
-#include "daemon/bench.h"
 #include "bus/rs485/mcu_fit.h"
+#include "daemon/bench.h"
 
 namespace bushd::daemon {
 namespace {

@@ -16,8 +16,8 @@
 #include "daemon/core/core.h"
 #include "sim/board_line.h"
 #include "sim/bus.h"
-#include "sim/pulse_drive.h"
 #include "sim/disk/sim_disk.h"
+#include "sim/pulse_drive.h"
 #include "state/store.h"
 
 // Failures print words.

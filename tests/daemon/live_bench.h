@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "daemon/bench.h"
+#include "daemon/core/supervisor.h"
 #include "daemon/model/interlocks.h"
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/homing_queue.h"
@@ -24,7 +25,6 @@
 #include "daemon/services/open_moves.h"
 #include "daemon/services/positions.h"
 #include "daemon/services/travels.h"
-#include "daemon/core/supervisor.h"
 #include "sim/bus.h"
 
 namespace bushd::test {

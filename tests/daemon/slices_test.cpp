@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lab.h"
 #include "daemon/fronts/reception.h"
+#include "daemon/lab.h"
 
 namespace bushd::test::slices_test {
 namespace {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "daemon/camac_lab.h"
-#include "daemon/lab.h"
 #include "daemon/fronts/reception.h"
+#include "daemon/lab.h"
 
 namespace bushd::test {
 namespace {

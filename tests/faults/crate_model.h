@@ -11,8 +11,8 @@
 
 #include "api/reply.h"
 #include "api/snapshot.h"
-#include "heritage/camac/bushd2.h"
 #include "config/config.h"
+#include "heritage/camac/bushd2.h"
 #include "module_registers.h"
 #include "request.h"
 #include "sim/line.h"

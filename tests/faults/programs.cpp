@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 
+#include "crate_model.h"
 #include "heritage/camac/bushd2.h"
 #include "heritage/camac/module.h"
-#include "crate_model.h"
 #include "shutter_model.h"
 
 namespace bushfaults {

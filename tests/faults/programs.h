@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "heritage/camac/naf.h"
 #include "config/config.h"
+#include "heritage/camac/naf.h"
 #include "request.h"
 #include "sim/random.h"
 

@@ -3,9 +3,9 @@
 // for itself; neither of the two listens before it talks. After a while it is ended.
 //
 // Half of them share the network with the first one. Such a daemon looks for others on its channels
-// before it does anything else (daemon/shell/channel_claim.h), and must find the first one there. The
-// others cannot know: what comes of them on the line the invariants of bushfaults tell, and they
-// hold without exception.
+// before it does anything else (daemon/shell/channel_claim.h), and must find the first one there.
+// The others cannot know: what comes of them on the line the invariants of bushfaults tell, and
+// they hold without exception.
 //
 // Its clients try to move motors; nobody trusts its positions, so it is not asked to set any.
 #pragma once

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "api/snapshot.h"
-#include "heritage/camac/naf.h"
 #include "config/config.h"
+#include "heritage/camac/naf.h"
 #include "module_registers.h"
 #include "sim/edge.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "config/config.h"
 #include "bus/rs485/pulse_port.h"
+#include "config/config.h"
 #include "sim/board_line.h"
 #include "sim/pulse_drive.h"
 #include "sim/random.h"
@@ -21,7 +21,8 @@ namespace bushfaults {
 //
 //     kUart         sixteen bytes, without pauses; tells when it is empty
 //     kAdapter      15 ms of bytes, and it pauses between packets; tells when it is empty
-//     kMuteAdapter  the same, and does not tell. lib/heritage/serial_pulse counts on it that what such an
+//     kMuteAdapter  the same, and does not tell. lib/heritage/serial_pulse counts on it that what
+//     such an
 //                   adapter has leaves within 20 ms, so that much is kept here
 //
 // A stalled driver passes nothing on for a while; what the hardware has leaves.

@@ -3,10 +3,10 @@
 // moves.
 //
 // Input: operations of four bytes, what, which and a number of 16 bits.
+#include "fuzz/fuzz.h"
 #include "heritage/camac/bushd1.h"
 #include "heritage/camac/bushd2.h"
 #include "heritage/camac/crate.h"
-#include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {
 namespace {

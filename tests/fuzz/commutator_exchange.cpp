@@ -3,8 +3,8 @@
 // understand.
 //
 // Input: operations of four bytes, what, which and a number of 16 bits.
-#include "heritage/commutator/exchange.h"
 #include "fuzz/fuzz.h"
+#include "heritage/commutator/exchange.h"
 
 namespace bushd::fuzz {
 namespace {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "bus/line_budget.h"
 #include "config/config.h"
 #include "engine/run.h"
-#include "bus/line_budget.h"
 #include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {

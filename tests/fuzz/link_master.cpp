@@ -15,8 +15,8 @@
 #include <optional>
 #include <vector>
 
-#include "fuzz/fuzz.h"
 #include "bus/rs485/master.h"
+#include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {
 namespace {

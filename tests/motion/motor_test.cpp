@@ -358,12 +358,12 @@ TEST_F(MotorTest, LocalInputsThatCameFirstEndAMove) {
 
 TEST_F(MotorTest, HasNoPositionBeforeItsMcuHasReported) {
   const Motor unheard(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
-  EXPECT_EQ(unheard.trust({}).trust, api::Trust::kUnknown);
+  EXPECT_EQ(unheard.trust({}).trust, words::Trust::kUnknown);
   EXPECT_THAT(unheard.trust({}).reason, HasSubstr("MCU hall:1 has not reported"));
-  EXPECT_EQ(motor.trust(0).trust, api::Trust::kKnown);
+  EXPECT_EQ(motor.trust(0).trust, words::Trust::kKnown);
   EXPECT_EQ(motor.trust(0).reason, "");
   report(kStart, 42);
-  EXPECT_EQ(motor.trust(1).trust, api::Trust::kUnknown) << "its MCU is in another boot";
+  EXPECT_EQ(motor.trust(1).trust, words::Trust::kUnknown) << "its MCU is in another boot";
   EXPECT_THAT(motor.trust(1).reason, HasSubstr("heard at 42"));
   motor.set_coordinates(units::Coordinates::make({"mm", {4, 1}, false, 0.5, 2}).value());
   EXPECT_THAT(motor.trust(1).reason, HasSubstr("heard at 42 (11.00 mm)"));
@@ -384,17 +384,17 @@ TEST_F(MotorTest, SaysHowItStandsToItsSoftLimits) {
 TEST_F(MotorTest, IsUncertainUntilSomebodySaysWhereItStandsButMayMove) {
   Motor found(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
   found.goes_online(mcu, true, false);
-  EXPECT_EQ(found.trust(0).trust, api::Trust::kUncertain);
+  EXPECT_EQ(found.trust(0).trust, words::Trust::kUncertain);
   EXPECT_THAT(found.trust(0).reason, HasSubstr("neither set nor homed"));
   EXPECT_TRUE(found.may_move_to(5));
   found.home();
   found.end_homing(true);
-  EXPECT_EQ(found.trust(0).trust, api::Trust::kKnown);
+  EXPECT_EQ(found.trust(0).trust, words::Trust::kKnown);
 }
 
 TEST_F(MotorTest, IsStaleWhileItsMcuIsOffline) {
   motor.goes_offline(4711);
-  EXPECT_EQ(motor.trust(0).trust, api::Trust::kStale);
+  EXPECT_EQ(motor.trust(0).trust, words::Trust::kStale);
   EXPECT_EQ(motor.trust(0).heard_utime_us, 4711);
   EXPECT_THAT(motor.trust(0).reason, HasSubstr("it rested"));
   motor.goes_online(mcu, false, false);
@@ -402,11 +402,11 @@ TEST_F(MotorTest, IsStaleWhileItsMcuIsOffline) {
   report(kStart + 20);
   motor.goes_offline(4712);
   motor.end(Outcome::kLink, "lost");
-  EXPECT_EQ(motor.trust(0).trust, api::Trust::kStale);
+  EXPECT_EQ(motor.trust(0).trust, words::Trust::kStale);
   EXPECT_EQ(motor.trust(0).heard_utime_us, 4712);
   EXPECT_THAT(motor.trust(0).reason, HasSubstr("may have run on"));
   motor.goes_online(mcu, false, false);
-  EXPECT_EQ(motor.trust(0).trust, api::Trust::kKnown);
+  EXPECT_EQ(motor.trust(0).trust, words::Trust::kKnown);
 }
 
 TEST_F(MotorTest, WhatPeopleMayMoveUnheardMayHaveRunOnFromRest) {

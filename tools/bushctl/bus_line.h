@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/result.h"
-#include "engine/message.h"
 #include "bus/port/serial_port.h"
+#include "engine/message.h"
 
 namespace bushctl {
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <random>
 
+#include "base/csv/number_csv.h"
 #include "base/printable.h"
 #include "commands.h"
-#include "base/csv/number_csv.h"
 #include "render.h"
 #include "tables/text_file.h"
 

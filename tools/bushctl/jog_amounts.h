@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "tables/table.h"
 #include "base/units/coordinates.h"
+#include "tables/table.h"
 
 namespace bushctl {
 

@@ -9,11 +9,11 @@
 #include <optional>
 
 #include "base/printable.h"
+#include "bus/rs485/unique_id.h"
 #include "bus_line.h"
 #include "bus_scan.h"
 #include "commands.h"
 #include "line_report.h"
-#include "bus/rs485/unique_id.h"
 
 namespace bushctl {
 namespace {

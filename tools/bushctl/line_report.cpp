@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
-#include "grid.h"
 #include "bus/rs485/health.h"
 #include "bus/rs485/unique_id.h"
+#include "grid.h"
 
 namespace bushctl {
 namespace {

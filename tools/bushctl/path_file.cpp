@@ -8,8 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "base/shortened.h"
 #include "base/csv/number_csv.h"
+#include "base/shortened.h"
 
 namespace bushctl {
 namespace {

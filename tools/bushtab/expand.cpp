@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "base/units/coordinates.h"
 #include "commands.h"
 #include "engine/run.h"
 #include "open_table.h"
-#include "base/units/coordinates.h"
 
 namespace bushtab {
 namespace {

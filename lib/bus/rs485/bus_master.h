@@ -21,7 +21,6 @@
 #include <vector>
 
 #include "base/result.h"
-#include "engine/message.h"
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/event.h"
 #include "bus/rs485/health.h"
@@ -32,6 +31,7 @@
 #include "bus/rs485/rehearsal.h"
 #include "bus/rs485/table_run.h"
 #include "bus/rs485/tick.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

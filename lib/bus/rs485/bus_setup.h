@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "engine/message.h"
-#include "engine/table.h"
 #include "bus/address.h"
 #include "bus/emission_setup.h"
+#include "engine/message.h"
+#include "engine/table.h"
 
 namespace bushd::link {
 

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "engine/message.h"
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/mcu_record.h"
 #include "bus/rs485/scratch.h"
 #include "bus/rs485/setup_queue.h"
 #include "bus/rs485/transactions.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

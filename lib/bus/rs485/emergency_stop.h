@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "engine/message.h"
 #include "bus/rs485/frame_writer.h"
 #include "bus/rs485/mcu_record.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

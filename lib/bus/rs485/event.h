@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <variant>
 
-#include "engine/message.h"
 #include "bus/rs485/mcu_index.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "bus/address.h"
 #include "engine/frame.h"
 #include "engine/message.h"
-#include "bus/address.h"
 
 namespace bushd::link {
 

@@ -1,7 +1,7 @@
 // The time of a line whose motors are at ports of their own, each of which makes the line's run by
-// itself: serial ports that make pulses (lib/heritage/serial_pulse). Their bytes leave when they leave, and
-// nobody can push one of them. So the run's time is that of the slowest port. Each tells how late
-// it is as soon as it knows, and none writes a step before the run's time has come to it.
+// itself: serial ports that make pulses (lib/heritage/serial_pulse). Their bytes leave when they
+// leave, and nobody can push one of them. So the run's time is that of the slowest port. Each tells
+// how late it is as soon as it knows, and none writes a step before the run's time has come to it.
 //
 //     due(t) = begun + t       t: time of the run at which a step falls, from the run's beginning
 //

@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <utility>
 
-#include "engine/run_plan.h"
 #include "bus/rs485/mcu_fit.h"
+#include "engine/run_plan.h"
 
 namespace bushd::link {
 namespace {

@@ -20,7 +20,6 @@
 #include <string>
 #include <vector>
 
-#include "engine/message.h"
 #include "bus/rs485/bus_master.h"
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/connector.h"
@@ -38,6 +37,7 @@
 #include "bus/rs485/table_run.h"
 #include "bus/rs485/tick_source.h"
 #include "bus/rs485/transactions.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

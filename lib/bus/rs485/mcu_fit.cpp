@@ -5,8 +5,8 @@
 #include <bit>
 #include <string>
 
-#include "engine/velocity.h"
 #include "bus/line_times.h"
+#include "engine/velocity.h"
 
 namespace bushd::link {
 namespace {

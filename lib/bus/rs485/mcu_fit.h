@@ -6,8 +6,8 @@
 #include <string>
 
 #include "base/result.h"
-#include "engine/message.h"
 #include "bus/rs485/bus_setup.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

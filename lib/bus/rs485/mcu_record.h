@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <string>
 
-#include "engine/message.h"
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/health.h"
 #include "bus/rs485/mcu_index.h"
 #include "bus/rs485/tick.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/message.h"
 #include "bus/rs485/mcu_record.h"
 #include "bus/rs485/transactions.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

@@ -1,6 +1,6 @@
 // What a bus asks of a port that is more to it than bytes, and what it hears of it: a serial port
-// whose TXD makes pulses (lib/heritage/serial_pulse). An order is carried out in the order of its fields,
-// without waiting, and answered by a status at once.
+// whose TXD makes pulses (lib/heritage/serial_pulse). An order is carried out in the order of its
+// fields, without waiting, and answered by a status at once.
 #pragma once
 
 #include <cstddef>

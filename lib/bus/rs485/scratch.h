@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "bus/rs485/setup_queue.h"
 #include "engine/message.h"
 #include "engine/table.h"
-#include "bus/rs485/setup_queue.h"
 
 namespace bushd::link {
 

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "engine/message.h"
 #include "bus/rs485/bus_setup.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

@@ -14,7 +14,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/message.h"
 #include "bus/rs485/bus_clock.h"
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/event.h"
@@ -23,6 +22,7 @@
 #include "bus/rs485/mcu_record.h"
 #include "bus/rs485/table_run.h"
 #include "bus/rs485/tick_source.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

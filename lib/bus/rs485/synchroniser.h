@@ -14,12 +14,12 @@
 #include <deque>
 #include <optional>
 
-#include "engine/message.h"
 #include "bus/line_times.h"
 #include "bus/rs485/bus_clock.h"
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/frame_writer.h"
 #include "bus/rs485/mcu_record.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

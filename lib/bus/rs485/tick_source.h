@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "engine/run.h"
 #include "bus/rs485/mcu_index.h"
 #include "bus/rs485/tick.h"
+#include "engine/run.h"
 
 namespace bushd::link {
 

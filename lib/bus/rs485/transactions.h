@@ -12,10 +12,10 @@
 #include <span>
 #include <vector>
 
-#include "engine/message.h"
 #include "bus/rs485/frame_writer.h"
 #include "bus/rs485/health.h"
 #include "bus/rs485/mcu_index.h"
+#include "engine/message.h"
 
 namespace bushd::link {
 

@@ -22,10 +22,10 @@
 #include <string>
 #include <vector>
 
-#include "heritage/commutator/exchange.h"
-#include "heritage/commutator/planned_steps.h"
 #include "bus/rs485/bus_master.h"
 #include "bus/rs485/tick_source.h"
+#include "heritage/commutator/exchange.h"
+#include "heritage/commutator/planned_steps.h"
 
 namespace bushd::commutator {
 

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "engine/run.h"
 #include "bus/rs485/tick_source.h"
+#include "engine/run.h"
 
 namespace bushd::commutator {
 

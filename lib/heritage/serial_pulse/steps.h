@@ -15,8 +15,8 @@
 #include <deque>
 #include <optional>
 
-#include "engine/run.h"
 #include "bus/rs485/tick_source.h"
+#include "engine/run.h"
 
 namespace bushd::serial_pulse {
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "base/result.h"
 #include "base/csv/number_csv.h"
+#include "base/result.h"
 #include "motion/pseudo/linear_axes.h"
 #include "motion/pseudo/monotone_cubic.h"
 

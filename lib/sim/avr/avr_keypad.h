@@ -8,8 +8,8 @@
 #include <memory>
 #include <string>
 
-#include "sim/edge.h"
 #include "sim/avr/avr_uart_line.h"
+#include "sim/edge.h"
 
 namespace bushd::sim {
 

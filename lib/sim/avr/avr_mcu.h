@@ -16,11 +16,11 @@
 #include <string>
 #include <utility>
 
-#include "sim/mcu.h"
-#include "sim/power_stage.h"
 #include "sim/avr/avr_chip.h"
 #include "sim/avr/avr_uart_line.h"
 #include "sim/avr/memory_watch.h"
+#include "sim/mcu.h"
+#include "sim/power_stage.h"
 
 struct avr_t;
 struct avr_io_t;

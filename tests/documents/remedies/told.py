@@ -1,6 +1,6 @@
 """Commands that the programs tell as remedies, taken out of the sources.
 
-A remedy is a whole command between quotes in a text, 'bushctl status', or one that api::remedy() makes (lib/api/remedy.h). What
+A remedy is a whole command between quotes in a text, 'bushctl status', or one that words::remedy() makes (lib/words/remedy.h). What
 --help says is run by the test of that page (shown_commands)."""
 
 import dataclasses

@@ -1,6 +1,6 @@
 // When the image for ATmega2560 answers: its reply must be over before another one's slot begins.
-#include "sim/random.h"
 #include "sim/avr/avr_fixture.h"
+#include "sim/random.h"
 
 namespace bushd::sim::answers_test {
 namespace {

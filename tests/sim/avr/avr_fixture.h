@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <string>
 
-#include "sim/mcu_alone.h"
 #include "sim/avr/avr_mcu.h"
+#include "sim/mcu_alone.h"
 
 namespace bushd::sim {
 

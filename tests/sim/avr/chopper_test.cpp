@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/mcu_alone.h"
 #include "sim/avr/avr_mcu.h"
+#include "sim/mcu_alone.h"
 
 namespace bushd::sim::chopper_test {
 namespace {

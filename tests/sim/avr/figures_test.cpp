@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "sim/step_slots.h"
 #include "sim/avr/avr_fixture.h"
+#include "sim/step_slots.h"
 
 namespace bushd::sim::figures_test {
 namespace {

@@ -1,7 +1,7 @@
 // What becomes of what the image for ATmega2560 keeps in its EEPROM when the power goes;
 // tests/conformance has the rest.
-#include "sim/random.h"
 #include "sim/avr/avr_fixture.h"
+#include "sim/random.h"
 
 namespace bushd::sim::nvm_test {
 namespace {

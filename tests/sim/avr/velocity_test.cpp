@@ -12,8 +12,8 @@
 #include <fstream>
 #include <map>
 
-#include "sim/mcu_alone.h"
 #include "sim/avr/avr_mcu.h"
+#include "sim/mcu_alone.h"
 
 namespace bushd::sim::velocity_test {
 namespace {

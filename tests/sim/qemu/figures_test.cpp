@@ -7,8 +7,8 @@
 // latter that counts for the steps a second.
 #include <cstdio>
 
-#include "sim/step_slots.h"
 #include "sim/qemu/qemu_fixture.h"
+#include "sim/step_slots.h"
 
 namespace bushd::sim {
 namespace {

@@ -1,7 +1,7 @@
 // What becomes of what the image for LM3S6965 keeps in its flash when the power goes, and when the
 // room for it goes to its end; tests/conformance has the rest.
-#include "sim/random.h"
 #include "sim/qemu/qemu_fixture.h"
+#include "sim/random.h"
 
 namespace bushd::sim {
 namespace {

@@ -5,14 +5,15 @@
 #include <cstdlib>
 #include <set>
 
-#include "api/remedy.h"
 #include "api/words.h"
 #include "diagnosis.h"
+#include "words/remedy.h"
 
 namespace bushctl::doctor {
 namespace {
 
 namespace api = bushd::api;
+namespace words = bushd::words;
 
 constexpr const char* kStart =
     "'systemctl status bushd' says why; 'sudo systemctl start bushd' starts it";
@@ -149,12 +150,12 @@ void check_versions(const Observations& seen, Findings& out) {
 
 // How its position becomes known, as far as this PC knows what the motor has.
 std::string home_or_set(const Observations& seen, const std::string& motor) {
-  const std::string set = "find out where it stands and run " + api::set_remedy(motor);
+  const std::string set = "find out where it stands and run " + words::set_remedy(motor);
   const ConfigurationSeen& file = seen.configuration;
   const bool told = !file.path.empty() && file.path == seen.daemon.config_path;
-  if (!told) return api::remedy("home", motor) + " if it has a home switch, or " + set;
+  if (!told) return words::remedy("home", motor) + " if it has a home switch, or " + set;
   const bool has_home = std::ranges::find(file.with_home, motor) != file.with_home.end();
-  return (has_home ? "run " + api::remedy("home", motor) + ", or " : "") + set;
+  return (has_home ? "run " + words::remedy("home", motor) + ", or " : "") + set;
 }
 
 Finding position(const Observations& seen, const api::MotorState& motor) {
@@ -167,7 +168,7 @@ Finding position(const Observations& seen, const api::MotorState& motor) {
                   .about = motor.name,
                   .of_several = fmt::format("motors are {}", word(motor.trust))};
   if (motor.trust == api::Trust::kRestored) {
-    finding.remedy = "look at the motor: " + api::remedy("confirm", motor.name) +
+    finding.remedy = "look at the motor: " + words::remedy("confirm", motor.name) +
                      " if it has not been turned, else " + finding.remedy;
   }
   return finding;

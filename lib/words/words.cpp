@@ -1,9 +1,9 @@
-#include "api/words.h"
+#include "words/words.h"
 
 #include <array>
 #include <utility>
 
-namespace bushd::api {
+namespace bushd::words {
 namespace {
 
 template <class Value, std::size_t N>
@@ -109,4 +109,4 @@ std::optional<Directions> directions_of(std::string_view word) {
   return find_value(kDirections, word);
 }
 
-}  // namespace bushd::api
+}  // namespace bushd::words

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace bushd::api {
+namespace bushd::words {
 
 // "'bushctl set theta --dial POSITION'"; words in capitals are for the user to fill in.
 inline std::string remedy(std::string_view verb, std::string_view motor,
@@ -21,4 +21,4 @@ inline std::string set_remedy(std::string_view motor) {
   return remedy("set", motor, "--dial POSITION");
 }
 
-}  // namespace bushd::api
+}  // namespace bushd::words
