@@ -5,12 +5,10 @@
 // Who calls what:
 // - bushd_mcu_boot: once after reset
 // - bushd_mcu_receive: for every byte on the line
-// - bushd_mcu_swap: at every tick boundary; the returned slot_buffer is emitted during the tick
-// that
-//   begins
-// - bushd_mcu_prepare: after every swap and before the next; computes the slot_buffer of the tick
-// that
-//   follows
+// - bushd_mcu_swap: at every tick boundary; the slot buffer that it returns is emitted during the
+//   tick that begins
+// - bushd_mcu_prepare: after every swap and before the next one; computes the slot buffer of the
+//   tick that follows
 // The functions are not reentrant; a port that calls `swap` from an interrupt may do so between two
 // calls of the others only (or masks it). Ticks run from boot on, whether or not the host has been
 // heard.
@@ -69,8 +67,8 @@ typedef struct bushd_mcu_config {
   bool keypad : 1;          // it has a line for one (keypad.h)
   bool no_slow_runs : 1;    // although the engine has them (BUSHD_SLOW_RUNS)
   int16_t* queue;           // queue_ticks x motors displacements
-  uint16_t
-      queue_ticks;  // 32 .. 16384, a power of two (absolute tick numbers then wrap without a seam)
+  // 32 .. 16384, a power of two: then absolute tick numbers wrap without a seam.
+  uint16_t queue_ticks;
   uint32_t min_tick_ns;  // shorter ones are refused
   int32_t pulse_ns;  // how long STEP pulses last; 0: half a slot; less: so much shorter than that
   uint16_t disabled_capabilities;  // BUSHD_CAN_* below 1 << 16 that it does not have: not in

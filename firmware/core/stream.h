@@ -20,8 +20,8 @@ typedef struct bushd_mcu_queue_summary {
   uint32_t moving_until;  // that tick
   uint16_t runs;          // these are in a table run, until:
   uint32_t runs_until;    // that tick
-  uint16_t
-      following;  // those that are plain and move on at plain_until, without an out-of-order range
+  // Those that are plain and move on at plain_until, without an out-of-order range.
+  uint16_t following;
 } bushd_mcu_queue_summary;
 
 // Rows of a frame that are still to be put into the queue. It was taken, and lies in the receiver.

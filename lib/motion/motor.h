@@ -215,23 +215,23 @@ class Motor {
   // From rest, or from the turning point of a motion.
   void start(std::int64_t target, Tick start, bushd_delay floor = 0);
   void aim(std::int64_t target, bushd_delay floor = 0);
-  // Where all that it has been told leads; nothing: nobody has said that in numbers.
+  // Where all requests so far lead; nothing: nobody has said that in numbers.
   void ask_for(std::optional<units::Steps> target) { asked_for_ = target; }
-  // The same for a run of a line.
+  // As start() and aim(), for a run of a line.
   void start_line(const OnLine& on_line, LineShare share, Tick start, bushd_delay floor);
   void aim_on_line(const OnLine& on_line, std::uint32_t line_step, bushd_delay floor);
   // From rest, along a trajectory whose first row is where it stands.
   void follow(TrajectoryShare share, Tick start);
-  // It moves so.
+  // Whether it moves along a trajectory.
   bool follows() const { return moves() && axis_.trajectory().has_value(); }
-  // What comes after the run that it makes, in place of what was to come.
+  // Replaces what comes after the present run.
   void go_on(std::vector<Leg> legs) { further_ = std::move(legs); }
-  // The leg that is to be made from where it stands: the rest of the one that it makes, or the next
-  // one, which is no more to come.
+  // Removes and returns the leg that is to be made from where it stands: the rest of the one that
+  // it makes, or the next one.
   Leg take_leg();
-  // Moving: ramps down, and its motion stays open.
+  // Ramps down a moving motor; its motion stays open.
   void pause();
-  // It goes on; if it stands already, by another run. On a line it stands first.
+  // Continues; by another run if it stands already. On a line it comes to rest first.
   void resume();
   bool is_paused() const { return pause_ == Pause::kRamps || stands_paused(); }
   bool stands_paused() const { return pause_ == Pause::kStands; }

@@ -1,8 +1,9 @@
 // Slot buffers onto the pins. Timer 1 counts the cycles of a slot: compare A begins its pulses,
 // compare B ends them.
 //
-//     slot k of a tick of L cycles begins at  start + k floor(L / slots);  the last one takes the
-//     rest
+//     slot k of a tick of L cycles begins at  start + k floor(L / slots)
+//
+// and the last one takes the rest.
 //
 // The core learns of a new tick when the main loop comes to it (emission_begun, emission_swap);
 // meanwhile its slot_buffer, prepared a tick ago, is emitted. If no slot_buffer is ready when it is

@@ -7,8 +7,8 @@
 // Time is true time in ns, int64. The MCU's own clock starts at 0 at boot and runs at
 // (1 + clock_ppm / 1e6) times true time; the core sees only this clock:
 //
-//     own(t)  = floor((t - boot) * (1e6 + ppm) / 1e6)         true(own) = the first t that reaches
-//     it
+//     own(t)    = floor((t - boot) * (1e6 + ppm) / 1e6)
+//     true(own) = the first t that reaches it
 //
 // A tick of `len` own ns with S slots makes its edges at own times  start + floor(e * len / 2S):
 // e = 2s is where the STEP pulses of slot s rise, e = 2s + 1 where they fall, half a slot later.
