@@ -81,7 +81,7 @@ TEST(Speeds, ASpeedThatNoStepCanHaveIsRefusedWithItsFigure) {
   const Answer slow = lab.wait(lab.send(by(5, 6e-7, false)));
   EXPECT_EQ(slow.result, "refused");
   EXPECT_THAT(slow.reason, HasSubstr("m01: 6e-07 mm/s would take 4166.67 s a step"));
-  EXPECT_THAT(slow.reason, HasSubstr("6.94444e-07 mm/s"));
+  EXPECT_THAT(slow.reason, HasSubstr("6.94445e-07 mm/s"));
   for (const double speed : {-1.0, std::nan(""), HUGE_VAL}) {
     EXPECT_EQ(lab.wait(lab.send(by(5, speed))).result, "refused") << speed;
   }
