@@ -46,7 +46,7 @@ class Readme(unittest.TestCase):
             with self.subTest(name):
                 command, lines = read(text)
                 self.assertTrue(command.startswith("bush"))
-                self.assertGreater(len(lines), 8)
+                self.assertGreater(len(lines), 7)
 
     def test_columns_of_watch_begin_or_end_where_their_heads_do(self):
         """A table: each of its words is below its head."""

@@ -33,7 +33,7 @@ def inked_cells(png):
     paper = rows[TOP + 2][4]
     found = set()
     for line in range((height - TOP) // LINE):
-        for column in range(int((width - 2 * LEFT) / COLUMN)):
+        for column in range(round((width - 2 * LEFT) / COLUMN)):
             left = LEFT + COLUMN * column
             inside = slice(round(left + EDGE), round(left + COLUMN - EDGE))
             lines = rows[TOP + LINE * line : TOP + LINE * (line + 1)]
