@@ -13,10 +13,12 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 
 FREESTANDING = {"stdint.h", "stdbool.h", "stddef.h", "limits.h", "string.h"}
-# Who may include whom (docs/design.md).
-ROOMS = {"lib/engine": ("engine/",), "firmware/core": ("engine/", "firmware/core/")}
+# Of these rooms docs/rooms.toml says which others they use.
+ROOMS_FILE = pathlib.Path(__file__).resolve().parents[2] / "docs/rooms.toml"
+FREESTANDING_ROOMS = ("lib/engine", "firmware/core")
 
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
 # A port may bring its own: BUSHD_OWN_CRC32, BUSHD_OWN_SLOTS_FILL, BUSHD_OWN_RUN_PARTS, BUSHD_OWN_LINE_FOLLOWER.
@@ -33,10 +35,17 @@ CROSS = {"avr": ("avr-", ["-mmcu=atmega2560"]), "cortex-m": ("arm-none-eabi-", [
 NOT_HERE = 77
 
 
+def rooms():
+    """By room, how the headers begin that it may include: its own, and those of rooms that it uses."""
+    uses = {room["path"]: room["uses"] for room in tomllib.loads(ROOMS_FILE.read_text(encoding="utf-8"))["room"]}
+    return {room: tuple(path.removeprefix("lib/") + "/" for path in (room, *uses[room])) for room in FREESTANDING_ROOMS}
+
+
 def check_includes(directories):
     faults = []
+    allowed_in = rooms()
     for directory in directories:
-        room = next(r for r in ROOMS if directory.as_posix().endswith(r))
+        room = next(r for r in allowed_in if directory.as_posix().endswith(r))
         files = sorted(directory.glob("*.[ch]"))
         if not files:
             faults.append(f"{directory}: no sources found")
@@ -47,10 +56,10 @@ def check_includes(directories):
                     continue
                 header = match[1].strip()
                 allowed = (header.startswith("<") and header[1:-1] in FREESTANDING) or (
-                    header.startswith('"') and header[1:].startswith(ROOMS[room]))
+                    header.startswith('"') and header[1:].startswith(allowed_in[room]))
                 if not allowed:
                     faults.append(f"{path}:{number}: {header} is not allowed in {room}; allowed: "
-                                  f"{', '.join(sorted(FREESTANDING))} and {', '.join(ROOMS[room])}")
+                                  f"{', '.join(sorted(FREESTANDING))} and {', '.join(allowed_in[room])}")
     return faults
 
 
