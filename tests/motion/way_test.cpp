@@ -90,6 +90,7 @@ TEST_F(WayTest, WhatARefusalTellsIsTaken) {
   const auto too_short = quick.take(1, 1e16);
   ASSERT_FALSE(too_short);
   EXPECT_GE(told(too_short) * 1e9, quick.duration_ns()) << too_short.error().message;
+  // By six digits, so up to 1e-5 of it more.
   EXPECT_LT(told(too_short) * 1e9, quick.duration_ns() * 1.00001);
   EXPECT_TRUE(quick.take(told(too_short), 1e16));
 }

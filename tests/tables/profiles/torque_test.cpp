@@ -290,7 +290,7 @@ TEST(TorqueCsv, EveryBadLineIsNamed) {
 
 // By hand: a screw of 5 mm lead has an arm of 5 mm / 2 pi = 0.795775 mm; 2 kg at it are
 // 2 x 6.33257e-7 kg m2. A pulley of 20 teeth of 2 mm has an arm of 6.36620 mm, which makes
-// 0.5 x 4.05285e-5, a ninth of it behind a gear of 3.
+// 0.5 x 4.05285e-5, a ninth of it behind a gear of 3. Tolerances are one in the last digit.
 TEST(Load, InertiaAtTheMotorIsThatOfItsMassAtItsArmOverTheGearSquared) {
   using tables::profiles::inertia_at_motor_kgm2;
   EXPECT_NEAR(inertia_at_motor_kgm2({.mass_kg = 2, .travel_per_turn_m = 0.005}), 1.266515e-6,
