@@ -241,7 +241,7 @@ TEST(RunState, AnyStateIsRefusedOrNotFasterThanTheTable) {
   int taken = 0;
   holds("hostile states", [&] {
     const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
-    for (int i = 0; i < 50; ++i) taken += refused_or_legal(table, hostile_state(table.law()));
+    for (int i = 0; i < 200; ++i) taken += refused_or_legal(table, hostile_state(table.law()));
   });
   EXPECT_GE(taken, 100) << "too few states that nearly fit";
 }
