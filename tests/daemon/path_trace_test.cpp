@@ -80,18 +80,43 @@ TEST_P(PathTrace, OfALogOfSeveralPathsEachIsJudgedByItsPoints) {
   EXPECT_EQ(Traced::check(lab, both), 1) << said();
 }
 
-TEST_P(PathTrace, OtherMovesBesidePathsAreRefusedWithARemedy) {
+TEST_P(PathTrace, PathsAndOtherMotionsInAnyOrderAreJudgedTogether) {
   Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(api::Move{.motors = {{"m01", 20}}})).result, "reached");
-  const auto move = lab.send(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()});
-  EXPECT_EQ(lab.wait(move).result, "reached");
+  const auto reaches = [&lab](auto request) {
+    EXPECT_EQ(lab.wait(lab.send(std::move(request))).result, "reached");
+  };
+  const api::MovePath path_there{.motors = kTraced, .rows = 63, .positions = points()};
+  reaches(api::Move{.motors = {{"m01", 200}, {"m04", -90}}});
+  reaches(api::Move{.kind = api::Move::Kind::kAbsolute, .motors = {{"m01", 0}, {"m04", 0}}});
+  reaches(path_there);
+  reaches(api::MoveLine{.motors = {{"m01", 120}, {"m03", -70}}});
+  reaches(api::Move{.motors = {{"m03", 60}}});
+  // m03 alone moves beside a path of others.
+  const auto long_move = lab.send(api::Move{.motors = {{"m03", 900}}});
+  const api::MovePath path_back{.motors = {"m04", "m01"}, .rows = 2, .positions = {100, -50, 7, 9}};
+  reaches(path_back);
+  EXPECT_EQ(lab.wait(long_move).result, "reached");
+  reaches(api::Move{.motors = {{"m01", -40}, {"m03", 33}}});
+  lab.run_for(0.1);
   ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
   write_points(points());
-  for (const char* given : {"", "--path path.csv"}) {
-    EXPECT_EQ(Traced::check(lab, given), 2) << given;
-    EXPECT_THAT(said(), testing::HasSubstr("begin a new one (bushd --move-log FILE"));
-  }
+  std::ofstream(path("back.csv")) << "m04,m01\n100,-50\n7,9\n";
+  const std::string both = "--path " + path("path.csv") + " --path " + path("back.csv");
+  EXPECT_EQ(Traced::check(lab, both), 0) << said();
+  EXPECT_THAT(said(), testing::ContainsRegex("edges of 3 motors are judged by the path"));
+  EXPECT_THAT(said(), testing::HasSubstr("steps commanded"));
+  EXPECT_EQ(check(lab), 2);
+  EXPECT_THAT(said(), testing::HasSubstr("it has 2 paths, and --path names 1"));
+  // A move that was asked to go elsewhere, and a path that was another one.
+  const auto elsewhere = [](nlohmann::json& event) {
+    if (event["event"] == "move" && event["steps"] == 33) event["steps"] = 34;
+    return true;
+  };
+  EXPECT_EQ(Traced::check(lab, both, elsewhere), 1) << said();
+  std::ofstream(path("back.csv")) << "m04,m01\n100,-90\n7,9\n";
+  EXPECT_EQ(Traced::check(lab, both), 1) << said();
+  EXPECT_THAT(said(), testing::HasSubstr("its edges are not the steps of the path's points"));
 }
 
 TEST_P(PathTrace, ATraceThatIsStillWrittenIsToldAsThat) {

@@ -84,7 +84,11 @@ class ArrayMove(Move):
         super().__init__(event, table)
         self.direction = 1
 
-    def _go_to(self, goal_steps, floor):
+    def _planned(self, event):
+        """By its rows, of which some may still come."""
+
+    def look_until(self, tick):
+        super().look_until(tick)
         self._known = None
 
     def change(self, tick, target_steps=None, floor=0):
@@ -124,7 +128,7 @@ class ArrayMove(Move):
         direction = row = tick = way = 0
         fastest_now = fastest_before = fastest_told = 0  # in the running step, the one before it, and as told
         over = False
-        while not (over and told == rest):
+        while not (over and told == rest) and self.start_tick + tick <= self._until:
             time_ns = (tick + 1) * self.tick_ns
             stopped = self._stop is not None and self.start_tick + tick >= self._stop
             if stopped or (time_ns > end_ns and not rests):
@@ -270,22 +274,18 @@ class ArrayMove(Move):
         self._end_steps = made
         return self._known
 
-    @property
-    def delays(self):
-        return [0] * len(self._work_out())
-
-    def times_ns(self):
-        return [due or 0 for _, _, _, _, _, _, _, due, _, _, _ in self._work_out()]
+    def _count(self):
+        return len(self._work_out())
 
     def end_steps(self):
         self._work_out()
         return self._end_steps
 
-    def end_tick(self):
+    def runs_at(self, tick):
         self._work_out()
-        return self.start_tick + self._ticks_made
+        return tick < self.start_tick + self._ticks_made
 
-    def too_close(self):
+    def too_close(self, most):
         """Judged are steps between two turns, of the rows alone; of a cubic, whose speed changes within a tick, with what that makes."""
         table = self.table
         slack = 1 / 32 if self._array.cubic else 1e-6
@@ -302,7 +302,7 @@ class ArrayMove(Move):
             return None
 
         slowest_ns = max(table.accel[0], table.decel[0]) * table.unit_ns
-        for number, (_, _, direction, _, _, _, _, due, _, _, _) in enumerate(self._work_out(), 1):
+        for number, (_, _, direction, _, _, _, _, due, _, _, _) in enumerate(self._work_out()[:most], 1):
             if due is None:
                 run.clear()
                 continue

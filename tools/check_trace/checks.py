@@ -1,6 +1,7 @@
 """Edges against steps, and what else pins and positions must fulfil."""
 
 import bisect
+import itertools
 import json
 import math
 
@@ -11,7 +12,7 @@ MAX_SKEW_NS = 20_000  # between the MCUs of a bus
 
 
 def name_of(step):
-    return f"step {step.number} of {len(step.move.delays)} of move {step.move.id}"
+    return step.move.name_of(step.number)
 
 
 class MotorCheck:
@@ -25,7 +26,7 @@ class MotorCheck:
         self._planned = []  # the steps that moves which met their limit have made by the table
 
     def run(self):
-        edges = self._without_autonomous(self._motor.edges)
+        edges = self._without_paths(self._without_autonomous(self._motor.edges))
         steps, edges = self._without_limits(edges)
         self._motor.steps = sorted(steps + self._planned, key=lambda step: step.time_ns)
         missing, surplus = [], []
@@ -91,13 +92,26 @@ class MotorCheck:
             self._check_other(edge, "an edge of the measuring step")
         return edges[2:]
 
+    def _without_paths(self, edges):
+        """Sets the edges of each path apart: from its first run to the next motion that is none of its runs."""
+        times_ns = [self._clock.bus_ns(edge.time_ns) for edge in edges]
+        groups = [(way, next(moves)) for way, moves in itertools.groupby(self._motor.moves, lambda move: move.way)]
+        begins = [bisect.bisect_left(times_ns, first.start_tick * first.tick_ns - self._slot_ns) for _, first in groups]
+        rest = edges[: begins[0]] if begins else edges
+        for (way, _), begin, end in zip(groups, begins, [*begins[1:], len(edges)]):
+            if way is None:
+                rest = rest + edges[begin:end]
+            else:
+                self._motor.path_edges[way] += edges[begin:end]
+        return rest
+
     def _without_limits(self, edges):
         """Moves that a limit switch has ended: by the table as far as they go by it, then to rest by the MCU's own ramp.
         Returns the steps and edges of the others."""
         steps = []
         for number, move in enumerate(self._motor.moves):
             own = [step for step in self._motor.steps if step.move is move]
-            if move.result != "limit":
+            if move.result != "limit" or move.way is not None:
                 steps += own
                 continue
             begin_ns = move.start_tick * move.tick_ns - self._slot_ns
@@ -129,7 +143,8 @@ class MotorCheck:
         for edge in ramp:
             self._check_other(edge, f"an edge of the ramp of move {move.id}", None if move.turns else move.direction)
         # In the coarse format an MCU takes its speed from the steps of a few ticks.
-        running = move.delays[max(planned - 1, 0)] if move.delays and not move.turns else move.table.cruise
+        knows = move.makes_steps() and not move.turns
+        running = move.delay_of(max(planned - 1, 0)) if knows else move.table.cruise
         unsure = 3 * move.tick_ns // (running * move.table.unit_ns) + 2
         most = len(move.table.ramp_down(running)) + unsure
         if len(ramp) > most:
@@ -160,6 +175,8 @@ class MotorCheck:
             text = f"{name_of(step)} is {away_ns / 1000:+.1f} us ({ticks:+.2f} ticks) from its slot"
             self._report("time", text, edge)
         for step in missing[len(surplus) :]:
+            if step.emitted_ns > step.move.cut_ns - self._slot_ns:
+                continue  # the trace ends there
             due_ns = step.emitted_ns + self._clock.at(step.emitted_ns)
             self._problems.add(self._motor, "missing", f"{name_of(step)} is missing", due_ns)
         for edge in surplus[len(missing) :]:

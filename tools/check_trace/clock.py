@@ -3,6 +3,7 @@
 An MCU's clock is an offset and a rate like a crystal's; the one that most of its edges agree upon is taken.
 """
 
+import math
 import random
 
 MAX_RATE = 100e-6  # crystals are better
@@ -36,7 +37,7 @@ def fit_clock(motors, slot_ns):
     """
     pairs = []
     for motor in motors:
-        if motor.autonomous or any(move.result == "limit" for move in motor.moves):
+        if motor.autonomous or any(move.result == "limit" or move.way is not None for move in motor.moves):
             pairs += pairs_by_move(motor, slot_ns)
             continue
         seen = [edge.time_ns for edge in motor.edges]
@@ -51,6 +52,18 @@ def fit_clock(motors, slot_ns):
     rough = agreed_clock(pairs, slot_ns)
     good = [(time, away) for time, away in pairs if abs(away - rough.at(time)) <= slot_ns]
     return straight_line(good)
+
+
+def rough_clock(motors):
+    """From paths alone, whose steps are not known beforehand: the first edge of all comes behind the first tick of all, by
+    no more than the first delay of a table. Between two paths all motors stand, for longer than the clocks of an MCU and of the
+    trace drift apart."""
+    edges_ns = [motor.edges[0].time_ns for motor in motors if motor.edges]
+    starts_ns = [move.start_tick * move.tick_ns for motor in motors for move in motor.moves]
+    starts_ns += [autonomous.begin_ns for motor in motors for autonomous in motor.autonomous]
+    if not edges_ns or min(starts_ns) == -math.inf:
+        return NO_CLOCK
+    return Clock(0, min(edges_ns) - min(starts_ns) - motors[0].moves[0].tick_ns, 0.0)
 
 
 def pairs_of(steps, seen):

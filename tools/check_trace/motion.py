@@ -39,6 +39,8 @@ from check_trace.problems import InputError
 Step = namedtuple("Step", "move number time_ns emitted_ns early_ns tick nth direction place bound_ns")
 INTERIOR, FIRST_TICK, LAST_TICK = range(3)
 
+ENDINGS = "reached", "stopped", "turned"  # results of which the plan tells where they leave the motor
+
 # A ramp-down waits no longer for a step (docs/tables.md).
 MOST_WAIT_NS = 500_000_000
 
@@ -96,8 +98,8 @@ class Plan:
     few of them are made."""
 
     def __init__(self, first_ns, unit_ns):
-        self._first_ns = first_ns
-        self._unit_ns = unit_ns
+        self.first_ns = first_ns
+        self.unit_ns = unit_ns
         self.delays = []
         self.times_ns = []
         self.begun = None  # a step that is not made: its delay, and when the motor rests
@@ -110,17 +112,42 @@ class Plan:
         self._rest = iter(rest)
         self.count = done + count
 
-    def work_out(self, until_ns):
-        """So that all steps made by then are there, and the one that runs then."""
-        last_ns = self.times_ns[-1] if self.times_ns else self._first_ns
-        while last_ns <= until_ns and (delay := next(self._rest, None)) is not None:
-            last_ns += delay * self._unit_ns
-            self.delays.append(delay)
-            self.times_ns.append(last_ns)
+    def has(self, index):
+        """Whether there is this step, counted from 0; it is worked out."""
+        while len(self.delays) <= index and self._work_out_next():
+            pass
+        return index < len(self.delays)
+
+    def made_by(self, ns):
+        """How many steps are made by then; the one that runs then is worked out."""
+        while (not self.times_ns or self.times_ns[-1] <= ns) and self._work_out_next():
+            pass
+        return bisect.bisect_right(self.times_ns, ns)
+
+    def begin_ns(self, index):
+        """When this step begins; the one before it is worked out."""
+        return self.times_ns[index - 1] if index else self.first_ns
+
+    def running(self, begin_ns, end_ns):
+        """The delays of the steps that run between these times."""
+        first, last = self.made_by(begin_ns), self.made_by(end_ns)
+        delays = self.delays[first : last + 1]
+        return [*delays, self.begun[0]] if self.begun and last == self.count else delays
+
+    def _work_out_next(self):
+        delay = next(self._rest, None)
+        if delay is None:
+            return False
+        self.times_ns.append((self.times_ns[-1] if self.times_ns else self.first_ns) + delay * self.unit_ns)
+        self.delays.append(delay)
+        return True
 
 
 class Move:
+    """One run of a motor. Its steps are worked out as far as somebody asks."""
+
     turns = False  # its steps are all in one direction
+    way = None  # of a run of a path: its number
 
     def __init__(self, event, table):
         self.id = event["id"]
@@ -140,38 +167,37 @@ class Move:
         # From this tick on it is made of ticks.
         self.ticks_from = {"stream": self.start_tick, "table": math.inf}[event.get("moves", "stream")]
         self.goal_steps = self.from_steps + event["steps"]
-        self._plan = Plan(self.late_ns, table.unit_ns)
-        self._go_to(self.goal_steps, event.get("floor", 0))
+        self._plan = self._planned(event)
         self.result = None
         self.result_steps = None
+        self._until = math.inf
+        self.cut_ns = math.inf  # in bus time, where the trace ends meanwhile
 
-    @property
-    def delays(self):
-        self._plan.work_out(math.inf)
-        return self._plan.delays
+    def look_until(self, tick):
+        """What it does later is not worked out."""
+        self._until = tick
 
-    def times_ns(self):
-        """The table's times of the steps, from the beginning of the start tick."""
-        self._plan.work_out(math.inf)
-        return self._plan.times_ns
+    def _planned(self, event):
+        plan = Plan(self.late_ns, self.table.unit_ns)
+        self._go_to(plan, self.goal_steps, event.get("floor", 0))
+        return plan
 
-    def _go_to(self, goal_steps, floor):
+    def _go_to(self, plan, goal_steps, floor):
         steps = goal_steps - self.from_steps
         self.direction = 1 if steps >= 0 else -1
-        self._plan.go_on(0, self.table.delays(abs(steps), floor), abs(steps))
+        plan.go_on(0, self.table.delays(abs(steps), floor), abs(steps))
 
     def change(self, tick, target_steps=None, floor=0):
         """What a stop, or a new target, at `tick` makes of the rest; changes follow each other."""
         self.ticks_from = min(self.ticks_from, tick)
         if target_steps is not None:
             self.goal_steps = target_steps
-        if tick <= self.start_tick:
-            self._go_to(self.from_steps if target_steps is None else target_steps, floor)
-            return
         plan = self._plan
+        if tick <= self.start_tick:
+            self._go_to(plan, self.from_steps if target_steps is None else target_steps, floor)
+            return
         until_ns = (tick - self.start_tick) * self.tick_ns
-        plan.work_out(until_ns)
-        done = bisect.bisect_right(plan.times_ns, until_ns)
+        done = plan.made_by(until_ns)
         if done == plan.count:
             return
         running = plan.delays[done]
@@ -187,46 +213,99 @@ class Move:
         rest = self.table.ramp_down(running)
         plan.go_on(done + 1, rest, len(rest))
 
-    def too_close(self):
-        """A step that comes sooner than its table allows: none, where the table alone makes the delays."""
+    def made(self):
+        """How many steps it has made, as its result says; 0 without one."""
+        return 0 if self.result_steps is None else abs(self.result_steps - self.from_steps)
+
+    def has_ended(self):
+        """Whether it has come to the end of its plan, as its result says: then all of its steps were made."""
+        return self.result in ENDINGS and self.result_steps == self.end_steps()
+
+    def too_close(self, most):
+        """The first step that comes sooner than its table allows, of the first `most` ones: none, where the table alone makes
+        the delays."""
         return None
 
     def end_steps(self):
-        return self.from_steps + self.direction * self._plan.count
+        return self.from_steps + self.direction * self._count()
 
-    def end_tick(self):
-        """The first tick in which the motor is at rest again."""
-        times = self.times_ns()
-        return self.start_tick - (-times[-1] // self.tick_ns) if times else self.start_tick
+    def runs_at(self, tick):
+        """Whether it makes steps in this tick, or later."""
+        return self._plan.made_by((tick - self.start_tick) * self.tick_ns) < self._plan.count
+
+    def makes_steps(self):
+        return self._count() > 0
+
+    def name_of(self, number):
+        return f"step {number} of {self._count()} of move {self.id}"
+
+    def delay_of(self, index):
+        """In units of its table, of a step counted from 0, or of the last one before it."""
+        return self._plan.delays[index if self._plan.has(index) else -1]
+
+    def _count(self):
+        """How many steps it makes in all."""
+        return self._plan.count
+
+    # What lines do otherwise.
+
+    def _time_ns(self, n):
+        """The table's time of step n, counted from 0, from the beginning of the start tick."""
+        return self._plan.times_ns[n]
+
+    def _told(self, tick):
+        """How many steps are made by the end of a tick, and the position there, in 1/256 step from its start."""
+        plan = self._plan
+        end_ns = (tick + 1) * self.tick_ns
+        made = plan.made_by(end_ns)
+        begun_delay, rest_ns = plan.begun or (0, -1)
+        if not self.fine or (made == plan.count and end_ns > rest_ns):
+            return made, 256 * made
+        delay = plan.delays[made] if made < plan.count else begun_delay
+        return made, 256 * made + (end_ns - plan.begin_ns(made)) * 256 // (delay * plan.unit_ns)
+
+    def _place(self, tick, before, after):
+        """Of the steps from `before` to `after` of this tick."""
+        if after == self._count() and not (self._plan.begun and (tick + 1) * self.tick_ns <= self._plan.begun[1]):
+            return LAST_TICK
+        return FIRST_TICK if tick == 0 else INTERIOR
+
+    def _in_mcu(self, n):
+        """When an MCU that makes the run itself makes step n, and how much later than by the table that may be: in ns."""
+        return self._plan.times_ns[n], 0
+
+    def _bound_ns(self, tick, place, displacement, slots):
+        """How far an edge of a tick may lie from the table (above)."""
+        stands = place == LAST_TICK or (tick == 0 and self.late_ns > 0)  # in a part of the tick
+        return self._off_ns(tick, self._plan, 1, stands, 1 / 256 if self.fine else 1 / 2, displacement, slots)
+
+    def _off_ns(self, tick, run, share, stands, rounding, displacement, slots):
+        """The same, of a motor that makes this share of the run's steps."""
+        delays = run.running(tick * self.tick_ns, (tick + 1) * self.tick_ns)
+        vmax = share / (min(delays) * run.unit_ns)
+        vmin = 0 if stands else share / (max(delays) * run.unit_ns)
+        off_steps = (vmax - vmin) * self.tick_ns / 4 + rounding
+        return min(self.tick_ns, 256 * self.tick_ns / displacement * off_steps + self.tick_ns / slots)
 
     def steps(self, slots):
-        """Every step: when by the table, and when by way of ticks and slots."""
-        times = self.times_ns()
-        delays = self._plan.delays
-        begun_delay, rest_ns = self._plan.begun or (0, -1)
-        if begun_delay:
-            delays = [*delays, begun_delay]
+        """Every step, one after the other: when by the table, and when by way of ticks and slots."""
         crossing = 256 if self.fine else 128
         made = 0
         q0 = 0  # position at the beginning of the tick, 1/256 step
         tick = 0
-        while made < len(times):
-            end_ns = (tick + 1) * self.tick_ns
-            after = bisect.bisect_right(times, end_ns, made)
-            q1 = 256 * after
-            if self.fine and (after < len(times) or end_ns <= rest_ns):
-                since_ns = end_ns - (times[after - 1] if after else self.late_ns)
-                q1 += since_ns * 256 // (delays[after] * self.table.unit_ns)
-            if after > made:
-                last = after == len(times) and end_ns > rest_ns
-                place = LAST_TICK if last else FIRST_TICK if tick == 0 else INTERIOR
-                stands = last or (tick == 0 and self.late_ns > 0)  # in a part of the tick
-                bound_ns = self.bound_ns(delays[made : after + 1], stands, q1 - q0, slots)
+        while made < self._count() and self.start_tick + tick <= self._until:
+            after, q1 = self._told(tick)
+            after = max(after, made)
             by_table = self.start_tick + tick < self.ticks_from
             begin_ns = (self.start_tick + tick) * self.tick_ns
+            if after > made:
+                place = self._place(tick, made, after)
+                bound_ns = self._bound_ns(tick, place, q1 - q0, slots)
             for n in range(made, after):
                 if by_table:
-                    slot = (times[n] - tick * self.tick_ns) * slots // self.tick_ns
+                    at_ns, late_ns = self._in_mcu(n)
+                    slot = (at_ns - tick * self.tick_ns) * slots // self.tick_ns
+                    bound_ns = self.tick_ns / slots + float(late_ns)
                 else:
                     slot = (256 * n + crossing - q0) * slots // (q1 - q0)
                 # A step exactly at the tick's end belongs to the tick.
@@ -234,23 +313,15 @@ class Move:
                 yield Step(
                     move=self,
                     number=n + 1,
-                    time_ns=self.start_tick * self.tick_ns + times[n],
+                    time_ns=self.start_tick * self.tick_ns + self._time_ns(n),
                     emitted_ns=begin_ns + slot * self.tick_ns // slots,
                     early_ns=0,
                     tick=self.start_tick + tick,
                     nth=n - made,
                     direction=self.direction,
                     place=place,
-                    bound_ns=self.tick_ns if self.emission in PERIODIC else self.tick_ns / slots if by_table else bound_ns,
+                    bound_ns=self.tick_ns if self.emission in PERIODIC else bound_ns,
                 )
             made = after
             q0 = q1
             tick += 1
-
-    def bound_ns(self, delays, stands, displacement, slots):
-        """How far an edge of a tick may lie from the table (above); `delays` are those that run in it."""
-        vmax = 1 / (min(delays) * self.table.unit_ns)
-        vmin = 0 if stands else 1 / (max(delays) * self.table.unit_ns)
-        rounding = 1 / 256 if self.fine else 1 / 2
-        off_steps = (vmax - vmin) * self.tick_ns / 4 + rounding
-        return min(self.tick_ns, 256 * self.tick_ns / displacement * off_steps + self.tick_ns / slots)

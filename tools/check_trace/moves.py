@@ -2,10 +2,11 @@
 
 import json
 import math
+from collections import defaultdict
 
 from check_trace.arrays import Array, ArrayMove
 from check_trace.lines import Envelope, LineMove, Part
-from check_trace.motion import Move
+from check_trace.motion import ENDINGS, Move
 from check_trace.problems import InputError
 from check_trace.tables import Tables
 from check_trace.trace import Levels
@@ -39,6 +40,7 @@ class Motor:
         self.set_by_steps = 0  # sum of what "set" has shifted the position by, without a step
         self.steps = []
         self.edges = []
+        self.path_edges = defaultdict(list)  # by number of the path
         self.others = 0  # edges of homing, local motion, and on the MCU's own way to rest
         self.errors_ns = ([], [], [])  # of the edges against the table, by place in the move
         self.off_slot_ns = 0  # farthest from the exact slot
@@ -121,7 +123,6 @@ class MoveLog:
             raise InputError(f"{path}: {error.strerror}") from None
         if len(self._ticks) > 1:
             raise InputError(f"{path}: moves on several buses or ticks; choose one with --bus NAME")
-        self._check_each()
 
     def tick_ns(self):
         return next(iter(self._ticks))[1]
@@ -212,8 +213,9 @@ class MoveLog:
         """Steps that were made while nobody heard: the edges tell them."""
         self._at_steps[event["motor"]] = event["position_steps"]
 
-    def _check_each(self):
-        """What the log must fulfil by itself, before edges are looked at."""
+    def check(self):
+        """What the log must fulfil by itself. Of moves that have not come to their ends as many steps as the motor has edges are
+        looked at."""
         outputs = {}
         for motor in self.motors.values():
             other = outputs.setdefault(motor.place(), motor)
@@ -225,20 +227,20 @@ class MoveLog:
                 text = f"move {motor.moves[-1].id} turned, and no move to its target follows"
                 self._problems.add(motor, "result", text)
             for before, after in zip(motor.moves, motor.moves[1:]):
-                if after.delays and before.result != "limit" and after.start_tick < before.end_tick():
-                    text = f"move {after.id} starts in tick {after.start_tick}, the one before runs until"
-                    self._problems.add(motor, "overlap", f"{text} {before.end_tick()}")
+                if after.makes_steps() and before.has_ended() and before.runs_at(after.start_tick):
+                    text = f"move {after.id} starts in tick {after.start_tick}, in which the one before still runs"
+                    self._problems.add(motor, "overlap", text)
 
     def _check_result(self, motor, move):
         text = None
-        if (too_close := move.too_close()) is not None:
+        if (too_close := move.too_close(max(move.made(), len(motor.edges)) + 1)) is not None:
             name = f"step {too_close} of move {move.id}"
             self._problems.add(motor, "table", f"{name} comes sooner after the one before than its table allows")
         if move.result is None:
             text = f"move {move.id} has no result"
         elif move.result == "limit":
             return  # when the switch was met is not in the log: the edges tell
-        elif move.result not in ("reached", "stopped", "turned"):
+        elif move.result not in ENDINGS:
             text = f"move {move.id} ended as '{move.result}', so the table does not say what was to happen"
         elif move.result == "reached" and move.end_steps() != move.goal_steps:
             text = f"move {move.id} does not end at its target, and yet its result is 'reached'"

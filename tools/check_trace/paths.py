@@ -84,31 +84,14 @@ def matched(steps, edges, turns):
     return made
 
 
-def of_each_path(motors, ways, tick_ns):
-    """The motors of each path, with its edges: those from its start on and before the next one's.
-
-    Between two paths all motors stand, for longer than the clocks of an MCU and of the trace drift apart; so one place
-    where both are known tells the others, the first edge of all behind the first tick of all."""
-    def moves(motor, way):
-        return [move for move in motor.moves if move.way == way]
-
-    starts = [min(move.start_tick for motor in motors for move in moves(motor, way)) * tick_ns for way in ways]
-    first_ns = min((motor.edges[0].time_ns for motor in motors if motor.edges), default=0)
-    # The first step comes within the first delay of a table after the first tick.
-    begins = [first_ns + start - starts[0] - tick_ns for start in starts]
-    begins[0] = float("-inf")
-    for index, way in enumerate(ways):
-        until = begins[index + 1] if index + 1 < len(ways) else float("inf")
-        parts = []
-        for motor in motors:
+def of_path(motors, way):
+    """The motors of a path, as if it was their only motion."""
+    for motor in motors:
+        moves = [move for move in motor.moves if move.way == way]
+        if moves:
             part = copy(motor)
-            part.moves = moves(motor, way)
-            if not part.moves:
-                continue
-            part.from_steps = part.moves[0].from_steps
-            part.edges = [edge for edge in motor.edges if begins[index] <= edge.time_ns < until]
-            parts.append(part)
-        yield parts
+            part.moves, part.from_steps, part.edges = moves, moves[0].from_steps, motor.path_edges[way]
+            yield part
 
 
 class PathCheck:

@@ -14,7 +14,7 @@ def text_us(error_us):
     return "(no edges)" if error_us is None else f"{error_us} us"
 
 
-def figures(motors, trace, skew_ns):
+def figures(motors, trace, skew_ns, on_paths):
     every = [[error for motor in motors for error in motor.errors_ns[place]] for place in range(3)]
     interior = every[INTERIOR]
     return {
@@ -23,6 +23,7 @@ def figures(motors, trace, skew_ns):
         "steps_commanded": sum(len(motor.steps) for motor in motors),
         "steps_made": sum(map(len, trace.edges.values())),
         "steps_of_their_own": sum(motor.others for motor in motors),
+        "steps_on_paths": on_paths,
         "max_edge_error_us": largest_us(interior) or 0.0,
         "rms_edge_error_us": round((sum(e * e for e in interior) / max(1, len(interior))) ** 0.5 / 1000, 1),
         "max_first_tick_error_us": largest_us(every[FIRST_TICK]),
@@ -66,6 +67,12 @@ def print_report(motors, clocks, problems, total, verbose):
             print(f"mcu{address}: tick 0 at {clock.at(0) / 1e6:.6f} ms, rate {clock.rate * 1e6:+.3f} ppm")
     for line in problems.lines():
         print(f"problem: {line}")
+    if any(motor.path_edges for motor in motors):
+        on_paths = [len(edges) for motor in motors for edges in motor.path_edges.values()]
+        movers = sum(1 for motor in motors if motor.path_edges)
+        print(f"{total['steps_on_paths']} of {sum(on_paths)} edges of {movers} motors are judged by the path")
+        if not total["steps_commanded"]:
+            return
     print(
         f"max error in a move's first tick {text_us(total['max_first_tick_error_us'])}, in its last tick "
         f"{text_us(total['max_last_tick_error_us'])}; rms in all others {total['rms_edge_error_us']} us"

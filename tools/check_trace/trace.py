@@ -38,6 +38,7 @@ class Trace:
         self.pulses = defaultdict(list)  # of STEP: (begin, width)
         self.double = []  # (place, time): STEP rises while it is high
         self.disorder = []  # (place, time): a time stamp before the one before
+        self.end_ns = 0
         try:
             with open(path, encoding="ascii") as file:
                 tokens = (token for line in file for token in line.split())
@@ -101,6 +102,7 @@ class Trace:
                 time = int(token[1:])
                 went_back = time < now
                 now = time
+                self.end_ns = max(self.end_ns, now)
                 continue
             if token == "$comment":
                 self._ended = [*iter(lambda: next(tokens), "$end")] == ["end", "of", "trace"]
