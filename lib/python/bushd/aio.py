@@ -312,13 +312,11 @@ class Client:
         speed: float | None = None,
         while_connected: bool = False,
     ) -> Motion:
-        if edge not in ("rising", "falling"):
-            raise ValueError(f'edge "{edge}": it is "rising" or "falling"')
         in_steps = await self._in_steps(motors, unit)
         request = requests.arm(
             motors,
             in_steps=in_steps,
-            falling=edge == "falling",
+            edge=edge,
             delay_us=delay_us,
             speed=speed,
             while_connected=while_connected,
@@ -338,14 +336,12 @@ class Client:
         duration_s: float | None = None,
         while_connected: bool = False,
     ) -> Motion:
-        if edge not in ("rising", "falling"):
-            raise ValueError(f'edge "{edge}": it is "rising" or "falling"')
         wanted = await self._amounts(motors, to, by, unit)
         request = requests.arm_line(
             wanted.values,
             absolute=wanted.absolute,
             in_steps=wanted.in_steps,
-            falling=edge == "falling",
+            edge=edge,
             delay_us=delay_us,
             speed=speed,
             duration_s=duration_s,

@@ -9,16 +9,18 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import enum
-import math
-import struct
+import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from . import messages, model
+from .messages import finite
 
 MAX_MESSAGE_BYTES = 60 * 1024  # a longer one would be fragmented on LCM
 MAX_PARTS = 4096  # of a whole; more than any configuration has
 MAX_DECIMALS = 12
+
+T = TypeVar("T")
 
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
 
@@ -45,23 +47,20 @@ class Detail:
 
     def __add__(self, more: Detail) -> Detail:
         """With the piece of the list that the next part has."""
-        plan, configuration, camac = self.plan, self.configuration, self.camac
-        if plan is not None and more.plan is not None:
-            plan = dataclasses.replace(plan, legs=plan.legs + more.plan.legs)
-        if configuration is not None and more.configuration is not None:
-            settings = configuration.settings + more.configuration.settings
-            configuration = dataclasses.replace(configuration, settings=settings)
-        if camac is not None and more.camac is not None:
-            camac = dataclasses.replace(camac, responses=camac.responses + more.camac.responses)
-        return Detail(
-            motors=self.motors + more.motors,
-            plan=plan,
-            entries=self.entries + more.entries,
-            tables=self.tables + more.tables,
-            motions=self.motions + more.motions,
-            configuration=configuration,
-            camac=camac,
-        )
+        return Detail(**{name: _joined(getattr(self, name), getattr(more, name)) for name in _names(Detail)})
+
+
+# The list of each whole that comes in pieces.
+_LISTS = {model.MovePlan: "legs", model.Configuration: "settings", model.CamacResult: "responses"}
+
+
+def _joined(whole: Any, piece: Any) -> Any:
+    if isinstance(whole, tuple):
+        return whole + piece
+    if whole is None or piece is None:
+        return whole
+    name = _LISTS[type(whole)]
+    return dataclasses.replace(whole, **{name: getattr(whole, name) + getattr(piece, name)})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,22 +115,10 @@ Message = Reply | Welcome | State | Description | Health
 
 def encode(message: Any) -> bytes:
     """Raises ValueError for what does not fit: numbers beyond their type, texts with a NUL, too many motors."""
-    try:
-        payload: bytes = message.encode()
-    except struct.error as error:
-        raise ValueError(f"a number does not fit the request: {error}") from None
+    payload: bytes = message.encode()
     if len(payload) > MAX_MESSAGE_BYTES:
         raise ValueError(f"the request takes {len(payload)} bytes; at most {MAX_MESSAGE_BYTES} fit a message")
     return payload
-
-
-def text(value: str) -> str:
-    """A text of a request: LCM's strings end at a NUL."""
-    if not isinstance(value, str):
-        raise TypeError(f"{value!r} is no text")
-    if "\0" in value:
-        raise ValueError(f"{value!r} has a NUL in it")
-    return value
 
 
 def decode(channel: str, payload: bytes) -> Message | None:
@@ -141,25 +128,14 @@ def decode(channel: str, payload: bytes) -> Message | None:
         return None
     kind, parse = known
     try:
-        message = kind.decode(payload)
-        for name in _BOOLEAN_ARRAYS.get(channel, ()):
-            setattr(message, name, list(getattr(message, name)))
-        # lcm-gen's decoder takes negative counts, texts that are cut off and what is left over; no encoder makes them.
-        if message.encode() != payload:
-            return None
-        return parse(message)
-    except (ValueError, OverflowError, IndexError, struct.error):
+        return parse(kind.decode(payload))
+    except (ValueError, OverflowError, IndexError):
         return None
-
-
-# lcm-gen's decoder makes iterators of them, which its encoder cannot take.
-_BOOLEAN_ARRAYS = {"CAMAC_REPLY": ("x", "q")}
-_STATE_FINGERPRINT: bytes = messages.mcu_state_t._get_packed_fingerprint()
 
 
 def run_of(channel: str, payload: bytes) -> int | None:
     """Which run of the daemon a STATE is of, from its first fields alone."""
-    if channel != "STATE" or len(payload) < 24 or payload[:8] != _STATE_FINGERPRINT:
+    if channel != "STATE" or len(payload) < 24 or payload[:8] != messages.mcu_state_t.FINGERPRINT:
         return None
     return int.from_bytes(payload[16:24], "big", signed=True)
 
@@ -168,20 +144,34 @@ def at(utime_us: int) -> datetime.datetime:
     return EPOCH + datetime.timedelta(microseconds=utime_us)
 
 
-def finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise ValueError(f"{value} is no number that a position or speed can be")
-    return value
-
-
 def precision(decimals: int) -> int:
     if not 0 <= decimals <= MAX_DECIMALS:
         raise ValueError("no number of decimals")
     return decimals
 
 
+@functools.cache
+def _names(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(kind))
+
+
+def made(kind: Callable[..., T], message: Any, **others: Any) -> T:
+    """One of `model`: what is not among `others` is what the message has by that name. Arrays become tuples."""
+    for name in _names(kind):
+        if name not in others:
+            value = getattr(message, name)
+            others[name] = tuple(value) if isinstance(value, list) else value
+    return kind(**others)
+
+
+def made_of_columns(kind: Callable[..., T], message: Any, **others: Any) -> tuple[T, ...]:
+    """One for each place of arrays of one length, of which `others` names those that have another name, or holds the values."""
+    columns = [others.get(name, name) for name in _names(kind)]
+    return tuple(kind(*row) for row in zip(*(getattr(message, one) if isinstance(one, str) else one for one in columns)))
+
+
 def table_ref(message: Any) -> model.TableRef:
-    return model.TableRef(message.name, max(message.revision, 0), message.hash)
+    return made(model.TableRef, message, revision=max(message.revision, 0))
 
 
 def _reply(message: Any, detail: Detail) -> Reply:
@@ -190,17 +180,8 @@ def _reply(message: Any, detail: Detail) -> Reply:
     if not 0 <= header.part < header.parts <= MAX_PARTS:
         raise ValueError("no such part")
     is_result = phase is Phase.RESULT
-    return Reply(
-        session=header.session,
-        client_id=header.client_id,
-        number=header.number,
-        phase=phase,
-        reason=header.reason,
-        outcome=model.Outcome(header.outcome) if is_result else None,
-        part=header.part,
-        parts=header.parts,
-        detail=detail if is_result else Detail(),
-    )
+    outcome = model.Outcome(header.outcome) if is_result else None
+    return made(Reply, header, phase=phase, outcome=outcome, detail=detail if is_result else Detail())
 
 
 def _answer(message: Any) -> Reply:
@@ -208,103 +189,57 @@ def _answer(message: Any) -> Reply:
     for index in message.table_of_motor:
         if index < 0:
             raise ValueError("no such table")
-    motors = tuple(
-        model.MotorResult(
-            motor=name,
-            outcome=model.Outcome(message.outcomes[i]),
-            position=message.user_positions[i],
-            dial=message.dial_positions[i],
-            position_steps=message.position_steps[i],
-            unit=message.units[i],
-            precision=precision(message.precisions[i]),
-            table=tables[message.table_of_motor[i]],
-            asked_by=message.asked_by[i],
-            legs=message.legs[i],
-            most_steps_per_s=message.most_steps_per_s[i],
-        )
-        for i, name in enumerate(message.motors)
+    motors = made_of_columns(
+        model.MotorResult,
+        message,
+        motor="motors",
+        outcome=[model.Outcome(word) for word in message.outcomes],
+        position="user_positions",
+        dial="dial_positions",
+        unit="units",
+        precision=[precision(decimals) for decimals in message.precisions],
+        table=[tables[index] for index in message.table_of_motor],
     )
     return _reply(message, Detail(motors=motors, plan=_plan(message.plan[0]) if message.plan else None))
 
 
 def _plan(message: Any) -> model.MovePlan:
-    counted = message.frames >= 0
-    return model.MovePlan(
+    durations_s = [us / 1e6 for us in message.motor_duration_us]
+    return made(
+        model.MovePlan,
+        message,
         duration_s=message.duration_us / 1e6,
-        ticks=message.ticks,
-        frames=message.frames if counted else None,
-        bytes=message.bytes if counted else None,
+        frames=message.frames if message.frames >= 0 else None,
+        bytes=message.bytes if message.frames >= 0 else None,
         limited_by=message.limited_by or None,
         points_s=tuple(us * 1e-6 for us in message.points_us),
-        legs=tuple(
-            model.PlannedLeg(name, steps, duration_us / 1e6, peak)
-            for name, steps, duration_us, peak in zip(
-                message.motors, message.steps, message.motor_duration_us, message.peak_steps_per_s
-            )
-        ),
+        legs=made_of_columns(model.PlannedLeg, message, motor="motors", duration_s=durations_s),
     )
 
 
 def _table_answer(message: Any) -> Reply:
-    entries = tuple(
-        model.TableEntry(
-            entry.name, table_ref(entry.table), entry.fault, entry.codes, entry.start_steps_per_s, entry.max_steps_per_s
-        )
-        for entry in message.entries
-    )
-    tables = tuple(
-        model.Table(
-            name=table.name,
-            time_unit_ns=table.time_unit_ns,
-            accel=tuple(table.accel),
-            decel=tuple(table.decel),
-            cruise=table.cruise,
-            description=table.description,
-            revision=table.revision,
-            hash=table.hash,
-        )
-        for table in message.tables
-    )
-    return _reply(message, Detail(entries=entries, tables=tables))
+    entries = tuple(made(model.TableEntry, entry, table=table_ref(entry.table)) for entry in message.entries)
+    return _reply(message, Detail(entries=entries, tables=tuple(made(model.Table, table) for table in message.tables)))
 
 
 def _history_answer(message: Any) -> Reply:
-    motions = tuple(
-        model.PastMotion(
-            at=at(motion.utime_us),
-            what=motion.what,
-            who=motion.who,
-            from_steps=motion.from_steps,
-            to_steps=motion.to_steps,
-            outcome=motion.outcome,
-            reason=motion.reason,
-            from_text=motion.from_text,
-            to_text=motion.to_text,
-        )
-        for motion in message.motions
-    )
+    motions = tuple(made(model.PastMotion, motion, at=at(motion.utime_us)) for motion in message.motions)
     return _reply(message, Detail(motions=motions))
 
 
 def _configuration_answer(message: Any) -> Reply:
-    settings = tuple(
-        model.Setting(*words)
-        for words in zip(message.setting_motors, message.keys, message.values, message.values_in_file)
-    )
-    return _reply(message, Detail(configuration=model.Configuration(message.path, message.sha256, settings)))
+    settings = made_of_columns(model.Setting, message, motor="setting_motors", key="keys", value="values", in_file="values_in_file")
+    return _reply(message, Detail(configuration=made(model.Configuration, message, settings=settings)))
 
 
 def _camac_answer(message: Any) -> Reply:
-    responses = tuple(
-        model.CamacResponse(bool(x), bool(q), data) for x, q, data in zip(message.x, message.q, message.data)
-    )
-    return _reply(message, Detail(camac=model.CamacResult(responses, message.tally, message.requests)))
+    return _reply(message, Detail(camac=made(model.CamacResult, message, responses=made_of_columns(model.CamacResponse, message))))
 
 
 def _welcome(message: Any) -> Welcome:
     if message.session == 0:
         raise ValueError("no session")
-    return Welcome(message.client_id, message.nonce, message.run, message.session)
+    return made(Welcome, message)
 
 
 def _state(message: Any) -> State:
@@ -318,7 +253,7 @@ def _state(message: Any) -> State:
         at(motor.heard_utime_us)
         for value in (motor.user_position, motor.dial_position, motor.user_target, motor.velocity_steps_per_s):
             finite(value)
-    return State(message.run, message.sequence, message.utime_us, message.part, message.parts, message)
+    return made(State, message, content=message)
 
 
 def _description(message: Any) -> Description:
@@ -326,34 +261,24 @@ def _description(message: Any) -> Description:
         precision(motor.precision)
         for value in (motor.offset, motor.user_low, motor.user_high):
             finite(value)
-    return Description(message.run, message.sequence, message.utime_us, message.part, message.parts, message)
+    return made(Description, message, content=message)
 
 
 _UNBOUNDED = 2**63 - 1
 
 
 def _health(message: Any) -> Health:
-    bus = model.BusHealth(
-        bus=message.bus,
-        port_state=message.port_state,
-        two_masters=message.two_masters,
-        crc_errors=message.crc_errors,
-        stray_frames=message.stray_frames,
-        recent_latency_us=message.recent_latency_us,
-        latency=tuple(
-            (None if below == _UNBOUNDED else below, answers)
-            for below, answers in zip(message.latency_below_us, message.latency_answers)
-        ),
-        mcus=tuple(_mcu_health(mcu) for mcu in message.mcus),
+    latency = tuple(
+        (None if below == _UNBOUNDED else below, answers)
+        for below, answers in zip(message.latency_below_us, message.latency_answers)
     )
-    return Health(0, message.sequence, message.utime_us, message.part, message.parts, bus)
+    bus = made(model.BusHealth, message, latency=latency, mcus=tuple(_mcu_health(mcu) for mcu in message.mcus))
+    return made(Health, message, run=0, content=bus)
 
 
 def _mcu_health(message: Any) -> model.McuHealth:
-    values = {field.name: getattr(message, field.name) for field in dataclasses.fields(model.McuHealth)}
-    if message.low_water_ticks < 0:
-        values["low_water_ticks"] = None
-    return model.McuHealth(**values)
+    queued = message.low_water_ticks
+    return made(model.McuHealth, message, low_water_ticks=queued if queued >= 0 else None)
 
 
 _DECODERS: dict[str, tuple[Any, Callable[[Any], Message]]] = {

@@ -84,8 +84,7 @@ class Driver:
     def _send_subscription(self, wanted: bool) -> None:
         if self.session.loses:
             return  # all hear all
-        message = messages.subscribe_t()
-        message.state = message.description = message.health = wanted
+        message = messages.subscribe_t(state=wanted, description=wanted, health=wanted)
         self.send(("SUBSCRIBE", message.encode()))
 
     def _on_readable(self) -> None:

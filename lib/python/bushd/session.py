@@ -139,7 +139,7 @@ class Session:
 
         `remedy`: what has to be there for a daemon to answer, for errors.
         """
-        self.client_id = codec.text(client_id)
+        self.client_id = messages.text(client_id)
         self.loses = loses
         self._remedy = remedy
         self._prefix = prefix
@@ -345,10 +345,7 @@ class Session:
             if now < self._next_hello or now >= max(exchange.give_up for exchange in waiting):
                 return []
             self._next_hello = now + self._timing.resend_every_s
-            hello = messages.hello_t()
-            hello.utime_us = self._utime_us()
-            hello.client_id = self.client_id
-            hello.nonce = self._nonce
+            hello = messages.hello_t(utime_us=self._utime_us(), client_id=self.client_id, nonce=self._nonce)
             return [("HELLO", codec.encode(hello))]
         if now < self._settled_at:
             return []
@@ -368,12 +365,8 @@ class Session:
         exchange.packet = self._encode(exchange.request, exchange.session, exchange.number)
 
     def _encode(self, request: Request, session: int, number: int) -> Packet:
-        header = messages.request_t()
-        header.utime_us = self._utime_us()
-        header.session = session
-        header.client_id = self.client_id
-        header.number = number
-        request.message.request = header
+        who = {"session": session, "client_id": self.client_id, "number": number}
+        request.message.request = messages.request_t(utime_us=self._utime_us(), **who)
         return request.channel, codec.encode(request.message)
 
     def _forget_session(self, session: int) -> None:

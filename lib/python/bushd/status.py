@@ -93,15 +93,13 @@ class StatusCollector:
 
 
 def _mcu(state: Any, description: Any) -> model.Mcu:
-    return model.Mcu(
+    return codec.made(
+        model.Mcu,
+        state,
         name=state.mcu,
-        bus=state.bus,
-        address=description.address,
         state=model.McuState(state.state),
-        detail=state.detail,
         inputs=frozenset(state.inputs.split()),
-        boot_number=state.boot_number,
-        tick=state.tick,
+        address=description.address,
         tick_ns=description.tick_ns,
         emergency_stop=description.emergency_stop,
         port=description.port,
@@ -111,34 +109,23 @@ def _mcu(state: Any, description: Any) -> model.Mcu:
 def _motor(state: Any, description: Any, mcu: str) -> model.Motor:
     trust = model.Trust(state.trust)
     known = trust is not model.Trust.UNKNOWN
-    return model.Motor(
-        name=state.name,
+    return codec.made(
+        model.Motor,
+        state,
         position=state.user_position if known else None,
         dial=state.dial_position if known else None,
         position_steps=state.position_steps if known else None,
         target=state.user_target if known else None,
         target_steps=state.target_steps if known else None,
-        unit=description.unit,
-        velocity_steps_per_s=state.velocity_steps_per_s,
-        moving=state.moving,
         activity=model.Activity(state.activity),
-        enabled=state.enabled,
         switch=state.input,
         inputs=frozenset(state.inputs.split()),
         inhibited=model.Inhibited(state.inhibited),
         trust=trust,
-        uncertain_reason=state.uncertain_reason,
         heard_at=codec.at(state.heard_utime_us) if trust is model.Trust.STALE else None,
-        paused=state.paused,
-        held=state.held,
-        armed_by=state.armed_by,
         line=model.LineState(state.line_fraction, state.line_left_s) if state.on_line else None,
         mcu=mcu,
-        output=description.output,
-        group=description.group,
         table=codec.table_ref(description.table),
-        description=description.description,
-        steps_per_unit=description.steps_per_unit,
-        precision=description.precision,
         soft_limits=(description.user_low, description.user_high) if description.soft_limits else None,
+        **{name: getattr(description, name) for name in ("unit", "output", "group", "description", "steps_per_unit", "precision")},
     )
