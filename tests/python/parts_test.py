@@ -8,7 +8,7 @@ import tempfile
 import unittest
 from unittest import mock
 
-from bushd import NoDaemon, Trust, aio, arguments, client, codec, messages, motion, requests, session, udpm
+from bushd import NoDaemon, Trust, aio, arguments, client, codec, messages, motion, moving, requests, session, udpm
 from bushd.status import StatusCollector
 
 
@@ -236,7 +236,7 @@ class Arguments(unittest.TestCase):
             requests.follow(["a"], [0], [[0], [1]], array=1)
 
     def test_every_request_of_the_daemon_can_be_made(self):
-        made = inspect.getsource(requests) + inspect.getsource(session) + inspect.getsource(aio)
+        made = "".join(inspect.getsource(module) for module in (requests, session, aio, moving))
         asked = [name for name in dir(messages) if "request" in getattr(getattr(messages, name), "__slots__", ())]
         self.assertGreater(len(asked), 20)
         for name in asked:

@@ -10,7 +10,7 @@
 """
 
 from . import aio
-from .client import Client, connect
+from .client import Client, Jog, Motion, Tables, connect
 from .errors import (
     BushdError,
     MoveFailed,
@@ -21,7 +21,6 @@ from .errors import (
     TwoDaemons,
     UnknownMotor,
 )
-from .handles import Jog, Motion, Tables
 from .model import (
     Activity,
     BusHealth,

@@ -9,6 +9,7 @@ import secrets
 import socket
 import sys
 from collections.abc import Mapping
+from typing import Any
 
 from . import model
 from .errors import MoveFailed, RequestFailed, UnknownMotor
@@ -40,6 +41,11 @@ class Amounts:
     @property
     def in_steps(self) -> bool:
         return self.unit == STEPS
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """As arguments of requests."""
+        return {"amounts": self.values, "absolute": self.absolute, "in_steps": self.in_steps}
 
 
 def amounts(

@@ -1,4 +1,4 @@
-"""The asyncio loop of the blocking client, in a thread."""
+"""The asyncio loop of the blocking client, in a thread, and what waits for it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import asyncio
 import atexit
 import concurrent.futures
 import threading
-from collections.abc import Coroutine
-from typing import Any, TypeVar
+from collections.abc import AsyncIterator, Coroutine, Iterator
+from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
 
@@ -52,6 +52,15 @@ class Loop:
 
         return self.run(calls())
 
+    def iterate(self, values: AsyncIterator[T]) -> Iterator[T]:
+        """What comes, as long as it is asked for."""
+        try:
+            while True:
+                yield self.run(anext(values))  # type: ignore[arg-type]  # it is a coroutine
+        finally:
+            if not self.closed:
+                self.run(values.aclose())  # type: ignore[attr-defined]
+
     def close(self) -> None:
         if self.closed:
             return
@@ -60,3 +69,11 @@ class Loop:
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
+
+
+class Blocking(Generic[T]):
+    """Waits for what one of the classes for asyncio does."""
+
+    def __init__(self, loop: Loop, awaited: T) -> None:
+        self._loop = loop
+        self._awaited = awaited

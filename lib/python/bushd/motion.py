@@ -40,7 +40,7 @@ async def end(driver: Driver, exchange: Exchange, ending: Request) -> None:
 
 
 class Motion:
-    """A motion that the daemon was asked for: a move, a homing, or moves that wait for the trigger."""
+    """A motion under way, of `move(..., wait=False)`, `home(..., wait=False)`, `arm()` and `arm_line()`."""
 
     def __init__(self, driver: Driver, exchange: Exchange, names: list[str]) -> None:
         self._driver = driver
@@ -65,18 +65,18 @@ class Motion:
         return self
 
     async def wait(self, *, check: bool = True) -> model.MoveResult:
-        """Its result. Cancelled, it ramps the motors down. Raises MoveFailed (with `check`), and all of `accepted`."""
+        """Its result, once all motors stand. Cancelled, it ramps them down. Raises MoveFailed, ResultUnknown."""
         await finish(self._driver, self._exchange, requests.stop(self._names))
         return arguments.move_result_of(self._exchange, check)
 
     async def stop(self) -> model.MoveResult:
-        """Ramps its motors down. Returns once they stand."""
+        """Ramps its motors down. Returns the result once they stand."""
         await end(self._driver, self._exchange, requests.stop(self._names))
         return await self.wait(check=False)
 
 
 class Jog:
-    """A motor that moves on at a speed, while the block runs: `async with client.jog("theta", 2.0) as jog:`."""
+    """A motor that moves on, of `Client.jog()`."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class Jog:
 
     @property
     def result(self) -> model.MoveResult:
-        """Once it is done. Raises ResultUnknown, NoDaemon."""
+        """How it has ended, once it is done. Raises ResultUnknown, NoDaemon."""
         if self._exchange is None or not self._exchange.over:
             raise BushdError(f"{self._name}: the jog has not ended")
         return arguments.move_result_of(self._exchange, check=False)
@@ -133,7 +133,7 @@ class Jog:
         arguments.result_of(exchange, check=True)
 
     async def end(self, *, steps_after: int | None = None) -> model.MoveResult:
-        """Ramps the motor down, or lets it end so many steps on. Returns once it stands."""
+        """Ramps the motor down, or lets it end so many steps (0 to 2^31 - 1) on. Returns once it stands."""
         exchange = self._exchange
         if exchange is None:
             raise BushdError(f"{self._name}: the jog has not begun")
