@@ -13,6 +13,10 @@ ACCEPTED, REFUSED, RESULT = (messages.reply_header_t.ACCEPTED, messages.reply_he
 TIMING = Timing()
 
 
+def move(amounts, in_steps=False):
+    return requests.ask("MOVE", **requests.way(amounts, True, in_steps))
+
+
 def reply(request, phase, outcome="", reason="", part=0, parts=1, session=None):
     header = messages.reply_header_t()
     header.session = request.session if session is None else session
@@ -100,7 +104,7 @@ class Daemon:
         return self.sent[-1][1].request
 
     def begin(self, request=None):
-        request = request or requests.move({"m1": 1.0}, absolute=True, in_steps=False)
+        request = request or move({"m1": 1.0})
         exchange = self.session.begin(request, self.now)
         self.poll()
         return exchange
@@ -159,16 +163,16 @@ class OverASocket(unittest.TestCase):
 
     def test_what_does_not_fit_a_message_is_an_error_of_the_caller(self):
         with self.assertRaises(ValueError):
-            self.daemon.begin(requests.move({"m1": 2**63}, absolute=True, in_steps=True))
+            self.daemon.begin(move({"m1": 2**63}, in_steps=True))
         with self.assertRaises(ValueError):
-            self.daemon.begin(requests.move({"m": 1.0, "n" * 70_000: 1.0}, absolute=True, in_steps=False))
+            self.daemon.begin(move({"m": 1.0, "n" * 70_000: 1.0}))
         for wrong in ({"m\0": 1.0}, {"m": float("nan")}, {}):
             with self.assertRaises(ValueError):
-                requests.move(wrong, absolute=True, in_steps=False)
+                move(wrong)
         for wrong in (1.5, float("inf")):
             with self.assertRaises(ValueError):
-                requests.move({"m": wrong}, absolute=True, in_steps=True)
-        self.assertEqual(requests.move({"m": 4.0}, absolute=True, in_steps=True).message.motors[0].steps, 4)
+                move({"m": wrong}, in_steps=True)
+        self.assertEqual(move({"m": 4.0}, in_steps=True).message.motors[0].steps, 4)
         self.assertEqual(self.daemon.sent, [])
 
 
@@ -325,7 +329,7 @@ class ExactlyOnce(unittest.TestCase):
         chance = random.Random(seed)
         daemon = Daemon(loses=True, timing=Timing(answer_within_s=60.0, silence_limit_s=1000.0))
         carried_out, answers, on_the_way = [], {}, []
-        exchanges = [daemon.session.begin(requests.move({f"m{i}": 1.0}, absolute=False, in_steps=False), daemon.now)
+        exchanges = [daemon.session.begin(move({f"m{i}": 1.0}), daemon.now)
                      for i in range(5)]
         kinds = {"MOVE": messages.move_t, "HELLO": messages.hello_t}
         for _ in range(3000):
@@ -400,7 +404,7 @@ class HostileBytes(unittest.TestCase):
         chance = random.Random(1985)
         session = Session("me", loses=True, remedy="", random_number=lambda: 7)
         query = session.begin_status(0.0, 1.0)
-        session.begin(requests.move({"m1": 1.0}, absolute=True, in_steps=False), 0.0)
+        session.begin(move({"m1": 1.0}), 0.0)
         extremes = [b"\xff\xff\xff\xff", b"\x80\0\0\0", b"\x7f\xff\xff\xff", b"\0\0\0\0"]
         for channel, payload in self.valid().items():
             for _ in range(1500):

@@ -13,11 +13,12 @@ import types
 from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Iterable, Mapping
 from typing import overload
 
-from . import arguments, model, requests
+from . import arguments, messages, model, requests
 from .asking import there
 from .links import DEFAULT_PREFIX, Link, open_link
 from .motion import Jog, Motion
 from .moving import Moving
+from .requests import ask
 from .session import Timing
 from .status import StatusCollector
 
@@ -159,23 +160,24 @@ class Client(Moving):
         unit it sets the position, which is KNOWN then.
         """
         wanted = await self._amounts(motors, position, None, unit)
-        return await self._result(requests.set_position(wanted.values, in_steps=wanted.in_steps, dial=dial), check)
+        motor_amounts = requests.motor_amounts(wanted.values, wanted.in_steps)
+        return await self._result(ask("SET_POSITION", motors=motor_amounts, dial=dial), check)
 
     async def confirm(self, *names: str, check: bool = True) -> model.Result:
         """Says that the positions of these motors (at least one), at rest, are right as shown: they are KNOWN."""
-        return await self._result(requests.of_motors("CONFIRM", names), check)
+        return await self._result(ask("CONFIRM", motors=names), check)
 
     async def enable(self, *names: str, check: bool = True) -> model.Result:
         """Enables the drivers of the MCUs of these motors; none named: of all."""
-        return await self._result(requests.of_motors("ENABLE", names), check)
+        return await self._result(ask("ENABLE", motors=names), check)
 
     async def disable(self, *names: str, check: bool = True) -> model.Result:
         """Disables them. Refused while one of their motors moves."""
-        return await self._result(requests.of_motors("DISABLE", names), check)
+        return await self._result(ask("DISABLE", motors=names), check)
 
     async def clear(self, *names: str, check: bool = True) -> model.Result:
         """Clears faults, and a latched emergency stop, of the MCUs of these motors; none named: of all."""
-        return await self._result(requests.of_motors("CLEAR_FAULTS", names), check)
+        return await self._result(ask("CLEAR_FAULTS", motors=names), check)
 
     async def position_compare(
         self,
@@ -195,8 +197,11 @@ class Client(Moving):
         delay_us: from the step to the pulse, 0 to 1500000. width_us: of the pulse, 1 to 1000000.
         """
         in_steps = await self._in_steps({name: position}, unit)
-        how: requests.Fields = {"positive": positive, "negative": negative, "delay_us": delay_us, "width_us": width_us}
-        return await self._result(requests.position_compare(name, position, in_steps=in_steps, **how), check)
+        kind = messages.position_compare_t
+        arrivals = (kind.POSITIVE if positive else 0) | (kind.NEGATIVE if negative else 0)
+        amount = requests.motor_amount(name, position, in_steps)
+        request = ask("POSITION_COMPARE", position=amount, arrivals=arrivals, delay_us=delay_us, width_us=width_us)
+        return await self._result(request, check)
 
     async def config(
         self,
@@ -232,12 +237,12 @@ class Client(Moving):
         if changes and name is not None:
             request = requests.change_configuration(name, changes)
         else:
-            request = requests.show_configuration([] if name is None else [name])
+            request = ask("CONFIGURE", kind="SHOW", motors=[] if name is None else [name], repeatable=True)
         return there((await self._ask(request)).detail.configuration)
 
     async def history(self, name: str, most: int = 20) -> list[model.PastMotion]:
         """What has moved this motor, the newest first; `most` 1 to 1000. Refused without a state store."""
-        return list((await self._ask(requests.history(name, most))).detail.motions)
+        return list((await self._ask(ask("GET_HISTORY", motor=name, most=most, repeatable=True))).detail.motions)
 
     async def camac(
         self,
@@ -265,11 +270,11 @@ class Tables:
 
     async def list(self) -> tuple[model.TableEntry, ...]:
         """All of them; invalid ones with their fault."""
-        return (await self._client._ask(requests.list_tables())).detail.entries
+        return (await self._client._ask(ask("LIST_TABLES", repeatable=True))).detail.entries
 
     async def get(self, name: str) -> model.Table:
         """What its file says. name: NAME, NAME@REVISION or NAME@TAG."""
-        tables = (await self._client._ask(requests.get_table(name))).detail.tables
+        tables = (await self._client._ask(ask("GET_TABLE", table=name, repeatable=True))).detail.tables
         return there(tables[0] if tables else None)
 
     async def set(self, name: str, table: model.Table) -> model.TableEntry:
@@ -278,16 +283,19 @@ class Tables:
         table: what `get()` has returned, changed by `dataclasses.replace`; refused if the table has changed since. With
         hash "" it is a new one.
         """
-        entries = (await self._client._ask(requests.set_table(name, table))).detail.entries
+        said = ("name", "description", "revision", "time_unit_ns", "cruise", "accel", "decel")
+        content = messages.table_t(**{field: getattr(table, field) for field in said})
+        request = ask("SET_TABLE", table=name, expected_hash=table.hash, content=content)
+        entries = (await self._client._ask(request)).detail.entries
         return there(entries[0] if entries else None)
 
     async def use(self, group: str, table: str, *, check: bool = True) -> model.Result:
         """Gives a group this table (NAME, NAME@REVISION or NAME@TAG), from its next move on."""
-        return await self._client._result(requests.use_table(group, table), check)
+        return await self._client._result(ask("USE_TABLE", group=group, table=table), check)
 
     async def reload(self, *, check: bool = True) -> model.Result:
         """Reads the tables of all groups again."""
-        return await self._client._result(requests.reload_tables(), check)
+        return await self._client._result(ask("RELOAD_TABLES"), check)
 
 
 __all__ = ["Client", "Connecting", "Jog", "Motion", "Tables", "connect"]

@@ -9,7 +9,7 @@ from . import arguments, model, requests
 from .arguments import Amount
 from .asking import Asking
 from .motion import Jog, Motion
-from .requests import Fields, Names, Rows
+from .requests import Fields, Names, Rows, ask, motor_amounts, trigger, way, with_duration, with_speed
 
 
 class Moving(Asking):
@@ -49,7 +49,7 @@ class Moving(Asking):
         A motor that moves is given a new target. Raises MoveFailed if a motor has not reached its target.
         """
         wanted = await self._amounts(motors, to, by, unit)
-        return await self._moved([requests.move(**wanted.how, speed=speed)], list(wanted.values), wait, check)
+        return await self._moved([ask("MOVE", **way(**wanted.how, speed=speed))], list(wanted.values), wait, check)
 
     async def plan(
         self,
@@ -62,7 +62,7 @@ class Moving(Asking):
     ) -> model.MovePlan:
         """What such a `move()` would be: how long, how fast, how much on the line. Nothing moves; of motors at rest."""
         wanted = await self._amounts(motors, to, by, unit)
-        return await self._planned([requests.move(**wanted.how, speed=speed, dry_run=True)])
+        return await self._planned([ask("MOVE", **way(**wanted.how, speed=speed), dry_run=True)])
 
     @overload
     async def move_line(self, motors: Mapping[str, float] | None = None, *, to: Mapping[str, float] | None = None,
@@ -95,7 +95,7 @@ class Moving(Asking):
         All else as of `move()`.
         """
         wanted = await self._amounts(motors, to, by, unit)
-        request = requests.move_line(**wanted.how, speed=speed, duration_s=duration_s)
+        request = ask("MOVE_LINE", **way(**wanted.how, speed=speed), **with_duration(duration_s))
         return await self._moved([request], list(wanted.values), wait, check)
 
     async def plan_line(
@@ -110,7 +110,8 @@ class Moving(Asking):
     ) -> model.MovePlan:
         """What such a `move_line()` would be. Nothing moves; of motors at rest."""
         wanted = await self._amounts(motors, to, by, unit)
-        return await self._planned([requests.move_line(**wanted.how, speed=speed, duration_s=duration_s, dry_run=True)])
+        how = {**way(**wanted.how, speed=speed), **with_duration(duration_s)}
+        return await self._planned([ask("MOVE_LINE", **how, dry_run=True)])
 
     @overload
     async def move_path(self, motors: Names, points: Rows, *, exact: bool = False, speed: float | None = None,
@@ -219,7 +220,7 @@ class Moving(Asking):
         if bool(names) == bool(all):
             raise TypeError("name the motors to home, or write all=True")
         in_steps = await self._in_steps({name: 0.0 for name in names}, unit)
-        request = requests.home(names, every=all, speed=speed, in_steps=in_steps)
+        request = ask("HOME", motors=names, all=all, **with_speed(speed, in_steps))
         return await self._moved([request], list(names), wait, check)
 
     async def arm(
@@ -239,8 +240,8 @@ class Moving(Asking):
         ended; with `while_connected` they are disarmed when this client closes or its program ends (not over LCM).
         """
         in_steps = await self._in_steps(motors, unit)
-        how: Fields = {"edge": edge, "delay_us": delay_us, "speed": speed, "while_connected": while_connected}
-        return await self._accepted(requests.arm(motors, in_steps=in_steps, **how), list(motors))
+        how = {**trigger(edge, delay_us, while_connected), **with_speed(speed, in_steps)}
+        return await self._accepted(ask("ARM", **how, motors=motor_amounts(motors, in_steps)), list(motors))
 
     async def arm_line(
         self,
@@ -260,12 +261,12 @@ class Moving(Asking):
         For MCUs that make the line themselves; refused where they cannot. All else as of `arm()`.
         """
         wanted = await self._amounts(motors, to, by, unit)
-        how: Fields = {"edge": edge, "delay_us": delay_us, "speed": speed, "while_connected": while_connected}
-        return await self._accepted(requests.arm_line(**wanted.how, **how, duration_s=duration_s), list(wanted.values))
+        how = {**trigger(edge, delay_us, while_connected), **with_duration(duration_s)}
+        return await self._accepted(ask("ARM_LINE", **how, **way(**wanted.how, speed=speed)), list(wanted.values))
 
     async def disarm(self, *names: str, check: bool = True) -> model.Result:
         """Ends the wait for the trigger of these motors, and of all armed with them; none named: of all."""
-        return await self._result(requests.of_motors("DISARM", names), check)
+        return await self._result(ask("DISARM", motors=names), check)
 
     def jog(
         self, name: str, speed: float, *, unit: str | None = None, keepalive_ms: int = 500, check: bool = True
@@ -303,22 +304,22 @@ class Moving(Asking):
 
     async def emergency_stop(self, *, check: bool = True) -> model.Result:
         """Stops all motors of all buses at once, until `clear()`."""
-        return await self._result(requests.emergency_stop(), check)
+        return await self._result(ask("EMERGENCY_STOP", repeatable=True), check)
 
     async def pause(self, *names: str, check: bool = True) -> model.Result:
         """Ramps down these motors, or those of these groups, and keeps their targets; none named: all.
 
         Their moves stay open until `resume()`, a stop or a new target."""
-        return await self._result(requests.of_motors("PAUSE", names), check)
+        return await self._result(ask("PAUSE", motors=names), check)
 
     async def resume(self, *names: str, check: bool = True) -> model.Result:
         """Lets paused motors, or those of these groups, go on to their targets; none named: all."""
-        return await self._result(requests.of_motors("RESUME", names), check)
+        return await self._result(ask("RESUME", motors=names), check)
 
     async def hold(self, *names: str, check: bool = True) -> model.Result:
         """Refuses motions of these motors or groups (none named: all) until `release()`; what is under way goes on."""
-        return await self._result(requests.of_motors("HOLD", names), check)
+        return await self._result(ask("HOLD", motors=names), check)
 
     async def release(self, *names: str, check: bool = True) -> model.Result:
         """Allows motions of motors or groups that are held; none named: of all."""
-        return await self._result(requests.of_motors("RELEASE", names), check)
+        return await self._result(ask("RELEASE", motors=names), check)

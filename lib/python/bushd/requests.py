@@ -1,4 +1,4 @@
-"""All that can be asked of the daemon, as requests of `session`: one function each.
+"""What can be asked of the daemon, as requests of `session`: any message by `ask()`, and by functions what takes more than that.
 
 Names of motors and numbers go as they come; the daemon resolves them, checks every range, and refuses with a reason.
 """
@@ -32,53 +32,6 @@ def ask(channel: str, *, repeatable: bool = False, **fields: Any) -> Request:
     return Request(channel, kind(**fields), repeatable)
 
 
-def move(
-    amounts: Amounts, *, absolute: bool, in_steps: bool, speed: float | None = None, dry_run: bool = False
-) -> Request:
-    return ask("MOVE", **_way(amounts, absolute, in_steps, speed), dry_run=dry_run)
-
-
-def move_line(
-    amounts: Amounts,
-    *,
-    absolute: bool,
-    in_steps: bool,
-    speed: float | None = None,
-    duration_s: float | None = None,
-    dry_run: bool = False,
-) -> Request:
-    way = _way(amounts, absolute, in_steps, speed)
-    return ask("MOVE_LINE", **way, **_duration(duration_s), dry_run=dry_run)
-
-
-def arm(
-    amounts: Amounts,
-    *,
-    in_steps: bool,
-    edge: str = "rising",
-    delay_us: int = 50,
-    speed: float | None = None,
-    while_connected: bool = False,
-) -> Request:
-    how: Fields = {"motors": _amounts(amounts, in_steps), **_speed(speed, in_steps)}
-    return ask("ARM", **how, edge=_edge(edge), delay_us=delay_us, while_connected=while_connected)
-
-
-def arm_line(
-    amounts: Amounts,
-    *,
-    absolute: bool,
-    in_steps: bool,
-    edge: str = "rising",
-    delay_us: int = 50,
-    speed: float | None = None,
-    duration_s: float | None = None,
-    while_connected: bool = False,
-) -> Request:
-    how = {**_way(amounts, absolute, in_steps, speed), **_duration(duration_s)}
-    return ask("ARM_LINE", **how, edge=_edge(edge), delay_us=delay_us, while_connected=while_connected)
-
-
 def move_path(
     motors: Names,
     points: Rows,
@@ -94,7 +47,7 @@ def move_path(
     if limits and len(limits) != len(rows):
         raise ValueError(f"{len(limits)} speeds for {len(rows)} points")
     corners = "EXACT" if exact else "CONTINUOUS"
-    how: Fields = {"motors": _named(names), "corners": corners, "dry_run": dry_run, **_speed(speed, in_steps)}
+    how: Fields = {"motors": named(names), "corners": corners, "dry_run": dry_run, **with_speed(speed, in_steps)}
     return [
         ask(
             "MOVE_PATH",
@@ -115,7 +68,7 @@ def follow(
     names, rows, times = list(motors), [list(row) for row in positions], list(time_s)
     if len(times) != len(rows):
         raise ValueError(f"{len(times)} times for {len(rows)} rows")
-    how: Fields = {"motors": _named(names), "array": array, "cubic": cubic, "stretch": stretch}
+    how: Fields = {"motors": named(names), "array": array, "cubic": cubic, "stretch": stretch}
 
     def part(kind: str, first: int, some: list[list[float]]) -> Request:
         return ask("FOLLOW", **how, part=kind, time_s=times[first : first + len(some)], positions=_in_a_row(some))
@@ -140,10 +93,6 @@ def _in_a_row(rows: list[list[float]]) -> list[float]:
     return [position for row in rows for position in row]
 
 
-def home(names: Names, *, every: bool = False, speed: float | None = None, in_steps: bool = False) -> Request:
-    return ask("HOME", motors=_named(names), all=every, **_speed(speed, in_steps))
-
-
 def jog(motor: str, speed: float, *, in_steps: bool, keepalive_ms: int, steps_after: int | None = None) -> Request:
     ends = -1 if steps_after is None else steps_after
     return ask("JOG", motor=motor, speed=speed, speed_in_steps=in_steps, keepalive_ms=keepalive_ms, steps_after=ends)
@@ -154,37 +103,7 @@ def renew_jog(motor: str, *, keepalive_ms: int) -> Request:
 
 
 def stop(names: Names) -> Request:
-    return ask("STOP", motors=_named(names), repeatable=True)
-
-
-def emergency_stop() -> Request:
-    return ask("EMERGENCY_STOP", repeatable=True)
-
-
-def set_position(amounts: Amounts, *, in_steps: bool, dial: bool) -> Request:
-    return ask("SET_POSITION", motors=_amounts(amounts, in_steps), dial=dial)
-
-
-def position_compare(
-    motor: str, position: float, *, in_steps: bool, positive: bool, negative: bool, delay_us: int, width_us: int
-) -> Request:
-    kind = messages.position_compare_t
-    arrivals = (kind.POSITIVE if positive else 0) | (kind.NEGATIVE if negative else 0)
-    amount = _amount(motor, position, in_steps)
-    return ask("POSITION_COMPARE", position=amount, arrivals=arrivals, delay_us=delay_us, width_us=width_us)
-
-
-def of_motors(channel: str, names: Names) -> Request:
-    """CONFIRM, ENABLE, DISABLE, CLEAR_FAULTS, DISARM, PAUSE, RESUME, HOLD, RELEASE: those that name motors and nothing else."""
-    return ask(channel, motors=_named(names))
-
-
-def history(motor: str, most: int) -> Request:
-    return ask("GET_HISTORY", motor=motor, most=most, repeatable=True)
-
-
-def show_configuration(names: Names) -> Request:
-    return ask("CONFIGURE", kind="SHOW", motors=_named(names), repeatable=True)
+    return ask("STOP", motors=named(names), repeatable=True)
 
 
 def change_configuration(motor: str, changes: Mapping[str, object]) -> Request:
@@ -225,43 +144,21 @@ def camac(
     )
 
 
-def list_tables() -> Request:
-    return ask("LIST_TABLES", repeatable=True)
-
-
-def get_table(name: str) -> Request:
-    return ask("GET_TABLE", table=name, repeatable=True)
-
-
-def set_table(name: str, table: model.Table) -> Request:
-    said = ("name", "description", "revision", "time_unit_ns", "cruise", "accel", "decel")
-    content = messages.table_t(**{field: getattr(table, field) for field in said})
-    return ask("SET_TABLE", table=name, expected_hash=table.hash, content=content)
-
-
-def use_table(group: str, table: str) -> Request:
-    return ask("USE_TABLE", group=group, table=table)
-
-
-def reload_tables() -> Request:
-    return ask("RELOAD_TABLES")
-
-
 # -- fields of several messages
 
 
-def _way(amounts: Amounts, absolute: bool, in_steps: bool, speed: float | None) -> Fields:
+def way(amounts: Amounts, absolute: bool, in_steps: bool, speed: float | None = None) -> Fields:
     kind = "ABSOLUTE" if absolute else "RELATIVE"
-    return {"motors": _amounts(amounts, in_steps), "kind": kind, **_speed(speed, in_steps)}
+    return {"motors": motor_amounts(amounts, in_steps), "kind": kind, **with_speed(speed, in_steps)}
 
 
-def _amounts(amounts: Amounts, in_steps: bool) -> list[Any]:
+def motor_amounts(amounts: Amounts, in_steps: bool) -> list[Any]:
     if not amounts:
         raise ValueError("no motor is named")
-    return [_amount(motor, value, in_steps) for motor, value in amounts.items()]
+    return [motor_amount(motor, value, in_steps) for motor, value in amounts.items()]
 
 
-def _amount(motor: str, value: float, in_steps: bool) -> Any:
+def motor_amount(motor: str, value: float, in_steps: bool) -> Any:
     how: Fields = {"steps": _whole(motor, value)} if in_steps else {"user": value}
     return messages.motor_amount_t(motor=motor, in_steps=in_steps, **how)
 
@@ -274,7 +171,7 @@ def _whole(motor: str, steps: float) -> int:
     return whole
 
 
-def _speed(speed: float | None, in_steps: bool) -> Fields:
+def with_speed(speed: float | None, in_steps: bool) -> Fields:
     if speed is None:
         return {}
     if finite(float(speed)) <= 0:
@@ -282,7 +179,7 @@ def _speed(speed: float | None, in_steps: bool) -> Fields:
     return {"speed": speed, "speed_in_steps": in_steps}
 
 
-def _duration(duration_s: float | None) -> Fields:
+def with_duration(duration_s: float | None) -> Fields:
     if duration_s is None:
         return {}
     # 0 on the bus of messages is "none".
@@ -291,13 +188,13 @@ def _duration(duration_s: float | None) -> Fields:
     return {"duration_s": duration_s}
 
 
-def _edge(edge: str) -> str:
+def trigger(edge: str, delay_us: int, while_connected: bool) -> Fields:
     if edge not in ("rising", "falling"):
         raise ValueError(f'edge "{edge}": it is "rising" or "falling"')
-    return edge.upper()
+    return {"edge": edge.upper(), "delay_us": delay_us, "while_connected": while_connected}
 
 
-def _named(names: Names) -> list[str]:
+def named(names: Names) -> list[str]:
     if isinstance(names, str):
         raise TypeError(f'a list of names is needed, not the text "{names}"')
     return list(names)
