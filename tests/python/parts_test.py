@@ -8,7 +8,7 @@ import tempfile
 import unittest
 from unittest import mock
 
-from bushd import NoDaemon, Trust, aio, arguments, client, codec, messages, motion, moving, requests, session, udpm
+from bushd import NoDaemon, Trust, aio, arguments, client, codec, messages, motion, requests, udpm
 from bushd.status import StatusCollector
 
 
@@ -234,13 +234,6 @@ class Arguments(unittest.TestCase):
         self.assertTrue(all((part.array, part.cubic, part.motors) == (4, True, ["a"]) for part in made))
         with self.assertRaisesRegex(ValueError, "1 times for 2 rows"):
             requests.follow(["a"], [0], [[0], [1]], array=1)
-
-    def test_every_request_of_the_daemon_can_be_made(self):
-        made = "".join(inspect.getsource(module) for module in (requests, session, aio, moving))
-        asked = [name for name in dir(messages) if "request" in getattr(getattr(messages, name), "__slots__", ())]
-        self.assertGreater(len(asked), 20)
-        for name in asked:
-            self.assertIn('"CAMAC"' if name == "camac_request_t" else f'"{name.removesuffix("_t").upper()}"', made)
 
     def test_both_faces_have_the_same_functions(self):
         pairs = ((client.Client, aio.Client), (client.Tables, aio.Tables), (client.Jog, motion.Jog),

@@ -134,7 +134,7 @@ class Installed(unittest.TestCase):
             self.assertIn("bushd is not running", said)
 
     def test_what_the_client_stands_on(self):
-        for script in ("session_test.py", "parts_test.py"):
+        for script in ("session_test.py", "parts_test.py", "requests_test.py"):
             list(self.in_each(*ISOLATED, HERE / script))
 
     def test_it_moves_motors_of_the_real_daemon(self):
