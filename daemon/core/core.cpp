@@ -20,7 +20,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       tables_(installation_, interlocks_, outputs),
       moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
       idle_drivers_(installation_, outputs,
-                    [this](MotorId motor) { return departures_.holds(motor); }),
+                    [this](MotorId motor) { return waiting_requests_.holds(motor); }),
       homing_(installation_, interlocks_, open_moves_, moves_, kept_, idle_drivers_, outputs),
       travels_(installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs),
       local_inputs_(installation_),
@@ -38,7 +38,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       pseudo_axes_(installation_),
       state_(installation_, pseudo_axes_, open_moves_, outputs),
       line_tables_(installation_, lines_),
-      departures_(
+      waiting_requests_(
           installation_, interlocks_, open_moves_, kept_, idle_drivers_, line_tables_,
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
             carry_out(now_us, asker, request);
@@ -47,7 +47,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
           [this](const api::Request& request) { return would_take(request); }),
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
-                [this](MotorId motor) { return departures_.holds(motor); }),
+                [this](MotorId motor) { return waiting_requests_.holds(motor); }),
       camac_(installation_, interlocks_, open_moves_, tables_, travels_, kept_, outputs,
              [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
                this->request(now_us, logged(asker, request, outputs_), request);
@@ -68,7 +68,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 &while_connected_,
                 &position_compare_,
                 &tables_,
-                &departures_,
+                &waiting_requests_,
                 &jogs_,
                 &pauses_,
                 &lines_,
@@ -164,7 +164,7 @@ void Core::request(std::int64_t now, const api::Asker& who, const api::Request& 
   } else if (const auto by = precedence.overtaken(asker, request)) {
     return open_moves_.not_begun(asker, *by);
   }
-  if (!departures_.hold(now, asker, request)) carry_out(now, asker, request);
+  if (!waiting_requests_.hold(now, asker, request)) carry_out(now, asker, request);
 }
 
 // Paths, arrays and lines for the trigger are found out about when they are carried out: their

@@ -16,7 +16,6 @@
 #include "daemon/model/outputs.h"
 #include "daemon/services/arrays.h"
 #include "daemon/services/camac.h"
-#include "daemon/services/departures.h"
 #include "daemon/services/drivers.h"
 #include "daemon/services/dry_run.h"
 #include "daemon/services/emergency_stop.h"
@@ -41,6 +40,7 @@
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
 #include "daemon/services/trigger.h"
+#include "daemon/services/waiting_requests.h"
 #include "daemon/services/while_connected.h"
 
 namespace bushd::daemon {
@@ -134,7 +134,7 @@ class Core {
   PseudoAxes pseudo_axes_;
   StatePublisher state_;
   LineTables line_tables_;
-  Departures departures_;
+  WaitingRequests waiting_requests_;
   HealthPublisher health_;
   MotorSettings settings_;
   Camac camac_;

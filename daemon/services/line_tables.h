@@ -1,7 +1,6 @@
 // Tables of lines, put into their MCUs before the lines begin. A request for a line waits for that
-// with the others that wait before they are carried out (Departures). As soon as one of these MCUs
-// does not rest, or does not take the table, the wait is over: a line without its table is
-// streamed, and one for the trigger is refused.
+// in WaitingRequests. As soon as one of these MCUs does not rest, or does not take the table, the
+// wait is over: a line without its table is streamed, and one for the trigger is refused.
 #pragma once
 
 #include <cstdint>

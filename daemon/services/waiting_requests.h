@@ -1,6 +1,8 @@
-// Requests that change where motors stand, until the disk knows that these motors are no longer at
-// rest, until their positions are restored, and until their drivers are enabled; of lines also
-// until their MCUs have the table. Mostly a millisecond or two, often none.
+// Holds requests that would move motors until everything that they need is ready.
+//
+// A request waits until the disk knows that its motors are no longer at rest, until their positions
+// are restored, and until their drivers are enabled. A line also waits until its MCUs have the
+// table. Most requests wait a millisecond or two, many not at all.
 #pragma once
 
 #include <cstdint>
@@ -19,15 +21,15 @@
 
 namespace bushd::daemon {
 
-class Departures final : public Service {
+class WaitingRequests final : public Service {
  public:
   using CarryOut = std::function<void(std::int64_t now_us, const api::Asker&, const api::Request&)>;
   // `busy`: what was carried out before is still being begun; all that is held waits for it.
   // `would_take`: whether the request would be taken as things stand, as far as that is known.
-  Departures(const Installation& installation, const Interlocks& interlocks,
-             const OpenMoves& open_moves, KeptPositions& kept, IdleDrivers& idle_drivers,
-             LineTables& line_tables, CarryOut carry_out, std::function<bool()> busy,
-             std::function<bool(const api::Request&)> would_take)
+  WaitingRequests(const Installation& installation, const Interlocks& interlocks,
+                  const OpenMoves& open_moves, KeptPositions& kept, IdleDrivers& idle_drivers,
+                  LineTables& line_tables, CarryOut carry_out, std::function<bool()> busy,
+                  std::function<bool(const api::Request&)> would_take)
       : installation_(installation),
         interlocks_(interlocks),
         open_moves_(open_moves),

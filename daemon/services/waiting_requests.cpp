@@ -1,4 +1,4 @@
-#include "daemon/services/departures.h"
+#include "daemon/services/waiting_requests.h"
 
 #include <algorithm>
 #include <utility>
@@ -15,7 +15,7 @@ bool has_common(const std::vector<MotorId>& a, const std::vector<MotorId>& b) {
 
 }  // namespace
 
-std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& request) const {
+std::optional<std::vector<MotorId>> WaitingRequests::motors_of(const api::Request& request) const {
   const auto found =
       std::visit(Overloaded{[&](const api::Move& r) -> Result<std::vector<MotorId>> {
                               if (r.dry_run) return std::vector<MotorId>();
@@ -59,18 +59,18 @@ std::optional<std::vector<MotorId>> Departures::motors_of(const api::Request& re
   return *found;
 }
 
-bool Departures::any_held(const std::vector<MotorId>& motors) const {
+bool WaitingRequests::any_held(const std::vector<MotorId>& motors) const {
   return std::ranges::any_of(held_,
                              [&](const Held& held) { return has_common(held.motors, motors); });
 }
 
-bool Departures::is_refused_anyway(const api::Request& request,
-                                   const std::vector<MotorId>& motors) const {
+bool WaitingRequests::is_refused_anyway(const api::Request& request,
+                                        const std::vector<MotorId>& motors) const {
   const auto changes = [this](MotorId motor) { return kept_.being_restored(motor); };
   return !any_held(motors) && std::ranges::none_of(motors, changes) && !would_take_(request);
 }
 
-Result<bool> Departures::make_ready(std::int64_t now_us, Held& held) {
+Result<bool> WaitingRequests::make_ready(std::int64_t now_us, Held& held) {
   bool ready = true;
   const bool moves = !std::holds_alternative<api::SetPosition>(held.request);
   for (const MotorId motor : held.motors) {
@@ -84,7 +84,8 @@ Result<bool> Departures::make_ready(std::int64_t now_us, Held& held) {
   return ready && line_tables_.make_ready(now_us, held.request, held.table);
 }
 
-bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
+bool WaitingRequests::hold(std::int64_t now_us, const api::Asker& asker,
+                           const api::Request& request) {
   const bool may_wait = kept_.keeps() || !idle_drivers_.none() || LineTables::concerns(request);
   if (!may_wait && held_.empty()) return false;
   auto motors = motors_of(request);
@@ -110,17 +111,17 @@ bool Departures::hold(std::int64_t now_us, const api::Asker& asker, const api::R
   return true;
 }
 
-void Departures::waits_no_more(Held& held) {
+void WaitingRequests::waits_no_more(Held& held) {
   line_tables_.end(held.table);
   for (const MotorId motor : held.motors) kept_.not_wanted(motor);
 }
 
-void Departures::refuse(Held& held, const std::string& reason) {
+void WaitingRequests::refuse(Held& held, const std::string& reason) {
   waits_no_more(held);
   held.asker.answer(api::Refused{reason});
 }
 
-bool Departures::is_let_go(std::int64_t now_us, const Held& held) {
+bool WaitingRequests::is_let_go(std::int64_t now_us, const Held& held) {
   const auto* jog = std::get_if<api::Jog>(&held.request);
   if (jog == nullptr) return false;
   const std::int64_t keepalive_ms = std::max(jog->keepalive_ms, api::Jog::kLeastKeepaliveMs);
@@ -128,7 +129,7 @@ bool Departures::is_let_go(std::int64_t now_us, const Held& held) {
          (held.asker.session && held.asker.session->gone());
 }
 
-void Departures::end_overtaken(std::int64_t) {
+void WaitingRequests::end_overtaken(std::int64_t) {
   std::erase_if(held_, [this](Held& held) {
     // It moves nothing; but with the daemon it ends too.
     const bool sets = std::holds_alternative<api::SetPosition>(held.request);
@@ -141,7 +142,7 @@ void Departures::end_overtaken(std::int64_t) {
   });
 }
 
-void Departures::step(std::int64_t now_us) {
+void WaitingRequests::step(std::int64_t now_us) {
   std::vector<MotorId> before;
   for (auto it = held_.begin(); it != held_.end() && !busy_();) {
     const bool in_turn = !has_common(it->motors, before);
