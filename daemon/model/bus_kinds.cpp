@@ -22,18 +22,20 @@ std::unique_ptr<link::BusMaster> new_master(const config::Bus& bus, link::BusSet
                                             link::TickSource& source) {
   switch (bus.kind) {
     case config::BusKind::kSerialPulse:
-      return std::make_unique<serial_pulse::Master>(std::move(setup), source, hash_of(bus.name));
+      return std::make_unique<serial_pulse::SerialPulseMaster>(std::move(setup), source,
+                                                               hash_of(bus.name));
     case config::BusKind::kRs485:
       break;
     case config::BusKind::kCommutator:
-      return std::make_unique<commutator::Master>(
-          commutator::Master::Setup{.name = bus.name,
-                                    .board = {.start_hz = bus.start_hz,
-                                              .baud = bus.baud,
-                                              .answer_us = bus.answer_ms * std::int64_t{1000}}},
+      return std::make_unique<commutator::CommutatorMaster>(
+          commutator::CommutatorMaster::Setup{
+              .name = bus.name,
+              .board = {.start_hz = bus.start_hz,
+                        .baud = bus.baud,
+                        .answer_us = bus.answer_ms * std::int64_t{1000}}},
           std::move(setup), source);
   }
-  return std::make_unique<link::Master>(std::move(setup), source);
+  return std::make_unique<link::Rs485Master>(std::move(setup), source);
 }
 
 }  // namespace bushd::daemon

@@ -197,7 +197,7 @@ class ImageReplay final : public fuzz::Programmed {
 
   void post(std::uint8_t address, std::uint8_t type, fuzz::Bytes payload) {
     feed(Bytes{0});
-    feed(Master::wire(address, type, next_sequence_++, payload));
+    feed(FrameMaster::wire(address, type, next_sequence_++, payload));
   }
 
   // Whether it is answered; the answer is answer_.
@@ -299,7 +299,7 @@ class ImageReplay final : public fuzz::Programmed {
   std::unique_ptr<McuUnderTest> real_;
   PulseCounter counter_;
   Bus bus_;
-  Master master_;
+  FrameMaster master_;
   SentTables tables_;
   Frame answer_{};
   bushd_report last_{};

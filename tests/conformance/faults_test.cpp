@@ -51,7 +51,7 @@ class Faults : public testing::TestWithParam<Target> {
   }
   void tell_damaged(bushd_type type, const Bytes& payload) {
     for (const std::uint8_t address : {kVirtual, kReal}) {
-      Bytes wire = Master::wire(address, static_cast<std::uint8_t>(type), 0, payload);
+      Bytes wire = FrameMaster::wire(address, static_cast<std::uint8_t>(type), 0, payload);
       wire[wire.size() / 2] ^= 0x40;
       bus_.master_send(wire, bus_.now_ns());
     }
@@ -108,7 +108,7 @@ class Faults : public testing::TestWithParam<Target> {
   const std::unique_ptr<McuUnderTest> real_;
   Recorder recorder_;
   Bus bus_;
-  Master master_;
+  FrameMaster master_;
   std::uint32_t first_tick_ = 0;
 };
 BUSHD_FOR_TARGETS(Faults, targets());
@@ -267,7 +267,7 @@ class GoldenFrames : public testing::TestWithParam<Target> {
   static std::vector<Answer> answers_of(Add add) {
     Bus bus(kBaud);
     add(bus);
-    Master master(bus);
+    FrameMaster master(bus);
     bus.advance_to(kBootNs);
     // A second time all of them are out of date.
     for (int round = 0; round < 2; ++round) {

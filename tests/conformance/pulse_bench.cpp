@@ -58,8 +58,8 @@ void PulseBench::start_master() {
   mcu.inputs.limit_immediate = limit_immediate_ ? 1 : 0;
   mcu.motor_inputs = {{.motor = 0, .positive = 1, .negative = 2, .home = 0}};
   setup.mcus.push_back(mcu);
-  master_ = std::make_unique<serial_pulse::Master>(std::move(setup),
-                                                   static_cast<link::TickSource&>(*this), 4711);
+  master_ = std::make_unique<serial_pulse::SerialPulseMaster>(
+      std::move(setup), static_cast<link::TickSource&>(*this), 4711);
   master_->port_opened(now_us_);
   open_ = true;
 }

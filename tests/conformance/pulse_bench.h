@@ -63,7 +63,7 @@ class PulseBench : private link::TickSource, private sim::EdgeSink {
   void clear_faults();
 
   sim::PulseDrive& drive() { return drive_; }
-  serial_pulse::Master& master() { return *master_; }
+  serial_pulse::SerialPulseMaster& master() { return *master_; }
   const bushd_report& report() const { return master_->view({0}).report; }
   std::int64_t counted() const { return report().motor[0].position_steps; }
   const std::vector<link::Event>& events() const { return events_; }
@@ -114,7 +114,7 @@ class PulseBench : private link::TickSource, private sim::EdgeSink {
   bool limit_immediate_;
   motion::Axis axis_;
   sim::PulseDrive drive_;
-  std::unique_ptr<serial_pulse::Master> master_;
+  std::unique_ptr<serial_pulse::SerialPulseMaster> master_;
   std::uint16_t boot_ = 0;
   std::vector<link::Event> events_;
   std::int64_t now_us_ = 0;

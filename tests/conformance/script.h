@@ -278,7 +278,7 @@ class Script : public testing::Test {
   std::uint32_t tick_ns_ = kTickNs;
   Recorder recorder_;
   Bus bus_;
-  Master master_;
+  FrameMaster master_;
   bushd_set_outputs levels_{};                // of the outputs of both
   std::map<std::uint8_t, std::size_t> seen_;  // steps of a motor, at the last look
 };

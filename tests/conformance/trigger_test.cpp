@@ -159,7 +159,7 @@ TEST_P(Current, IsMeasuredAndPulsesAreAsFarApart) {
   bus.add_mcu([&](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
     return real->make(kBirth, index, driver, sink);
   });
-  Master master(bus);
+  FrameMaster master(bus);
   master.patience_ns = 6'000'000;
   bus.advance_to(300'000'000);
   ASSERT_NO_FATAL_FAILURE(master.bring_up(kLongTickNs, BUSHD_FORMAT_COARSE));

@@ -179,7 +179,7 @@ class Bus {
     return payload;
   }
 
-  link::Master& master() { return master_; }
+  link::Rs485Master& master() { return master_; }
   Source& source() { return source_; }
   std::int64_t now_us() const { return now_us_; }
   bool online(link::McuIndex mcu) const {
@@ -417,7 +417,7 @@ class Bus {
   }
 
   Source source_;
-  link::Master master_;
+  link::Rs485Master master_;
   std::array<SaneMcu, kMcus> mcus_;
   bushd_receiver receiver_{};  // of what the master sends
   bushd_receiver answers_{};   // of what it hears
@@ -467,7 +467,7 @@ void arm(Bus& bus, Input& input) {
   const std::uint32_t delay_us = BUSHD_TRIGGER_MIN_DELAY_US + input.u16();
   if (!bus.online(mcu) || !bus.master().can_trigger(mcu)) return;
   if (bus.master().view(mcu).report.armed != 0) return;
-  std::vector<link::Master::Armed> moves;
+  std::vector<link::Rs485Master::Armed> moves;
   for (std::uint8_t m = 0; m < kMotors; ++m) {
     if ((mask >> m & 1) != 0) moves.push_back({.motor = m, .run = {m % 2 == 0 ? 70 : -70, m}});
   }
@@ -512,7 +512,7 @@ void home(Bus& bus, Input& input) {
 }
 
 void run_op(Op op, Bus& bus, Input& input) {
-  link::Master& master = bus.master();
+  link::Rs485Master& master = bus.master();
   switch (op) {
     case Op::kNoise:
       return bus.receive(input.bytes(input.u8()));

@@ -60,9 +60,10 @@ struct Frame {
   TimeNs end_ns;
 };
 
-class Master {
+// A master that sends the frames which a test gives it, and collects those that are received.
+class FrameMaster {
  public:
-  explicit Master(Bus& bus) : bus_(bus) {
+  explicit FrameMaster(Bus& bus) : bus_(bus) {
     bus_.on_master_byte = [this](std::uint8_t byte, TimeNs end_ns) {
       bushd_frame frame;
       const bushd_receive got = bushd_receive_byte(&receiver_, byte, &frame);

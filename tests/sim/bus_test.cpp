@@ -44,7 +44,7 @@ class TwoMcus : public testing::Test {
 
   Recorder recorder;
   Bus bus{kBaud, &recorder};
-  Master master{bus};
+  FrameMaster master{bus};
 };
 
 TEST_F(TwoMcus, EachAnswersForItself) {
@@ -64,7 +64,7 @@ TEST_F(TwoMcus, EachAnswersForItself) {
 }
 
 TEST_F(TwoMcus, ReplyComesAfterRequestTurnaroundAndItsOwnBytes) {
-  const Bytes request = Master::wire(1, BUSHD_MSG_TABLES, 0, {});
+  const Bytes request = FrameMaster::wire(1, BUSHD_MSG_TABLES, 0, {});
   const TimeNs asked_ns = bus.now_ns();
   const auto reply = master.request(1, BUSHD_MSG_TABLES);
   ASSERT_TRUE(reply);
@@ -86,7 +86,7 @@ TEST_F(TwoMcus, RepliesOfOthersCountForNothing) {
 }
 
 TEST_F(TwoMcus, BrokenFrameIsCountedByAllAndAnsweredByNone) {
-  Bytes wire = Master::wire(1, BUSHD_MSG_TABLES, 9, {});
+  Bytes wire = FrameMaster::wire(1, BUSHD_MSG_TABLES, 9, {});
   wire[3] ^= 0x40;
   bus.master_send(wire, bus.now_ns());
   master.drain();
@@ -101,8 +101,8 @@ TEST_F(TwoMcus, TwoTalkersAtOnceCollideAndAreReported) {
     collisions.push_back({first, second});
   };
   // Two requests without a pause: the second is on the line while the first is being answered.
-  Bytes both = Master::wire(1, BUSHD_MSG_TABLES, 1, {});
-  const Bytes second = Master::wire(2, BUSHD_MSG_TABLES, 2, {});
+  Bytes both = FrameMaster::wire(1, BUSHD_MSG_TABLES, 1, {});
+  const Bytes second = FrameMaster::wire(2, BUSHD_MSG_TABLES, 2, {});
   both.insert(both.end(), second.begin(), second.end());
   bus.master_send(both, bus.now_ns());
   master.drain();
@@ -120,7 +120,7 @@ TEST(Bus, TwoMcusOfOneAddressCollide) {
   Bus bus(kBaud);
   bus.add_mcu({.address = 5});
   bus.add_mcu({.address = 5});
-  Master master(bus);
+  FrameMaster master(bus);
   int between_mcus = 0;
   bus.on_collision = [&](TimeNs, std::uint8_t first, std::uint8_t second) {
     between_mcus += first == 5 && second == 5;
@@ -161,7 +161,7 @@ TEST(Bus, McusOfOneAddressAreFoundAndParted) {
   Bus bus(kBaud);
   bus.add_mcu({.address = 5});
   bus.add_mcu({.address = 5});
-  Master master(bus);
+  FrameMaster master(bus);
   std::vector<Frame> found;
   for (std::uint16_t salt = 0; salt < 50 && found.size() < 2; ++salt) {
     found = master.scan({salt, 4, 300});
@@ -254,7 +254,7 @@ TEST_F(TwoMcus, RebootDropsThePinsTheReplyAndTheMemory) {
   master.fine_ticks(1, 0, first, {32 * 256, 32 * 256, 32 * 256}, 1000);
   // In the second tick, within the pulse of its 5th step.
   const TimeNs reset_ns = tick_start_ns(first) + kTickNs + 5 * 8 * kSlotNs + kSlotNs / 4;
-  const Bytes question = Master::wire(1, BUSHD_MSG_TABLES, 1, {});
+  const Bytes question = FrameMaster::wire(1, BUSHD_MSG_TABLES, 1, {});
   bus.master_send(question, reset_ns - static_cast<TimeNs>(question.size() + 5) * kByteNs);
   bus.advance_to(reset_ns);
   master.frames.clear();
@@ -280,7 +280,7 @@ TEST(Bus, StrideDoesNotMatter) {
     Bus bus(kBaud, recorder.get());
     bus.add_mcu({.address = 1, .clock_ppm = 40});
     bus.add_mcu({.address = 2, .boot_ns = 777, .clock_ppm = -40});
-    Master master(bus);
+    FrameMaster master(bus);
     master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
     master.upload_table(2, 0, 1000, {4000, 2000, 1500, 1000}, 1000);
     master.assign(2, 0, 0);
@@ -304,7 +304,7 @@ TEST(Bus, StrideDoesNotMatter) {
 
 TEST_F(TwoMcus, NextEventIsNeverLateAndNeverPast) {
   master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
-  bus.master_send(Master::wire(1, BUSHD_MSG_TABLES, 1, {}), bus.now_ns() + 123);
+  bus.master_send(FrameMaster::wire(1, BUSHD_MSG_TABLES, 1, {}), bus.now_ns() + 123);
   for (int i = 0; i < 500; ++i) {
     const TimeNs next_ns = bus.next_event_ns();
     ASSERT_GT(next_ns, bus.now_ns());

@@ -70,7 +70,7 @@ class EmissionBus {
  public:
   Recorder recorder;
   Bus bus;
-  Master master;
+  FrameMaster master;
   std::uint32_t first_tick = 0;
   TimeNs start_ns = 0;  // of the rows
 };

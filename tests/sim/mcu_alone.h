@@ -52,7 +52,7 @@ class McuAlone : public testing::Test {
   const TimeNs boot_ns_;
   Recorder recorder_;
   Bus bus_;
-  Master master_;
+  FrameMaster master_;
 };
 
 }  // namespace bushd::sim

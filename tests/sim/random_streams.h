@@ -158,7 +158,7 @@ class RandomStreams : public testing::Test {
     if (!payload.empty() && random_.one_in(4)) random_.pick(payload) = byte();
     const std::uint8_t address = random_.one_in(8) ? byte() : kAddress;
     if (random_.one_in(16)) {
-      send(Master::wire(address, type, byte(), payload));
+      send(FrameMaster::wire(address, type, byte(), payload));
     } else {
       master_.post(address, type, payload);
       sent_ += payload.size() + 8;
@@ -173,7 +173,7 @@ class RandomStreams : public testing::Test {
         return send(Bytes(random_.below(300), byte()));
       default: {
         const auto type = static_cast<std::uint8_t>(random_.between(1, kLastType));
-        Bytes frame = Master::wire(kAddress, type, byte(), bytes(random_.below(120)));
+        Bytes frame = FrameMaster::wire(kAddress, type, byte(), bytes(random_.below(120)));
         if (random_.one_in(2)) {
           frame.resize(random_.below(frame.size()));
         } else {
@@ -252,7 +252,7 @@ class RandomStreams : public testing::Test {
   Random random_;
   PulseCounter counter_;
   Bus bus_;
-  Master master_;
+  FrameMaster master_;
   std::uint32_t tick_ = 0;
   std::uint8_t epoch_ = 0;
   std::uint64_t sent_ = 0;  // bytes

@@ -25,7 +25,7 @@ TEST(Sync, PerfectClocksOfAnyPhaseTickAtTheSameNanosecond) {
     Bus bus(500'000);
     bus.add_mcu({.address = 1});
     bus.add_mcu({.address = 2, .boot_ns = phase_ns});
-    Master master(bus);
+    FrameMaster master(bus);
     master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
     EXPECT_EQ(skew_ns(bus), 0) << "phase " << phase_ns;
     EXPECT_EQ(bus.mcu(0).core().tick, bus.mcu(1).core().tick);
@@ -36,7 +36,7 @@ TEST(Sync, LateComerJoinsTheOthers) {
   Bus bus(500'000);
   bus.add_mcu({.address = 1});
   bus.add_mcu({.address = 2, .boot_ns = 123'456});
-  Master master(bus);
+  FrameMaster master(bus);
   master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
   bus.advance_to(bus.now_ns() + 1'234'567'890);
   bus.reboot(1, 654'321);
@@ -58,15 +58,16 @@ TEST(Sync, LateComerJoinsTheOthers) {
 TEST(Sync, RepeatedFrameIsNoOtherMark) {
   Bus bus(500'000);
   bus.add_mcu({.address = 1});
-  Master master(bus);
+  FrameMaster master(bus);
   master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
   const auto mark_after = [&](TimeNs pause_ns, std::uint32_t name) {
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
     const bushd_sync message = {1, name, false, 0, 0, 0};
     bus.advance_to(bus.now_ns() + pause_ns);
-    bus.master_send(Master::wire(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, 200,
-                                 {payload.data(), bushd_encode_sync(&message, payload.data())}),
-                    bus.now_ns());
+    bus.master_send(
+        FrameMaster::wire(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, 200,
+                          {payload.data(), bushd_encode_sync(&message, payload.data())}),
+        bus.now_ns());
     master.drain();
     return bus.mcu(0).core().clock.sync_tick;
   };
@@ -86,7 +87,7 @@ TEST(Sync, ClocksThatDifferAreHeldTogether) {
       Bus bus(500'000);
       bus.add_mcu({.address = 1, .clock_ppm = ppm});
       bus.add_mcu({.address = 2, .boot_ns = 1'000'000, .clock_ppm = -ppm});
-      Master master(bus);
+      FrameMaster master(bus);
       master.bring_up(tick_ns, BUSHD_FORMAT_FINE);
       TimeNs worst_ns = 0;
       for (int i = 0; i < 600; ++i) {
@@ -162,7 +163,7 @@ class Hour {
  private:
   std::uint32_t tick_ns_;
   Bus bus_;
-  Master master_;
+  FrameMaster master_;
   std::uint8_t reference_ = 1;
   std::mt19937 random_{20260401};
   int silent_ = 0;

@@ -98,7 +98,7 @@ TEST_F(Vcd, FileHoldsWhatTheBusDid) {
   Bus bus(500'000, writer.get());
   bus.add_mcu({.address = 1, .clock_ppm = 30});
   bus.add_mcu({.address = 2, .boot_ns = 999'999, .clock_ppm = -30});
-  Master master(bus);
+  FrameMaster master(bus);
   master.bring_up(1'000'000, BUSHD_FORMAT_FINE);
   for (const std::uint8_t address : {std::uint8_t{1}, std::uint8_t{2}}) {
     master.upload_table(address, 0, 1000, {4000, 2000, 1500, 1000}, 1000);

@@ -52,7 +52,7 @@ std::uint8_t next_trigger_number(McuRecord& mcu) {
 
 }  // namespace
 
-Master::Master(BusSetup setup, TickSource& source)
+Rs485Master::Rs485Master(BusSetup setup, TickSource& source)
     : setup_(std::move(setup)),
       mcus_(records_of(setup_)),
       writer_(setup_.baud),
@@ -69,7 +69,7 @@ Master::Master(BusSetup setup, TickSource& source)
       emergency_(mcus_, writer_),
       horizon_(clock(), transactions_.health().latency) {}
 
-void Master::port_opened(std::int64_t now_us) {
+void Rs485Master::port_opened(std::int64_t now_us) {
   port_open_ = true;
   heard_ = false;
   transactions_.reset();
@@ -78,14 +78,14 @@ void Master::port_opened(std::int64_t now_us) {
   connector_.port_opened(now_us);
 }
 
-void Master::port_lost(std::int64_t now_us, const std::string& cause) {
+void Rs485Master::port_lost(std::int64_t now_us, const std::string& cause) {
   port_open_ = false;
   transactions_.abandon();
   for (const McuIndex i : mcus_.indices()) connector_.give_up(i, cause, now_us);
   synchroniser_.port_lost();
 }
 
-void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+void Rs485Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
   notice_standing_still(now_us);
   transactions_.receive(now_us, bytes);
 }
@@ -93,7 +93,7 @@ void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
 // While an MCU is not offline it is asked again and again, unless nobody calls step(). Another
 // master may have taken the place of one that was silent for so long; answers that have waited
 // meanwhile are of a time that is over.
-void Master::notice_standing_still(std::int64_t now_us) {
+void Rs485Master::notice_standing_still(std::int64_t now_us) {
   const std::int64_t still_us = now_us - stepped_us_;
   if (!port_open_ || still_us < Synchroniser::kOtherMasterUs) return;
   transactions_.abandon();
@@ -104,7 +104,7 @@ void Master::notice_standing_still(std::int64_t now_us) {
   }
 }
 
-std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
+std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   writer_.clear();
   notice_standing_still(now_us);
   stepped_us_ = now_us;
@@ -121,14 +121,14 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
 
 // How long nothing may be sent, and then all others have their turn first: a poll whose last answer
 // is missing.
-std::int64_t Master::silence_us() const {
+std::int64_t Rs485Master::silence_us() const {
   return poller_.cycle_us() + transactions_.patience_us() + streams_.round_us();
 }
 
 // By urgency: an emergency, also one that binds an MCU that has just come; queues that are all but
 // empty; replacements, what follows them, and the polls that confirm them; queues about to run
 // empty; reports; SYNCs; configuration; filling queues.
-bool Master::send_next(std::int64_t now_us) {
+bool Rs485Master::send_next(std::int64_t now_us) {
   const std::int64_t target_us = horizon_.queue_target_us();
   const auto below = [target_us](std::int64_t lead_us) {
     return StreamScheduler::Filling{.lead_us = lead_us, .target_us = target_us};
@@ -148,7 +148,7 @@ bool Master::send_next(std::int64_t now_us) {
          streams_.send_stream(now_us, below(target_us));
 }
 
-std::int64_t Master::next_wake_us() const {
+std::int64_t Rs485Master::next_wake_us() const {
   if (!port_open_) return INT64_MAX;
   if (transactions_.open()) {
     const std::int64_t timeout_us = transactions_.timeout_us();
@@ -161,7 +161,7 @@ std::int64_t Master::next_wake_us() const {
   return std::max(wake, writer_.room_from_us());
 }
 
-std::int64_t Master::wake_us(McuIndex mcu) const {
+std::int64_t Rs485Master::wake_us(McuIndex mcu) const {
   if (mcus_[mcu].view.phase == McuPhase::kOffline) return connector_.retry_due_us(mcu);
   if (streams_.has_replacement_to_send(mcu) || mcus_[mcu].poll_wanted) return stepped_us_;
   const bool open = streams_.has_ticks_to_send(mcu) || !connector_.queue(mcu).empty() ||
@@ -169,15 +169,15 @@ std::int64_t Master::wake_us(McuIndex mcu) const {
   return std::min(poller_.due_us(mcu), open ? stepped_us_ + kStreamWakeUs : INT64_MAX);
 }
 
-std::vector<Event> Master::take_events() {
+std::vector<Event> Rs485Master::take_events() {
   return std::exchange(events_, {});
 }
 
-Tick Master::earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const {
+Tick Rs485Master::earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const {
   return std::max(horizon_.earliest_start(now_us), streams_.next_tick(mcu, motor));
 }
 
-Tick Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {
+Tick Rs485Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {
   const StreamScheduler::LineUse use = {
       .free_us = transactions_.open() ? transactions_.quiet_us() : now_us,
       .margin_us = kCriticalMarginUs,
@@ -185,43 +185,43 @@ Tick Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> to
   return horizon_.earliest_replace(now_us, streams_.carried_us(now_us, use, together));
 }
 
-Tick Master::earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
-                               Tick start) const {
+Tick Rs485Master::earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
+                                    Tick start) const {
   return std::max(earliest_replace(now_us, together), start);
 }
 
-bool Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const {
+bool Rs485Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const {
   return !streams_.replacement_open(mcu) &&
          !streams_.behind(now_us, horizon_.queue_urgent_us(silence_us()));
 }
 
-void Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
+void Rs485Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
 }
 
-void Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
+void Rs485Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
   streams_.begin_run(mcu, motor, start, run);
 }
 
-void Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) {
+void Rs485Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) {
   streams_.begin_run(mcu, motor, start, run);
   synchroniser_.lines_run(true);
 }
 
-bool Master::can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay floor,
-                          bool alone) const {
+bool Rs485Master::can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+                               bool alone) const {
   return makes_lines(mcu) && slot_of(mcu, table) && keeps_up_with(mcu, table, floor, alone);
 }
 
-bool Master::keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay floor,
-                           bool alone) const {
+bool Rs485Master::keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+                                bool alone) const {
   if (!bushd_delay_is_code(floor)) return false;  // LINE_RUN cannot tell it
   if (can(mcu, BUSHD_CAN_TABLE_TICKS)) return true;
   return bushd_run_is_slow(&table, floor, setup_.tick_ns,
                            alone ? BUSHD_SLOW_LINE_DELAY_NS : BUSHD_SHARED_LINE_DELAY_NS);
 }
 
-std::optional<std::uint8_t> Master::slot_of(McuIndex mcu, const bushd_table& table) const {
+std::optional<std::uint8_t> Rs485Master::slot_of(McuIndex mcu, const bushd_table& table) const {
   const std::vector<TableRef>& tables = mcus_[mcu].setup.tables;
   for (std::size_t slot = 0; slot < tables.size(); ++slot) {
     if (makes_the_same_runs(*tables[slot].table, table)) return static_cast<std::uint8_t>(slot);
@@ -231,27 +231,27 @@ std::optional<std::uint8_t> Master::slot_of(McuIndex mcu, const bushd_table& tab
   return BUSHD_SCRATCH_SLOT;
 }
 
-bool Master::can_upload(McuIndex mcu, const bushd_table& table) const {
+bool Rs485Master::can_upload(McuIndex mcu, const bushd_table& table) const {
   const McuRecord& record = mcus_[mcu];
   std::size_t codes = codes_of(table);
   for (const TableRef& ref : record.setup.tables) codes += codes_of(*ref.table);
   return can(mcu, BUSHD_CAN_SCRATCH) && codes <= record.view.identity.table_codes;
 }
 
-void Master::end_upload(McuIndex mcu) {
+void Rs485Master::end_upload(McuIndex mcu) {
   if (uploads(mcu)) connector_.scratch(mcu).clear();
 }
 
-void Master::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {
+void Rs485Master::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {
   streams_.follow_run(mcu, motor, start, run);
   if (std::holds_alternative<LineRun>(run)) synchroniser_.lines_run(true);
 }
 
-void Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
+void Rs485Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
   streams_.replace(mcu, motors, first, stepped_us_);
 }
 
-std::optional<BusSnapshot> Master::snapshot(std::int64_t now_us) const {
+std::optional<BusSnapshot> Rs485Master::snapshot(std::int64_t now_us) const {
   return BusSnapshot{.setup = &setup_,
                      .mcus = mcus_,
                      .clock = clock(),
@@ -259,8 +259,8 @@ std::optional<BusSnapshot> Master::snapshot(std::int64_t now_us) const {
                      .now_us = now_us};
 }
 
-std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
-                         std::span<const Armed> moves) {
+std::uint8_t Rs485Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
+                              std::span<const Armed> moves) {
   McuRecord& record = mcus_[mcu];
   std::vector<bushd_table_run_entry> entries;
   for (const Armed& move : moves) {
@@ -274,8 +274,8 @@ std::uint8_t Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
   return number;
 }
 
-std::uint8_t Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
-                              std::span<const ArmedOnLine> parts) {
+std::uint8_t Rs485Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
+                                   std::span<const ArmedOnLine> parts) {
   std::vector<bushd_line_entry> entries;
   for (const auto& [motor, run] : parts) {
     entries.push_back({motor, static_cast<std::int8_t>(run.direction), run.increment});
@@ -290,46 +290,46 @@ std::uint8_t Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay
   return number;
 }
 
-std::uint8_t Master::travel(McuIndex mcu, bushd_travel message) {
+std::uint8_t Rs485Master::travel(McuIndex mcu, bushd_travel message) {
   message.number = next_trigger_number(mcus_[mcu]);
   connector_.queue(mcu).travel(message);
   return message.number;
 }
 
-void Master::end_travel(McuIndex mcu, std::uint8_t motor) {
+void Rs485Master::end_travel(McuIndex mcu, std::uint8_t motor) {
   bushd_travel message{};
   message.kind = BUSHD_TRAVEL_NONE;
   message.motor = motor;
   connector_.queue(mcu).travel(message);
 }
 
-void Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {
+void Rs485Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {
   connector_.queue(mcu).position_compare(message);
 }
 
-void Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) {
+void Rs485Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) {
   connector_.queue(mcu).set_position(motor, position_steps);
 }
 
-void Master::emergency_stop(bushd_stop_mode mode) {
+void Rs485Master::emergency_stop(bushd_stop_mode mode) {
   emergency_.begin(mode);
   for (const McuIndex i : mcus_.indices()) streams_.drop_all(i);
   connector_.emergency_stop(mode);
 }
 
-void Master::bind_to_stop(McuIndex mcu, bushd_stop_mode mode) {
+void Rs485Master::bind_to_stop(McuIndex mcu, bushd_stop_mode mode) {
   connector_.bind_to_stop(mcu, mode);
 }
 
-void Master::reconfigure(McuIndex mcu, McuSetup setup) {
+void Rs485Master::reconfigure(McuIndex mcu, McuSetup setup) {
   if (connector_.reconfigure(mcu, std::move(setup))) streams_.drop_all(mcu);
 }
 
-Result<void> Master::check_room(McuIndex mcu, const McuSetup& setup) const {
+Result<void> Rs485Master::check_room(McuIndex mcu, const McuSetup& setup) const {
   return connector_.check_room(mcu, setup);
 }
 
-void Master::reset_low_water() {
+void Rs485Master::reset_low_water() {
   for (McuRecord& mcu : mcus_) mcu.health.low_water_ticks.reset();
 }
 

@@ -41,10 +41,12 @@
 
 namespace bushd::link {
 
-class Master final : public BusMaster, private Transactions::Listener, private Connector::Listener {
+class Rs485Master final : public BusMaster,
+                          private Transactions::Listener,
+                          private Connector::Listener {
  public:
   // `source` outlives it.
-  Master(BusSetup setup, TickSource& source);
+  Rs485Master(BusSetup setup, TickSource& source);
 
   void port_opened(std::int64_t now_us) override;
   void port_lost(std::int64_t now_us, const std::string& cause) override;

@@ -25,11 +25,11 @@ void unwrap_known_until(McuView& view) {
 
 }  // namespace
 
-void Master::overheard(std::int64_t now_us, const bushd_frame& frame) {
+void Rs485Master::overheard(std::int64_t now_us, const bushd_frame& frame) {
   synchroniser_.overheard(now_us, frame);
 }
 
-bool Master::answered(std::int64_t now_us, const Transactions::Answer& answer) {
+bool Rs485Master::answered(std::int64_t now_us, const Transactions::Answer& answer) {
   heard_ = true;
   poller_.answered(answer.mcu);
   switch (answer.type) {
@@ -60,7 +60,7 @@ bool Master::answered(std::int64_t now_us, const Transactions::Answer& answer) {
   }
 }
 
-bool Master::unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
+bool Rs485Master::unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
   if (mcus_[mcu].view.phase == McuPhase::kOffline) {
     connector_.not_found(now_us, mcu);
     return false;
@@ -69,12 +69,12 @@ bool Master::unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
   return true;
 }
 
-void Master::ended(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
+void Rs485Master::ended(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
   if (type == BUSHD_MSG_IDENTIFY) connector_.identify_ended(now_us, mcu);
 }
 
-void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answer,
-                           const bushd_report& report) {
+void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer& answer,
+                                const bushd_report& report) {
   const McuIndex index = answer.mcu;
   McuRecord& mcu = mcus_[index];
   McuView& view = mcu.view;
@@ -115,22 +115,22 @@ void Master::handle_report(std::int64_t now_us, const Transactions::Answer& answ
   events_.push_back(McuReported{index});
 }
 
-void Master::found(std::int64_t now_us, McuIndex) {
+void Rs485Master::found(std::int64_t now_us, McuIndex) {
   synchroniser_.hurry(now_us);
 }
 
-void Master::came_online(McuIndex mcu) {
+void Rs485Master::came_online(McuIndex mcu) {
   streams_.came_online(mcu);
   events_.push_back(McuOnline{mcu});
 }
 
-void Master::went_offline(McuIndex mcu, bool was_online) {
+void Rs485Master::went_offline(McuIndex mcu, bool was_online) {
   poller_.went_offline(mcu);
   streams_.drop_all(mcu);
   if (was_online) events_.push_back(McuOffline{mcu});
 }
 
-void Master::refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) {
+void Rs485Master::refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) {
   events_.push_back(RequestRefused{.mcu = mcu, .type = type, .status = status});
 }
 

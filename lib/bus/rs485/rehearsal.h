@@ -42,7 +42,7 @@ struct BusSnapshot {
 // On a line that has nothing else to do and loses nothing.
 class Rehearsal {
  public:
-  // `source` outlives it. Preconditions as of Master::begin, at the moment of the snapshot.
+  // `source` outlives it. Preconditions as of Rs485Master::begin, at the moment of the snapshot.
   // Nothing is told beyond `max_frames`: making them all takes as long as in the moves themselves.
   Rehearsal(BusSnapshot bus, TickSource& source, std::span<const PlannedMove> moves,
             std::uint64_t max_frames);

@@ -48,7 +48,7 @@ class StreamScheduler {
   };
   explicit StreamScheduler(const Surroundings& around);
 
-  // See Master for these. Preconditions: as there.
+  // See Rs485Master for these. Preconditions: as there.
   void begin(McuIndex mcu, std::uint8_t motor, Tick start);
   void begin_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run);
   void follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run);

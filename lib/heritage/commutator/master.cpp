@@ -39,7 +39,7 @@ void name_it(bushd_identity& identity, const std::string& name) {
 
 }  // namespace
 
-Master::Master(Setup setup, link::BusSetup bus, link::TickSource& source)
+CommutatorMaster::CommutatorMaster(Setup setup, link::BusSetup bus, link::TickSource& source)
     : tick_ns_(bus.tick_ns),
       codes_per_s_(std::uint64_t{kCodesPerStartPeriod} * setup.board.start_hz),
       settle_us_(std::max<std::int64_t>(
@@ -64,33 +64,36 @@ Master::Master(Setup setup, link::BusSetup bus, link::TickSource& source)
 
 // --- The plan's time
 
-std::int64_t Master::plan_ns(std::int64_t now_us) const {
+std::int64_t CommutatorMaster::plan_ns(std::int64_t now_us) const {
   const std::int64_t free_ns = clock_ns_ + std::max<std::int64_t>(now_us - clock_us_, 0) * 1000;
   if (!motion_ || motion_->steps.has_left_plan() || motion_->cut) return free_ns;
   if (motion_->asked) return std::min(free_ns, std::max(motion_->asked->at_ns - 1, clock_ns_));
   return std::min(free_ns, std::max(motion_->steps.start() * tick_ns_, clock_ns_));
 }
 
-std::int64_t Master::us_of_plan(std::int64_t plan_ns) const {
+std::int64_t CommutatorMaster::us_of_plan(std::int64_t plan_ns) const {
   return clock_us_ + std::max<std::int64_t>((plan_ns - clock_ns_ + 999) / 1000, 0);
 }
 
-void Master::set_clock(std::int64_t now_us, std::int64_t plan_ns) {
+void CommutatorMaster::set_clock(std::int64_t now_us, std::int64_t plan_ns) {
   clock_us_ = now_us;
   clock_ns_ = plan_ns;
 }
 
-link::Tick Master::earliest_start(std::int64_t now_us, link::McuIndex, std::uint8_t) const {
+link::Tick CommutatorMaster::earliest_start(std::int64_t now_us, link::McuIndex,
+                                            std::uint8_t) const {
   return tick_at(now_us) + kStartTicks;
 }
 
-link::Tick Master::earliest_replace(std::int64_t now_us, std::span<const link::ToReplace>) const {
+link::Tick CommutatorMaster::earliest_replace(std::int64_t now_us,
+                                              std::span<const link::ToReplace>) const {
   const link::Tick next = tick_at(now_us) + 1;
   return motion_ ? std::max(next, motion_->steps.committed()) : next;
 }
 
-link::Tick Master::earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
-                                     link::Tick start) const {
+link::Tick CommutatorMaster::earliest_retarget(std::int64_t now_us,
+                                               std::span<const link::ToReplace> together,
+                                               link::Tick start) const {
   const bool begun = motion_ && motion_->asked;
   return begun ? earliest_replace(now_us, together)
                : std::max(start, earliest_start(now_us, kBoard, 0));
@@ -98,7 +101,7 @@ link::Tick Master::earliest_retarget(std::int64_t now_us, std::span<const link::
 
 // --- Bytes and time
 
-void Master::port_opened(std::int64_t now_us) {
+void CommutatorMaster::port_opened(std::int64_t now_us) {
   port_open_ = true;
   exchange_.forget();
   set_clock(now_us, plan_ns(now_us));
@@ -107,7 +110,7 @@ void Master::port_opened(std::int64_t now_us) {
   online_us_ = now_us + settle_us_;
 }
 
-void Master::port_lost(std::int64_t now_us, const std::string& cause) {
+void CommutatorMaster::port_lost(std::int64_t now_us, const std::string& cause) {
   port_open_ = false;
   if (motion_ && motion_->asked && !exchange_.cancel()) {
     uncertain(motion_->motor,
@@ -120,11 +123,11 @@ void Master::port_lost(std::int64_t now_us, const std::string& cause) {
   online_us_.reset();
 }
 
-void Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+void CommutatorMaster::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
   for (const std::uint8_t byte : bytes) handle(now_us, exchange_.receive(now_us, byte));
 }
 
-std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
+std::span<const std::uint8_t> CommutatorMaster::step(std::int64_t now_us) {
   if (!port_open_) return {};
   handle(now_us, exchange_.advance(now_us));
   if (online_us_ && now_us >= *online_us_) go_online(now_us);
@@ -137,7 +140,7 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   return out_;
 }
 
-std::int64_t Master::next_wake_us() const {
+std::int64_t CommutatorMaster::next_wake_us() const {
   if (!port_open_) return kNever;
   std::int64_t wake = exchange_.next_wake_us();
   if (online_us_) wake = std::min(wake, *online_us_);
@@ -148,19 +151,19 @@ std::int64_t Master::next_wake_us() const {
   return std::min(wake, report_wanted_ ? 0 : report_us_);
 }
 
-std::vector<link::Event> Master::take_events() {
+std::vector<link::Event> CommutatorMaster::take_events() {
   return std::exchange(events_, {});
 }
 
 // --- The exchange
 
-void Master::handle(std::int64_t now_us, const Exchange::Event& event) {
+void CommutatorMaster::handle(std::int64_t now_us, const Exchange::Event& event) {
   if (event.stray) ++health_.stray_frames;
   if (event.answer) answered(now_us, event.answer->status);
   if (event.lost) lost(now_us, event.lost->cause);
 }
 
-void Master::ask(std::int64_t now_us) {
+void CommutatorMaster::ask(std::int64_t now_us) {
   if (!motion_ || !exchange_.free()) return;
   Motion& motion = *motion_;
   const bool begins = !motion.asked && !motion.cut;
@@ -177,7 +180,7 @@ void Master::ask(std::int64_t now_us) {
 }
 
 // The delay of the next step: that of the plan, or longer on the way up again after a pause.
-std::uint64_t Master::paced(std::int64_t now_us, std::uint64_t delay_ns) {
+std::uint64_t CommutatorMaster::paced(std::int64_t now_us, std::uint64_t delay_ns) {
   Motion& motion = *motion_;
   const auto slot = board_.setup.table_of_motor.at(motion.motor);
   const bushd_table& table = *board_.setup.tables.at(*slot).table;
@@ -208,7 +211,7 @@ std::uint64_t Master::paced(std::int64_t now_us, std::uint64_t delay_ns) {
   return delay_ns;
 }
 
-void Master::answered(std::int64_t now_us, const Status& status) {
+void CommutatorMaster::answered(std::int64_t now_us, const Status& status) {
   Motion& motion = *motion_;
   const std::uint8_t motor = motion.motor;
   const bool planned = !motion.steps.has_left_plan() && !motion.cut;
@@ -241,18 +244,18 @@ void Master::answered(std::int64_t now_us, const Status& status) {
   }
 }
 
-void Master::take_limits(const Status& status, std::uint8_t motor) {
+void CommutatorMaster::take_limits(const Status& status, std::uint8_t motor) {
   bushd_report& report = board_.view.report;
   set_bit(report.forbidden_positive, motor, status.right_limit);
   set_bit(report.forbidden_negative, motor, status.left_limit);
 }
 
-void Master::set_powered(bool on) {
+void CommutatorMaster::set_powered(bool on) {
   std::uint8_t& flags = board_.view.report.flags;
   flags = static_cast<std::uint8_t>(on ? flags | BUSHD_FLAG_ENABLED : flags & ~BUSHD_FLAG_ENABLED);
 }
 
-void Master::lost(std::int64_t now_us, const std::string& cause) {
+void CommutatorMaster::lost(std::int64_t now_us, const std::string& cause) {
   ++board_.health.timeouts;
   uncertain(motion_->motor, cause +
                                 " to a step, which may have been made or not, and it stopped "
@@ -261,27 +264,27 @@ void Master::lost(std::int64_t now_us, const std::string& cause) {
 }
 
 // From now on reports tell where it is, not where it is in its plan.
-void Master::leave_plan() {
+void CommutatorMaster::leave_plan() {
   recent_.clear();
   motion_->steps.leave_plan();
 }
 
-void Master::cut() {
+void CommutatorMaster::cut() {
   recent_.clear();
   motion_->cut = true;
 }
 
-void Master::end_motion() {
+void CommutatorMaster::end_motion() {
   motion_.reset();
   report_wanted_ = true;
 }
 
-void Master::uncertain(std::uint8_t motor, std::string reason) {
+void CommutatorMaster::uncertain(std::uint8_t motor, std::string reason) {
   board_.view.uncertain_reason = std::move(reason);
   events_.emplace_back(link::PositionUncertain{kBoard, motor});
 }
 
-void Master::go_offline(std::int64_t now_us, std::string detail) {
+void CommutatorMaster::go_offline(std::int64_t now_us, std::string detail) {
   motion_.reset();
   recent_.clear();
   exchange_.forget();
@@ -294,7 +297,7 @@ void Master::go_offline(std::int64_t now_us, std::string detail) {
   board_.view.phase = link::McuPhase::kOffline;
 }
 
-void Master::go_online(std::int64_t now_us) {
+void CommutatorMaster::go_online(std::int64_t now_us) {
   online_us_.reset();
   board_.view.phase = link::McuPhase::kOnline;
   board_.view.detail.clear();
@@ -304,7 +307,7 @@ void Master::go_online(std::int64_t now_us) {
   events_.emplace_back(link::McuOnline{kBoard});
 }
 
-void Master::take_report(std::int64_t now_us) {
+void CommutatorMaster::take_report(std::int64_t now_us) {
   link::McuView& view = board_.view;
   bushd_report& report = view.report;
   view.tick = std::max(view.tick, tick_at(now_us));
@@ -332,7 +335,7 @@ void Master::take_report(std::int64_t now_us) {
 
 // --- Motion
 
-void Master::begin(link::McuIndex, std::uint8_t motor, link::Tick start) {
+void CommutatorMaster::begin(link::McuIndex, std::uint8_t motor, link::Tick start) {
   if (motion_) {
     events_.emplace_back(link::StartMissed{kBoard, motor});
     return;
@@ -343,20 +346,20 @@ void Master::begin(link::McuIndex, std::uint8_t motor, link::Tick start) {
       .steps = PlannedSteps(source_, kBoard, motor, static_cast<std::uint32_t>(tick_ns_), start)});
 }
 
-void Master::replace(link::McuIndex, std::uint16_t motors, link::Tick first) {
+void CommutatorMaster::replace(link::McuIndex, std::uint16_t motors, link::Tick first) {
   if (!motion_ || (motors & bit_of(motion_->motor)) == 0 || motion_->steps.has_left_plan()) return;
   if (motion_->asked && first < motion_->steps.committed()) {
     events_.emplace_back(link::ReplacementFailed{kBoard, bit_of(motion_->motor)});
   }
 }
 
-void Master::drop(link::McuIndex, std::uint8_t motor) {
+void CommutatorMaster::drop(link::McuIndex, std::uint8_t motor) {
   if (!motion_ || motion_->motor != motor || motion_->steps.has_left_plan()) return;
   if (!motion_->asked) return end_motion();
   leave_plan();
 }
 
-void Master::emergency_stop(bushd_stop_mode mode) {
+void CommutatorMaster::emergency_stop(bushd_stop_mode mode) {
   board_.view.bound_by_stop = true;
   board_.view.report.faults |= BUSHD_FAULT_EMERGENCY;
   report_wanted_ = true;
@@ -369,7 +372,7 @@ void Master::emergency_stop(bushd_stop_mode mode) {
 
 // --- Requests
 
-void Master::reconfigure(link::McuIndex, link::McuSetup setup) {
+void CommutatorMaster::reconfigure(link::McuIndex, link::McuSetup setup) {
   board_.setup = std::move(setup);
   if (board_.view.phase != link::McuPhase::kOnline) return;
   board_.view.phase = link::McuPhase::kConnecting;
@@ -377,7 +380,7 @@ void Master::reconfigure(link::McuIndex, link::McuSetup setup) {
   online_us_ = clock_us_;
 }
 
-Result<void> Master::check_room(link::McuIndex, const link::McuSetup& setup) const {
+Result<void> CommutatorMaster::check_room(link::McuIndex, const link::McuSetup& setup) const {
   for (const link::TableRef& ref : setup.tables) {
     const std::uint64_t fastest_ns =
         std::uint64_t{ref.table->time_unit_ns} * bushd_table_fastest(ref.table);
@@ -391,7 +394,7 @@ Result<void> Master::check_room(link::McuIndex, const link::McuSetup& setup) con
 }
 
 // Windings stay on: a board has nothing to switch them off with.
-void Master::control(link::McuIndex, std::uint8_t actions) {
+void CommutatorMaster::control(link::McuIndex, std::uint8_t actions) {
   report_wanted_ = true;
   const bool refused = (actions & BUSHD_CONTROL_DISABLE) != 0 ||
                        ((actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0 && motion_);
@@ -403,7 +406,8 @@ void Master::control(link::McuIndex, std::uint8_t actions) {
   }
 }
 
-void Master::set_position(link::McuIndex, std::uint8_t motor, std::int32_t position_steps) {
+void CommutatorMaster::set_position(link::McuIndex, std::uint8_t motor,
+                                    std::int32_t position_steps) {
   position_.at(motor) = position_steps;
   report_wanted_ = true;
 }

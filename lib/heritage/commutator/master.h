@@ -29,14 +29,14 @@
 
 namespace bushd::commutator {
 
-class Master final : public link::BusMaster {
+class CommutatorMaster final : public link::BusMaster {
  public:
   struct Setup {
     std::string name;  // tells its board from others, for what is kept of positions
     Exchange::Setup board{};
   };
   // `source` outlives it. Preconditions: the setup has one MCU, with outputs 0..7.
-  Master(Setup setup, link::BusSetup bus, link::TickSource& source);
+  CommutatorMaster(Setup setup, link::BusSetup bus, link::TickSource& source);
 
   void port_opened(std::int64_t now_us) override;
   void port_lost(std::int64_t now_us, const std::string& cause) override;

@@ -13,7 +13,7 @@ constexpr std::int64_t kLineAskUs = 2'000;  // whether the run of the line is ov
 
 // A driver may stop for a while. What it still had when it was asked has not left; so nothing is
 // counted that would have left since.
-void Master::count_gone(std::int64_t now_us) {
+void SerialPulseMaster::count_gone(std::int64_t now_us) {
   const std::int64_t asked_ns = std::min(now_us, status_us_) * 1000;
   while (sent_.size() > status_->queued && sent_.front().gone_ns <= asked_ns) {
     if (run_) {
@@ -29,7 +29,7 @@ void Master::count_gone(std::int64_t now_us) {
 }
 
 // The bytes that the driver has leave one after the other, and none of them before now.
-void Master::follow_queue() {
+void SerialPulseMaster::follow_queue() {
   if (status_->queued == 0 || status_->baud == 0) return;
   const auto one_ns = static_cast<std::int64_t>(byte_ns(status_->baud));
   const std::int64_t begun_ns = status_us_ * 1000;
@@ -45,7 +45,7 @@ void Master::follow_queue() {
   line_free_ns_ = free_ns;
 }
 
-bool Master::drained(std::int64_t now_us) const {
+bool SerialPulseMaster::drained(std::int64_t now_us) const {
   const std::int64_t free_us = us_of(line_free_ns_);
   if (!sent_.empty() || now_us < free_us || status_us_ < free_us) return false;
   if (status_->queued > 0) return false;
@@ -53,7 +53,7 @@ bool Master::drained(std::int64_t now_us) const {
   return now_us >= std::max(free_us, quiet_since_us_) + kUnseenUs;
 }
 
-void Master::wait_until_drained(std::int64_t now_us) {
+void SerialPulseMaster::wait_until_drained(std::int64_t now_us) {
   const std::int64_t free_us = us_of(line_free_ns_);
   if (status_us_ < free_us) return ask_at(std::max(free_us, now_us));
   if (status_->queued > 0 || status_->empty) return ask_at(now_us + kDrainAskUs);
@@ -61,13 +61,13 @@ void Master::wait_until_drained(std::int64_t now_us) {
 }
 
 // Since it was asked last the driver may have done nothing.
-std::uint32_t Master::unsure_steps() const {
+std::uint32_t SerialPulseMaster::unsure_steps() const {
   std::uint32_t steps = 0;
   for (const Sent& sent : recent_) steps += sent.steps;
   return steps;
 }
 
-void Master::write(std::int64_t now_us, link::PulseOrder& order) {
+void SerialPulseMaster::write(std::int64_t now_us, link::PulseOrder& order) {
   if (run_->pace) tell_line(now_us);
   if (run_->ahead.left() == 0 && run_->pace && drained(now_us)) return wake_at(now_us + kLineAskUs);
   if (run_->ahead.left() == 0) return wait_until_drained(now_us);
@@ -78,7 +78,7 @@ void Master::write(std::int64_t now_us, link::PulseOrder& order) {
 }
 
 // Before its first byte the direction is set, and kept for a while.
-bool Master::may_write(std::int64_t now_us, link::PulseOrder& order) {
+bool SerialPulseMaster::may_write(std::int64_t now_us, link::PulseOrder& order) {
   Run& run = *run_;
   const bool positive = run.direction > 0;
   if (status_->positive != positive) {
@@ -111,7 +111,7 @@ bool Master::may_write(std::int64_t now_us, link::PulseOrder& order) {
 }
 
 // Returns whether another one may follow at once.
-bool Master::write_byte(std::int64_t now_us, link::PulseOrder& order) {
+bool SerialPulseMaster::write_byte(std::int64_t now_us, link::PulseOrder& order) {
   Run& run = *run_;
   const auto delays = delays_ahead(run.ahead, planner_.horizon_ns(), Planner::kLookAhead);
   const Ahead ahead{.delays_ns = delays, .to_the_end = delays.size() == run.ahead.left()};
@@ -161,14 +161,14 @@ bool Master::write_byte(std::int64_t now_us, link::PulseOrder& order) {
 }
 
 // Where the driver tells that all has left, it is known how much later that is than it should be.
-void Master::measure_pauses() {
+void SerialPulseMaster::measure_pauses() {
   count_gone(now_us_);
   if (!burst_us_ || !drained(now_us_)) return;
   burst_us_.reset();
   if (status_->empty) add_pause(now_us_ - us_of(line_free_ns_) - kDrainAskUs);
 }
 
-void Master::add_pause(std::int64_t us) {
+void SerialPulseMaster::add_pause(std::int64_t us) {
   constexpr std::int64_t kWorthTellingUs = 1'000;
   if (us <= 0) return;
   pauses_.pauses_us += us;

@@ -21,7 +21,7 @@ constexpr std::int64_t kBounceUs = 5'000;  // behind a step nothing is read for 
 
 }  // namespace
 
-void Master::home(link::McuIndex, const bushd_home& message) {
+void SerialPulseMaster::home(link::McuIndex, const bushd_home& message) {
   requests_open_ = true;
   report_due_us_ = wake_us_ = 0;
   if (message.most_steps == 0) {
@@ -46,7 +46,7 @@ void Master::home(link::McuIndex, const bushd_home& message) {
   begin_fast(now_us_, ahead ? -direction : direction);
 }
 
-void Master::begin_fast(std::int64_t now_us, int direction) {
+void SerialPulseMaster::begin_fast(std::int64_t now_us, int direction) {
   homing_->stage = BUSHD_HOMING_FAST;
   homing_->meets_limit = false;
   bushd_run run;
@@ -54,7 +54,7 @@ void Master::begin_fast(std::int64_t now_us, int direction) {
   begin_run(now_us, {.run = run, .line = {}}, 0, false);
 }
 
-void Master::begin_slow(std::int64_t now_us, bushd_homing stage, int direction) {
+void SerialPulseMaster::begin_slow(std::int64_t now_us, bushd_homing stage, int direction) {
   homing_->stage = stage;
   homing_->readings = 0;
   const bushd_delay slow = homing_->message.slow_delay;
@@ -68,7 +68,7 @@ void Master::begin_slow(std::int64_t now_us, bushd_homing stage, int direction) 
   run_->slow = true;
 }
 
-void Master::follow_homing(std::int64_t now_us) {
+void SerialPulseMaster::follow_homing(std::int64_t now_us) {
   if (!homing_) return;
   if (faults_ != 0 || homing_->stopped) {
     if (run_ && run_->slow) ramp_down(true);
@@ -82,7 +82,7 @@ void Master::follow_homing(std::int64_t now_us) {
   }
 }
 
-void Master::follow_fast(std::int64_t now_us) {
+void SerialPulseMaster::follow_fast(std::int64_t now_us) {
   Homing& homing = *homing_;
   const int direction = homing.message.direction;
   const bool immediately = (setup_.mcus[0].inputs.limit_immediate & 1) != 0;
@@ -104,7 +104,7 @@ void Master::follow_fast(std::int64_t now_us) {
   }
 }
 
-bool Master::is_sure(std::int64_t now_us, bool as_wanted) {
+bool SerialPulseMaster::is_sure(std::int64_t now_us, bool as_wanted) {
   Homing& homing = *homing_;
   if (!as_wanted) {
     homing.readings = 0;
@@ -120,7 +120,7 @@ bool Master::is_sure(std::int64_t now_us, bool as_wanted) {
 }
 
 // The last step has been made for sure, and the lines have been read since, when they were quiet.
-bool Master::looked(std::int64_t now_us) {
+bool SerialPulseMaster::looked(std::int64_t now_us) {
   if (!drained(now_us)) {
     wait_until_drained(now_us);
     return false;
@@ -131,7 +131,7 @@ bool Master::looked(std::int64_t now_us) {
   return false;
 }
 
-void Master::follow_slow(std::int64_t now_us) {
+void SerialPulseMaster::follow_slow(std::int64_t now_us) {
   if (!run_) return end_homing(now_us, BUSHD_HOMING_STOPPED);
   if (!looked(now_us)) return;
   const bool approaches = homing_->stage == BUSHD_HOMING_APPROACH;
@@ -152,7 +152,7 @@ void Master::follow_slow(std::int64_t now_us) {
                                   : BUSHD_HOMING_STUCK);
 }
 
-void Master::end_homing(std::int64_t now_us, bushd_homing how) {
+void SerialPulseMaster::end_homing(std::int64_t now_us, bushd_homing how) {
   last_homing_ = how;
   homing_.reset();
   report_due_us_ = now_us;

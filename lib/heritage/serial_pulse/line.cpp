@@ -17,8 +17,8 @@ namespace bushd::serial_pulse {
 using link::LinePace;
 using link::Tick;
 
-void Master::begin_in_pace(link::McuIndex mcu, std::uint8_t motor, Tick start,
-                           LinePace::Place place) {
+void SerialPulseMaster::begin_in_pace(link::McuIndex mcu, std::uint8_t motor, Tick start,
+                                      LinePace::Place place) {
   const auto plan = source_.plan_on_line_at(mcu, motor, start);
   if (!plan || run_ || !status_) {
     events_.push_back(link::StartMissed{mcu, motor});
@@ -31,7 +31,7 @@ void Master::begin_in_pace(link::McuIndex mcu, std::uint8_t motor, Tick start,
   tell_note();
 }
 
-std::optional<link::MotorPlan> Master::plan_from(Tick first) {
+std::optional<link::MotorPlan> SerialPulseMaster::plan_from(Tick first) {
   if (run_->on_line) return source_.plan_on_line_at({0}, 0, first);
   const auto run = source_.plan_at({0}, 0, first);
   if (!run) return std::nullopt;
@@ -39,7 +39,7 @@ std::optional<link::MotorPlan> Master::plan_from(Tick first) {
 }
 
 // The ticks of the line are those of its run's time, the same for all of its motors.
-Tick Master::line_clock(std::int64_t now_us) const {
+Tick SerialPulseMaster::line_clock(std::int64_t now_us) const {
   if (!run_->pace->begun()) return run_->start;
   return run_->start +
          std::max<std::int64_t>(run_->pace->run_ns(now_us * 1000), 0) / setup_.tick_ns;
@@ -47,7 +47,7 @@ Tick Master::line_clock(std::int64_t now_us) const {
 
 // One that has made its last step waits until the run is over, so that its ticks are those of the
 // others.
-bool Master::line_is_over(std::int64_t now_us) {
+bool SerialPulseMaster::line_is_over(std::int64_t now_us) {
   Run& run = *run_;
   if (!run.pace) return true;
   advance_ticks(now_us, false);
@@ -59,7 +59,7 @@ bool Master::line_is_over(std::int64_t now_us) {
 }
 
 // When its next step can be made, and whether it can at all.
-void Master::tell_line(std::int64_t now_us) {
+void SerialPulseMaster::tell_line(std::int64_t now_us) {
   Run& run = *run_;
   if (run.ahead.left() == 0) {
     if (now_us >= run.not_before_us) run.pace->ready(now_us * 1000);
@@ -74,7 +74,7 @@ void Master::tell_line(std::int64_t now_us) {
 }
 
 // Precondition: it could write its next byte.
-bool Master::waits_for_line(std::int64_t now_us) {
+bool SerialPulseMaster::waits_for_line(std::int64_t now_us) {
   Run& run = *run_;
   const std::int64_t now_ns = now_us * 1000;
   if (!run.pace->ready(now_ns)) {
@@ -91,7 +91,7 @@ bool Master::waits_for_line(std::int64_t now_us) {
 }
 
 // Behind the last byte that was written another delay has to be kept than was planned then.
-void Master::keep_delay_of(const Steps& ahead) {
+void SerialPulseMaster::keep_delay_of(const Steps& ahead) {
   if (!run_->on_line || run_->written == 0) return;
   Steps next = ahead;
   const std::uint64_t delay_ns = next.take_ns();
@@ -100,7 +100,7 @@ void Master::keep_delay_of(const Steps& ahead) {
 }
 
 // From when the last byte has left for sure, `kept_ns` after its last step at the least.
-std::int64_t Master::hold_us_of(std::uint64_t delay_ns, std::uint64_t kept_ns) const {
+std::int64_t SerialPulseMaster::hold_us_of(std::uint64_t delay_ns, std::uint64_t kept_ns) const {
   std::uint64_t least_ns = delay_ns;
   if (run_->pace) {
     const std::uint16_t longest = std::max(table().accel.code[0], table().decel.code[0]);
@@ -111,7 +111,7 @@ std::int64_t Master::hold_us_of(std::uint64_t delay_ns, std::uint64_t kept_ns) c
 }
 
 // Within a byte steps are even.
-link::RunProgress Master::progress_at(std::int64_t now_ns) const {
+link::RunProgress SerialPulseMaster::progress_at(std::int64_t now_ns) const {
   std::int64_t left_ns = run_->left_ns;
   for (const Sent& byte : sent_) {
     const std::int64_t begun_ns = byte.gone_ns - byte.takes_ns;
@@ -130,7 +130,7 @@ link::RunProgress Master::progress_at(std::int64_t now_ns) const {
   return {left_ns, next.time_ns()};
 }
 
-void Master::measure_line(std::int64_t now_us) {
+void SerialPulseMaster::measure_line(std::int64_t now_us) {
   if (!run_ || !run_->pace || !run_->pace->begun()) return;
   const std::int64_t ahead_ns = run_->pace->measure(now_us * 1000);
   health_.clock_offset_us = 1e-3 * static_cast<double>(ahead_ns);
@@ -143,7 +143,7 @@ void Master::measure_line(std::int64_t now_us) {
   tell_note();
 }
 
-void Master::tell_note() {
+void SerialPulseMaster::tell_note() {
   view_.note = pauses_note_;
   if (!pauses_note_.empty() && !line_note_.empty()) view_.note += "; ";
   view_.note += line_note_;

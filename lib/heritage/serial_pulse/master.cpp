@@ -29,7 +29,8 @@ std::uint64_t motor_ns(const link::MotorPlan& plan, bushd_delay delay) {
 
 }  // namespace
 
-Master::Master(link::BusSetup setup, link::TickSource& source, std::uint64_t unique_id)
+SerialPulseMaster::SerialPulseMaster(link::BusSetup setup, link::TickSource& source,
+                                     std::uint64_t unique_id)
     : setup_(std::move(setup)), source_(source) {
   bushd_identity& identity = view_.identity;
   identity.protocol_version = BUSHD_PROTOCOL_VERSION;
@@ -42,7 +43,7 @@ Master::Master(link::BusSetup setup, link::TickSource& source, std::uint64_t uni
   }
 }
 
-void Master::port_opened(std::int64_t now_us) {
+void SerialPulseMaster::port_opened(std::int64_t now_us) {
   open_ = true;
   waits_ = fresh_ = false;
   order_.reset();
@@ -54,7 +55,7 @@ void Master::port_opened(std::int64_t now_us) {
   wake_us_ = now_us;
 }
 
-void Master::port_lost(std::int64_t now_us, const std::string& cause) {
+void SerialPulseMaster::port_lost(std::int64_t now_us, const std::string& cause) {
   const bool was_online = view_.phase == link::McuPhase::kOnline;
   if (status_) count_gone(now_us);
   const std::uint32_t unsure = unsure_steps();
@@ -87,11 +88,11 @@ void Master::port_lost(std::int64_t now_us, const std::string& cause) {
   events_.push_back(link::PositionUncertain{kMcu, 0});
 }
 
-std::vector<link::Event> Master::take_events() {
+std::vector<link::Event> SerialPulseMaster::take_events() {
   return std::exchange(events_, {});
 }
 
-std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
+std::span<const std::uint8_t> SerialPulseMaster::step(std::int64_t now_us) {
   fresh_ = false;
   now_us_ = now_us;
   if (!open_ || waits_) return {};
@@ -128,11 +129,11 @@ std::span<const std::uint8_t> Master::step(std::int64_t now_us) {
   return {};
 }
 
-std::int64_t Master::next_wake_us() const {
+std::int64_t SerialPulseMaster::next_wake_us() const {
   return open_ && !waits_ ? wake_us_ : INT64_MAX;
 }
 
-void Master::pulse_status(std::int64_t now_us, const link::PulseStatus& status) {
+void SerialPulseMaster::pulse_status(std::int64_t now_us, const link::PulseStatus& status) {
   if (!open_) return;
   waits_ = false;
   now_us_ = now_us;
@@ -159,7 +160,7 @@ void Master::pulse_status(std::int64_t now_us, const link::PulseStatus& status) 
   measure_pauses();
 }
 
-void Master::identify() {
+void SerialPulseMaster::identify() {
   view_.phase = link::McuPhase::kOnline;
   view_.detail.clear();
   view_.identified = true;
@@ -169,24 +170,25 @@ void Master::identify() {
 
 // --- Time
 
-std::int64_t Master::us_per_ticks(Tick ticks) const {
+std::int64_t SerialPulseMaster::us_per_ticks(Tick ticks) const {
   return ticks * setup_.tick_ns / 1000;
 }
 
-Tick Master::clock(std::int64_t now_us) const {
+Tick SerialPulseMaster::clock(std::int64_t now_us) const {
   return base_tick_ + (now_us - base_us_) * 1000 / setup_.tick_ns;
 }
 
-Tick Master::tick_at(std::int64_t now_us) const {
+Tick SerialPulseMaster::tick_at(std::int64_t now_us) const {
   return run_ && run_->planned ? run_->tick : clock(now_us);
 }
 
-Tick Master::earliest_start(std::int64_t now_us, McuIndex, std::uint8_t) const {
+Tick SerialPulseMaster::earliest_start(std::int64_t now_us, McuIndex, std::uint8_t) const {
   return std::max(clock(now_us), view_.tick) + 2;
 }
 
 // The first tick at whose beginning the plan has made all that has been written.
-Tick Master::earliest_replace(std::int64_t now_us, std::span<const link::ToReplace>) const {
+Tick SerialPulseMaster::earliest_replace(std::int64_t now_us,
+                                         std::span<const link::ToReplace>) const {
   if (!run_ || !run_->planned) return clock(now_us) + 2;
   const Run& run = *run_;
   if (run.written == 0) return run.tick;
@@ -199,14 +201,15 @@ Tick Master::earliest_replace(std::int64_t now_us, std::span<const link::ToRepla
   }
 }
 
-Tick Master::earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
-                               Tick start) const {
+Tick SerialPulseMaster::earliest_retarget(std::int64_t now_us,
+                                          std::span<const link::ToReplace> together,
+                                          Tick start) const {
   return std::max(earliest_replace(now_us, together), start);
 }
 
 // The report is of the last tick at whose beginning the plan had made no more steps than have left.
 // The last tick of a run is told when all has left for sure.
-void Master::advance_ticks(std::int64_t now_us, bool to_the_end) {
+void SerialPulseMaster::advance_ticks(std::int64_t now_us, bool to_the_end) {
   Run& run = *run_;
   if (run.tick < run.start) run.tick = to_the_end ? run.start : std::min(run.start, clock(now_us));
   if (run.tick < run.start) return;
@@ -227,29 +230,29 @@ void Master::advance_ticks(std::int64_t now_us, bool to_the_end) {
 
 // --- Inputs
 
-bool Master::reads(std::uint8_t number) const {
+bool SerialPulseMaster::reads(std::uint8_t number) const {
   const unsigned active = status_->lines ^ setup_.mcus[0].inputs.inverted;
   return (active >> number & 1) != 0;
 }
 
-bushd_motor_inputs Master::numbers() const {
+bushd_motor_inputs SerialPulseMaster::numbers() const {
   const auto& named = setup_.mcus[0].motor_inputs;
   return named.empty() ? bushd_motor_inputs{} : named.front();
 }
 
-bool Master::at_limit(int direction) const {
+bool SerialPulseMaster::at_limit(int direction) const {
   const bushd_set_inputs& inputs = setup_.mcus[0].inputs;
   const bool has = ((direction > 0 ? inputs.limit_positive : inputs.limit_negative) & 1) != 0;
   return has && reads(direction > 0 ? numbers().positive : numbers().negative);
 }
 
 // For a report that tells where a run was ended, too, however its switch is by then.
-bool Master::forbidden(int direction) const {
+bool SerialPulseMaster::forbidden(int direction) const {
   return (run_ && run_->limited && run_->direction == direction) ||
          now_us_ < limit_us_[direction > 0] + kReleaseUs;
 }
 
-void Master::watch_limits(std::int64_t now_us) {
+void SerialPulseMaster::watch_limits(std::int64_t now_us) {
   if (!run_ || homing_ || !forbidden(run_->direction)) return;
   const bool immediately = (setup_.mcus[0].inputs.limit_immediate & 1) != 0;
   if (!run_->planned && !immediately) return;  // it ramps down already
@@ -259,12 +262,12 @@ void Master::watch_limits(std::int64_t now_us) {
 
 // --- Runs
 
-const bushd_table& Master::table() const {
+const bushd_table& SerialPulseMaster::table() const {
   const link::McuSetup& mcu = setup_.mcus[0];
   return *mcu.tables[mcu.table_of_motor[0].value_or(0)].table;
 }
 
-void Master::begin(McuIndex, std::uint8_t, Tick start) {
+void SerialPulseMaster::begin(McuIndex, std::uint8_t, Tick start) {
   const auto plan = source_.plan_at(kMcu, 0, start);
   if (!plan || run_ || !status_) {
     events_.push_back(link::StartMissed{kMcu, 0});
@@ -273,7 +276,8 @@ void Master::begin(McuIndex, std::uint8_t, Tick start) {
   begin_run(base_us_, {.run = *plan, .line = {}}, start, true);
 }
 
-void Master::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick start, bool planned) {
+void SerialPulseMaster::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick start,
+                                  bool planned) {
   const bushd_run& run = plan.run;
   // Of a line the delay before the first step counts from when all are ready.
   const std::int64_t first_us =
@@ -294,7 +298,7 @@ void Master::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick st
   wake_us_ = 0;
 }
 
-void Master::plan_rates(const link::MotorPlan& plan) {
+void SerialPulseMaster::plan_rates(const link::MotorPlan& plan) {
   const bushd_run& run = plan.run;
   const auto ns_of = [&](bushd_delay delay) { return motor_ns(plan, delay); };
   const std::uint64_t longest = ns_of(
@@ -314,7 +318,7 @@ void Master::plan_rates(const link::MotorPlan& plan) {
   for (const auto& [ask, made] : made_) planner_.learn(ask, made);
 }
 
-void Master::replace(McuIndex, std::uint16_t, Tick first) {
+void SerialPulseMaster::replace(McuIndex, std::uint16_t, Tick first) {
   if (!run_ || !run_->planned) return;
   Run& run = *run_;
   const auto plan = plan_from(first);
@@ -337,7 +341,7 @@ void Master::replace(McuIndex, std::uint16_t, Tick first) {
 }
 
 // From now on ticks go by the clock, for the plan does not tell any more where the motor is.
-void Master::leave_plan(std::int64_t now_us, bool immediately) {
+void SerialPulseMaster::leave_plan(std::int64_t now_us, bool immediately) {
   if (run_->planned) {
     base_tick_ = run_->tick;
     base_us_ = now_us;
@@ -348,7 +352,7 @@ void Master::leave_plan(std::int64_t now_us, bool immediately) {
   report_due_us_ = now_us;
 }
 
-void Master::ramp_down(bool immediately) {
+void SerialPulseMaster::ramp_down(bool immediately) {
   Run& run = *run_;
   // One that has not made a step need not begin in order to stop.
   if (immediately || run.written == 0) return run.ahead.end();
@@ -358,7 +362,7 @@ void Master::ramp_down(bool immediately) {
   keep_delay_of(run.ahead);
 }
 
-void Master::end_run(std::int64_t now_us) {
+void SerialPulseMaster::end_run(std::int64_t now_us) {
   if (run_->planned) {
     advance_ticks(now_us, true);
     base_tick_ = run_->tick;
@@ -371,12 +375,12 @@ void Master::end_run(std::int64_t now_us) {
   report_due_us_ = now_us;
 }
 
-void Master::drop(McuIndex, std::uint8_t) {
+void SerialPulseMaster::drop(McuIndex, std::uint8_t) {
   if (!run_ || !run_->planned) return;
   if (run_->ahead.left() > 0 || run_->pace) leave_plan(now_us_, false);
 }
 
-void Master::emergency_stop(bushd_stop_mode mode) {
+void SerialPulseMaster::emergency_stop(bushd_stop_mode mode) {
   faults_ |= BUSHD_FAULT_EMERGENCY;
   view_.bound_by_stop = true;
   if (run_) leave_plan(now_us_, mode == BUSHD_STOP_IMMEDIATE);
@@ -386,12 +390,12 @@ void Master::emergency_stop(bushd_stop_mode mode) {
 
 // --- Requests
 
-void Master::reconfigure(McuIndex, link::McuSetup setup) {
+void SerialPulseMaster::reconfigure(McuIndex, link::McuSetup setup) {
   setup_.mcus[0] = std::move(setup);
   if (view_.phase == link::McuPhase::kOnline) events_.push_back(link::McuOnline{kMcu});
 }
 
-void Master::control(McuIndex, std::uint8_t actions) {
+void SerialPulseMaster::control(McuIndex, std::uint8_t actions) {
   if ((actions & BUSHD_CONTROL_CLEAR_FAULTS) != 0 && !run_) {
     faults_ = 0;
     view_.bound_by_stop = false;
@@ -404,13 +408,13 @@ void Master::control(McuIndex, std::uint8_t actions) {
   report_due_us_ = wake_us_ = 0;
 }
 
-void Master::set_position(McuIndex, std::uint8_t, std::int32_t position_steps) {
+void SerialPulseMaster::set_position(McuIndex, std::uint8_t, std::int32_t position_steps) {
   if (!run_) position_ = position_steps;
   requests_open_ = true;
   report_due_us_ = wake_us_ = 0;
 }
 
-void Master::report(std::int64_t now_us) {
+void SerialPulseMaster::report(std::int64_t now_us) {
   const bool begun = run_ && (!run_->planned || run_->tick >= run_->start);
   const bushd_set_inputs& inputs = setup_.mcus[0].inputs;
   std::int64_t position = position_;

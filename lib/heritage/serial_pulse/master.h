@@ -41,7 +41,7 @@ constexpr std::int64_t us_of(std::int64_t ns) {
   return (ns + 999) / 1000;
 }
 
-class Master final : public link::BusMaster, private link::LinePort {
+class SerialPulseMaster final : public link::BusMaster, private link::LinePort {
  public:
   // Bytes under way, at most: where one takes nearly as long or longer, it and as much before it.
   static constexpr std::int64_t kMostAheadUs = 20'000;
@@ -57,7 +57,7 @@ class Master final : public link::BusMaster, private link::LinePort {
 
   // One MCU with one motor, at output 0. `source` outlives it. `unique_id`: of the port, so that a
   // kept position is known again.
-  Master(link::BusSetup setup, link::TickSource& source, std::uint64_t unique_id);
+  SerialPulseMaster(link::BusSetup setup, link::TickSource& source, std::uint64_t unique_id);
 
   void port_opened(std::int64_t now_us) override;
   void port_lost(std::int64_t now_us, const std::string& cause) override;

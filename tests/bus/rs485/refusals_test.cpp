@@ -223,7 +223,7 @@ TEST(Connect, EmissionThatTheMcuRefusesIsNamedWithItsPlaceInTheConfiguration) {
   bus.setup.mcus[0].emission.settings.pulse_us = 3;
   bus.setup.mcus[0].emission.pulse_at = {
       .message = {}, .file = "b.toml", .line = 7, .key = "mcu[0].pulse_us", .column = 12};
-  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
+  bus.master = std::make_unique<link::Rs485Master>(bus.setup, bus.source);
   bus.master->port_opened(bus.now_us);
   bus.slaves[0].refusals = {{BUSHD_MSG_EMISSION, BUSHD_E_PULSE_WIDTH}};
   ASSERT_TRUE(bus.run_until([&] {
@@ -238,7 +238,7 @@ TEST(Connect, EmissionThatAnMcuDoesNotKnowIsNotAskedFor) {
   bus.setup.mcus[0].emission.settings.mode = BUSHD_EMISSION_BURST;
   bus.setup.mcus[0].emission.settings.step_us = 100;
   bus.setup.mcus[0].emission.mode_at = {.message = {}, .file = "b.toml", .key = "mcu[0].emission"};
-  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
+  bus.master = std::make_unique<link::Rs485Master>(bus.setup, bus.source);
   bus.master->port_opened(bus.now_us);
   bus.run_for(1'000'000);
   EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
@@ -252,7 +252,7 @@ TEST(Connect, TableThatIsTooFastForTheEmissionKeepsTheMcuAway) {
   bus.slaves[0].identity.capabilities |= BUSHD_CAN_BURST;
   bus.setup.mcus[0].emission.settings.mode = BUSHD_EMISSION_BURST;
   bus.setup.mcus[0].emission.settings.step_us = 2000;
-  bus.master = std::make_unique<link::Master>(bus.setup, bus.source);
+  bus.master = std::make_unique<link::Rs485Master>(bus.setup, bus.source);
   bus.master->port_opened(bus.now_us);
   bus.run_for(1'000'000);
   EXPECT_THAT(

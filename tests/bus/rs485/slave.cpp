@@ -26,7 +26,7 @@ FakeBus::FakeBus(int count, int motors, bushd_format format, std::uint32_t tick_
     slave.zero_us = -1'000'000 - 12'345 * i;
     slaves.push_back(slave);
   }
-  master = std::make_unique<link::Master>(setup, source);
+  master = std::make_unique<link::Rs485Master>(setup, source);
   master->port_opened(now_us);
 }
 

@@ -149,7 +149,7 @@ class FakeBus {
   std::vector<std::uint16_t> codes;
   bushd_table table{};
   link::BusSetup setup;
-  std::unique_ptr<link::Master> master;
+  std::unique_ptr<link::Rs485Master> master;
   std::vector<Heard> heard;  // every frame of the master
   std::vector<link::Event> events;
   std::int64_t master_bytes = 0;

@@ -99,7 +99,7 @@ class Moving {
         bus(line.mcus, line.motors, line.format, line.tick_us * 1000, line.baud) {
     for (Slave& slave : bus.slaves) slave.identity.queue_ticks = line.tick_us < 1'000 ? 1024 : 256;
     bus.source.end = [](std::uint8_t) { return 1'000'000'000; };
-    bus.master = std::make_unique<link::Master>(bus.setup, source_);
+    bus.master = std::make_unique<link::Rs485Master>(bus.setup, source_);
     bus.master->port_opened(bus.now_us);
     bus.connect();
   }

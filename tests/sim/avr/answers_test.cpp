@@ -23,7 +23,7 @@ TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
     ASSERT_EQ(master_.frames.size(), 1u);
     const Frame& answer = master_.frames[0];
     const auto bytes = static_cast<TimeNs>(
-        Master::wire(kAddress, answer.type, answer.sequence, answer.payload).size());
+        FrameMaster::wire(kAddress, answer.type, answer.sequence, answer.payload).size());
     ASSERT_LT(answer.end_ns - bytes * kByteNs - asked_ns, TimeNs{kTickNs}) << "poll " << i;
   }
 }
