@@ -169,12 +169,12 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
   return motors;
 }
 
-link::LineRun Mcu::line_run(const motion::LineShare& share, bushd_delay floor,
+link::LineRun Mcu::line_run(const motion::LineShare& share, bushd_delay shortest_delay,
                             link::Tick ticks) const {
   // What really begins has its table there. A dry run may ask before: this is where it would be.
   const auto slot = master_.slot_of(on_bus_, share.table->view());
   return {.slot = slot.value_or(BUSHD_SCRATCH_SLOT),
-          .floor = floor,
+          .shortest_delay = shortest_delay,
           .longest = share.longest,
           .from = share.from,
           .steps = share.to - share.from,
@@ -192,9 +192,9 @@ bool Installation::rests(const Mcu& mcu) const {
   return !any_moves(mcu) && (!mcu.online() || mcu.report().moving == 0);
 }
 
-bool Installation::by_table(const Mcu& mcu, std::int64_t steps, bushd_delay floor) const {
+bool Installation::by_table(const Mcu& mcu, std::int64_t steps, bushd_delay shortest_delay) const {
   return (bus_of(mcu).config.table_runs || !mcu.streams()) && mcu.can_run_tables() &&
-         (bushd_delay_is_code(floor) || mcu.can_run_slowly()) &&
+         (bushd_delay_is_code(shortest_delay) || mcu.can_run_slowly()) &&
          std::abs(steps) <= motion::Motor::kMaxPosition;
 }
 

@@ -98,11 +98,11 @@ class Mcu {
   bool has_table(const bushd_table& table) const {
     return master_.slot_of(on_bus_, table).has_value();
   }
-  bool keeps_up_with(const bushd_table& table, bushd_delay floor, bool alone) const {
-    return master_.keeps_up_with(on_bus_, table, floor, alone);
+  bool keeps_up_with(const bushd_table& table, bushd_delay shortest_delay, bool alone) const {
+    return master_.keeps_up_with(on_bus_, table, shortest_delay, alone);
   }
-  bool can_run_line(const bushd_table& table, bushd_delay floor, bool alone) const {
-    return master_.can_run_line(on_bus_, table, floor, alone);
+  bool can_run_line(const bushd_table& table, bushd_delay shortest_delay, bool alone) const {
+    return master_.can_run_line(on_bus_, table, shortest_delay, alone);
   }
   bool makes_lines() const { return master_.makes_lines(on_bus_); }
   // A table for lines (link::BusMaster::upload). Precondition: it rests, and has answered.
@@ -140,9 +140,10 @@ class Mcu {
   }
   // Of a motor's share that the MCUs are to make themselves, in so many ticks. Precondition:
   // can_run_line of its line, or its table is yet to be uploaded.
-  link::LineRun line_run(const motion::LineShare& share, bushd_delay floor, link::Tick ticks) const;
+  link::LineRun line_run(const motion::LineShare& share, bushd_delay shortest_delay,
+                         link::Tick ticks) const;
   link::LineRun line_run(const motion::Axis& axis) const {
-    return line_run(*axis.line(), axis.floor(), axis.over_tick() - axis.start_tick());
+    return line_run(*axis.line(), axis.shortest_delay(), axis.over_tick() - axis.start_tick());
   }
   void begin_line_run(Output output, const motion::Axis& axis) {
     master_.begin_line_run(on_bus_, output.value, axis.start_tick(), line_run(axis));
@@ -230,7 +231,7 @@ class Installation {
   bool any_moves(const Mcu& mcu) const;  // or is not at rest
   bool rests(const Mcu& mcu) const;      // all of it, as planned and as reported
   // The MCU gets such a move as a whole and runs it by the motor's table.
-  bool by_table(const Mcu& mcu, std::int64_t steps, bushd_delay floor) const;
+  bool by_table(const Mcu& mcu, std::int64_t steps, bushd_delay shortest_delay) const;
 
   // By the names that clients use; none of them twice.
   Result<MotorId> find(const std::string& name) const;

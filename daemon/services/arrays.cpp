@@ -95,14 +95,14 @@ Result<std::list<Arrays::Array>::iterator> Arrays::begin(const api::Asker& asker
           "from point to point",
           motor.name(), installation_.bus_of(mcu).config.name));
     }
-    const auto floor = moves_.floor_of(id, std::nullopt);
-    if (!floor) return fail(floor.error());
+    const auto shortest_delay = moves_.shortest_delay_of(id, std::nullopt);
+    if (!shortest_delay) return fail(shortest_delay.error());
     const tables::TablePtr table = installation_.table_of(id);
     array.parts.push_back({.motor = id,
                            .table = table,
                            .coordinates = motor.coordinates(),
                            .bounds = {.table = &table->view(),
-                                      .floor = *floor,
+                                      .shortest_delay = *shortest_delay,
                                       .lowest = motor.lowest(),
                                       .highest = motor.highest()}});
   }

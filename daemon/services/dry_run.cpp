@@ -13,16 +13,17 @@ namespace {
 constexpr std::uint64_t kMaxFrames = 3000;
 
 api::MovePlan::Motor plan_of(const std::string& name, bushd_table table, std::int64_t steps,
-                             bushd_delay floor) {
-  if (!bushd_delay_is_code(floor)) {  // the delay of all
-    const double delay_s = static_cast<double>(floor) * table.time_unit_ns * 1e-9;
+                             bushd_delay shortest_delay) {
+  if (!bushd_delay_is_code(shortest_delay)) {  // the delay of all
+    const double delay_s = static_cast<double>(shortest_delay) * table.time_unit_ns * 1e-9;
     const double all_us = delay_s * 1e6 * static_cast<double>(std::abs(steps));
     return {.motor = name,
             .steps = steps,
             .duration_us = static_cast<std::int64_t>(all_us),
             .peak_steps_per_s = steps == 0 ? 0.0 : 1 / delay_s};
   }
-  table.cruise = std::max(table.cruise, static_cast<std::uint16_t>(floor));  // the same move
+  table.cruise =
+      std::max(table.cruise, static_cast<std::uint16_t>(shortest_delay));  // the same move
   const auto time = tables::move_time(table, static_cast<std::uint32_t>(std::abs(steps)));
   return {
       .motor = name,
@@ -34,7 +35,7 @@ api::MovePlan::Motor plan_of(const std::string& name, bushd_table table, std::in
 
 // As long as the run, which is as fast as its share of it.
 api::MovePlan::Motor plan_of_line(const std::string& name, const motion::LineShare& share,
-                                  std::int64_t steps, bushd_delay floor) {
+                                  std::int64_t steps, bushd_delay shortest_delay) {
   if (share.track) {
     const motion::Path& path = share.track->path();
     const double ns = static_cast<double>(share.track->units()) * path.unit_ns();
@@ -43,7 +44,7 @@ api::MovePlan::Motor plan_of_line(const std::string& name, const motion::LineSha
             .duration_us = static_cast<std::int64_t>(ns / 1000),
             .peak_steps_per_s = path.most_steps_per_s(share.motor)};
   }
-  api::MovePlan::Motor plan = plan_of(name, share.table->view(), share.longest, floor);
+  api::MovePlan::Motor plan = plan_of(name, share.table->view(), share.longest, shortest_delay);
   plan.steps = steps;
   plan.peak_steps_per_s *= static_cast<double>(share.increment) / share.longest;
   return plan;
@@ -61,7 +62,7 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
   plan_.limited_by = std::move(limited_by);
   motors_.reserve(parts.size());
   link::Tick of_lines = INT64_MIN;
-  for (const auto& [id, steps, floor, from_steps, line] : parts) {
+  for (const auto& [id, steps, shortest_delay, from_steps, line] : parts) {
     const motion::Motor& motor = installation[id];
     const Mcu& mcu = installation.mcu_of(id);
     const config::Bus& bus = installation.bus_of(mcu).config;
@@ -71,9 +72,9 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                        .output = motor.output(),
                        .from_steps = from_steps.value_or(motor.position_steps()),
                        .steps = steps,
-                       .floor = floor,
+                       .shortest_delay = shortest_delay,
                        .start = mcu.earliest_start(now_us, motor.output()),
-                       .by_table = !line && installation.by_table(mcu, steps, floor),
+                       .by_table = !line && installation.by_table(mcu, steps, shortest_delay),
                        .tick_ns = bus.tick_ns(),
                        .format = bus.format,
                        .table = installation.table_of(id),
@@ -81,7 +82,7 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
                        .line_run = {}});
     if (line && line->in_mcus) {
       motion::Axis axis = installation.new_axis(id);
-      axis.start_line(motors_.back().from_steps, *line, motors_.back().start, floor);
+      axis.start_line(motors_.back().from_steps, *line, motors_.back().start, shortest_delay);
       motors_.back().line_run = mcu.line_run(axis);
     }
     if (line) of_lines = std::max(of_lines, motors_.back().start);
@@ -121,15 +122,15 @@ bool DryRun::is_further_leg(std::size_t index) const {
 
 void DryRun::plan_motor(const Motor& motor, bool further_leg) {
   if (!further_leg) of_motor_ = {};
-  plan_.motors.push_back(motor.line
-                             ? plan_of_line(motor.name, *motor.line, motor.steps, motor.floor)
-                             : plan_of(motor.name, motor.table->view(), motor.steps, motor.floor));
+  plan_.motors.push_back(
+      motor.line ? plan_of_line(motor.name, *motor.line, motor.steps, motor.shortest_delay)
+                 : plan_of(motor.name, motor.table->view(), motor.steps, motor.shortest_delay));
   if (motor.steps == 0) return;
   motion::Axis axis(motor.table->view(), motor.tick_ns, motor.format);
   if (motor.line) {
-    axis.start_line(motor.from_steps, *motor.line, motor.start, motor.floor);
+    axis.start_line(motor.from_steps, *motor.line, motor.start, motor.shortest_delay);
   } else {
-    axis.start(motor.from_steps, motor.steps, motor.start, 0, motor.floor);
+    axis.start(motor.from_steps, motor.steps, motor.start, 0, motor.shortest_delay);
   }
   const link::Tick ticks = axis.end_tick() - motor.start;
   of_motor_.ticks += ticks;
@@ -144,7 +145,7 @@ void DryRun::plan_motor(const Motor& motor, bool further_leg) {
   bus.axes.emplace(std::pair{motor.mcu, motor.output}, axis);
   link::PlannedMove move{motor.mcu, motor.output.value, motor.start, {}};
   if (motor.by_table) {
-    move.run = link::TableRun{static_cast<std::int32_t>(motor.steps), motor.floor};
+    move.run = link::TableRun{static_cast<std::int32_t>(motor.steps), motor.shortest_delay};
   }
   if (motor.line_run) move.run = *motor.line_run;
   bus.moves.push_back(move);

@@ -25,9 +25,10 @@ class DryRun {
   struct Part {
     MotorId motor;  // at rest; the legs of one motor stand together, in their order
     std::int64_t steps;
-    bushd_delay floor;
+    bushd_delay shortest_delay;
     std::optional<std::int64_t> from_steps{};  // none: where it stands
-    std::optional<motion::LineShare> line{};   // of its run, whose floor it is; all start together
+    std::optional<motion::LineShare>
+        line{};  // of its run, whose shortest delay it is; all start together
   };
   // `installation` outlives it, and may change meanwhile.
   // `limited_by` as of MovePlan.
@@ -49,7 +50,7 @@ class DryRun {
     Output output;
     std::int64_t from_steps;
     std::int64_t steps;
-    bushd_delay floor;
+    bushd_delay shortest_delay;
     link::Tick start;
     bool by_table;
     std::uint32_t tick_ns;

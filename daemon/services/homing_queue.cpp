@@ -90,8 +90,9 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
   open_.open(asker, *motors, OpenMoves::Purpose::kHome);
   if (request.all) sequence_.emplace();
   for (const MotorId motor : *motors) {
-    Task task{
-        .motor = motor, .floor = *floor_of(motor, request.speed), .after_stops = asker.after_stops};
+    Task task{.motor = motor,
+              .shortest_delay = *shortest_delay_of(motor, request.speed),
+              .after_stops = asker.after_stops};
     if (!request.all) {
       add(std::move(task));
     } else {
@@ -113,9 +114,9 @@ Result<std::vector<MotorId>> HomingQueue::motors_of(const api::Home& request) co
     if (const auto may = may_home(motor); !may) {
       return fail(installation_[motor].name() + ": " + may.error().text());
     }
-    const auto floor = floor_of(motor, request.speed);
-    if (!floor) return fail(floor.error());
-    if (const auto may = may_home_by(motor, *floor); !may) {
+    const auto shortest_delay = shortest_delay_of(motor, request.speed);
+    if (!shortest_delay) return fail(shortest_delay.error());
+    if (const auto may = may_home_by(motor, *shortest_delay); !may) {
       return fail(installation_[motor].name() + ": " + may.error().text());
     }
   }
@@ -147,17 +148,18 @@ Result<void> HomingQueue::may_home(MotorId id) const {
     return fail("MCU " + mcu.name() + " cannot home; find out where it stands and run " +
                 words::set_remedy(installation_[id].name()));
   }
-  const bushd_home message = message_for({.motor = id, .floor = 0});
+  const bushd_home message = message_for({.motor = id, .shortest_delay = 0});
   return installation_[id].may_be_moved_within(std::int64_t{message.most_steps} +
                                                message.slow_steps);
 }
 
 // An MCU without slow runs is told no longer delays than 16 bits hold.
-Result<void> HomingQueue::may_home_by(MotorId id, bushd_delay floor) const {
+Result<void> HomingQueue::may_home_by(MotorId id, bushd_delay shortest_delay) const {
   const Mcu& mcu = installation_.mcu_of(id);
   if (mcu.can_run_slowly()) return {};
-  const bushd_home message = message_for({.motor = id, .floor = floor});
-  if (bushd_delay_is_code(message.floor) && bushd_delay_is_code(message.slow_delay)) return {};
+  const bushd_home message = message_for({.motor = id, .shortest_delay = shortest_delay});
+  if (bushd_delay_is_code(message.shortest_delay) && bushd_delay_is_code(message.slow_delay))
+    return {};
   const double slowest_ns =
       std::min(static_cast<double>(installation_.table_of(id)->view().time_unit_ns),
                static_cast<double>(BUSHD_HOME_UNIT_NS)) *
@@ -168,14 +170,15 @@ Result<void> HomingQueue::may_home_by(MotorId id, bushd_delay floor) const {
       mcu.name(), 1e9 / slowest_ns));
 }
 
-Result<bushd_delay> HomingQueue::floor_of(MotorId id,
-                                          const std::optional<api::Speed>& speed) const {
+Result<bushd_delay> HomingQueue::shortest_delay_of(MotorId id,
+                                                   const std::optional<api::Speed>& speed) const {
   const auto& home = installation_.config()[id].home;
   std::optional<api::Speed> asked = speed;
   if (!asked && home && home->speed) asked = api::Speed{.per_s = *home->speed};
-  auto floor = installation_[id].floor_at(asked);
-  if (!floor) return fail(installation_[id].name() + ": " + floor.error().message);
-  return floor;
+  auto shortest_delay = installation_[id].shortest_delay_at(asked);
+  if (!shortest_delay)
+    return fail(installation_[id].name() + ": " + shortest_delay.error().message);
+  return shortest_delay;
 }
 
 bushd_home HomingQueue::message_for(const Task& task) const {
@@ -184,7 +187,7 @@ bushd_home HomingQueue::message_for(const Task& task) const {
   const config::Home& home = *motor.home;
   const bushd_table& table = installation_.table_of(id)->view();
   const std::uint64_t first =
-      std::max<std::uint64_t>({table.accel.code[0], table.decel.code[0], task.floor});
+      std::max<std::uint64_t>({table.accel.code[0], table.decel.code[0], task.shortest_delay});
   const std::uint64_t slow_ns = std::max<std::uint64_t>(
       {first * table.time_unit_ns, installation_.config().bus_of(motor).tick_ns(),
        1'000'000'000u / home.slow_steps_per_s});
@@ -192,7 +195,7 @@ bushd_home HomingQueue::message_for(const Task& task) const {
   return {.motor = motor.output.value,
           .direction = static_cast<std::int8_t>(home.positive ? 1 : -1),
           .most_steps = home.most_steps,
-          .floor = task.floor,
+          .shortest_delay = task.shortest_delay,
           .slow_steps = home.slow_most_steps.value_or(table.decel.count + kMoreSlowSteps),
           .slow_delay = units,
           .position_steps = home.position_steps};
@@ -460,7 +463,7 @@ void HomingQueue::end_waiting() {
 void HomingQueue::give_up(Task& task, const std::string& because) {
   if (!task.ended_by.empty()) return;
   task.ended_by = because;
-  bushd_home message = message_for({.motor = task.motor, .floor = 0});
+  bushd_home message = message_for({.motor = task.motor, .shortest_delay = 0});
   message.most_steps = 0;
   installation_.mcu_of(task.motor).home(message);
 }
@@ -480,14 +483,16 @@ void HomingQueue::goes_online(Mcu& mcu) {
     const motion::Motor& motor = installation_[id];
     const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
     if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
-    const auto floor = floor_of(id, {});
-    auto may = floor ? may_home(id) : fail(floor.error());
-    if (may) may = may_home_by(id, *floor);
+    const auto shortest_delay = shortest_delay_of(id, {});
+    auto may = shortest_delay ? may_home(id) : fail(shortest_delay.error());
+    if (may) may = may_home_by(id, *shortest_delay);
     if (!may) {
       outputs_.log(LogLevel::kWarning, id, motor.name() + " is not homed: " + may.error().text());
       continue;
     }
-    add({.motor = id, .floor = *floor, .after_stops = open_.precedence().stops()});
+    add({.motor = id,
+         .shortest_delay = *shortest_delay,
+         .after_stops = open_.precedence().stops()});
   }
 }
 

@@ -49,7 +49,7 @@ class HomingQueue final : public Service {
   };
   struct Task {
     MotorId motor;
-    bushd_delay floor;  // of the fast approach
+    bushd_delay shortest_delay;  // of the fast approach
     Phase phase = Phase::kWaiting;
     std::string ended_by{};  // it was asked to end, because of that; waiting: when it is its turn
     std::int64_t then_steps = 0;
@@ -67,8 +67,9 @@ class HomingQueue final : public Service {
   Result<std::vector<MotorId>> all_by_order() const;
   Result<void> may_home(MotorId motor) const;
   Result<void> may_begin(MotorId motor) const;
-  Result<bushd_delay> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
-  Result<void> may_home_by(MotorId motor, bushd_delay floor) const;
+  Result<bushd_delay> shortest_delay_of(MotorId motor,
+                                        const std::optional<api::Speed>& speed) const;
+  Result<void> may_home_by(MotorId motor, bushd_delay shortest_delay) const;
   bushd_home message_for(const Task& task) const;  // precondition: its motor has a home
   void add(Task task);
   void begin(Mcu& mcu);

@@ -67,20 +67,20 @@ Result<void> Jogs::may_jog(std::int64_t now_us, MotorId motor, const api::Asker&
 
 Result<Jogs::Course> Jogs::course_of(MotorId id, const api::Jog& request) const {
   const motion::Motor& motor = installation_[id];
-  const auto floor =
-      motor.floor_at(api::Speed{.per_s = std::abs(request.per_s), .in_steps = request.in_steps});
-  if (!floor) return fail(floor.error());
+  const auto shortest_delay = motor.shortest_delay_at(
+      api::Speed{.per_s = std::abs(request.per_s), .in_steps = request.in_steps});
+  if (!shortest_delay) return fail(shortest_delay.error());
   const bool mirrored = !request.in_steps && motor.coordinates().scale().negative;
   const int direction = (request.per_s > 0) != mirrored ? 1 : -1;
-  const std::int64_t target = motor.farthest(direction, *floor);
+  const std::int64_t target = motor.farthest(direction, *shortest_delay);
   // Beyond it, one that moves back would turn round.
   const bool beyond = !motor.stands_within_soft_limits();
   if (target == motor.position_steps() && (beyond || !motor.has_plan())) {
     return fail("stands at or beyond its soft limit, at " +
                 motor.coordinates().text(motor.position_steps()) + "; jog it the other way");
   }
-  if (const auto may = motor.may_move_to(target, *floor); !may) return fail(may.error());
-  return Course{.direction = direction, .target = target, .floor = *floor};
+  if (const auto may = motor.may_move_to(target, *shortest_delay); !may) return fail(may.error());
+  return Course{.direction = direction, .target = target, .shortest_delay = *shortest_delay};
 }
 
 void Jogs::run(std::int64_t now_us, const api::Asker& asker, MotorId id, const api::Jog& request) {
@@ -98,7 +98,7 @@ void Jogs::run(std::int64_t now_us, const api::Asker& asker, MotorId id, const a
     return change(now_us, asker, id, *course);
   }
   asker.answer(api::Accepted{});
-  moves_.jog(now_us, asker, id, course->target, course->floor);
+  moves_.jog(now_us, asker, id, course->target, course->shortest_delay);
   step(now_us);  // what it was doing has ended
   jogs_.insert_or_assign(id, Jog{.opened_by = asker,
                                  .renewed_by = asker,
@@ -129,13 +129,14 @@ void Jogs::change(std::int64_t now_us, const api::Asker& asker, MotorId id, cons
   const bool again = std::exchange(jog.ends, false);
   jog.let_go = false;
   jog.after.reset();
-  const bool same = course.direction == jog.course.direction && course.floor == jog.course.floor;
+  const bool same = course.direction == jog.course.direction &&
+                    course.shortest_delay == jog.course.shortest_delay;
   asker.answer(api::Accepted{});
   if (!same || again) {
     jog.course = course;
     say_limit(id);
     open_.unsay(id, api::Outcome::kStopped);
-    moves_.redirect(now_us, id, course.target, course.floor);
+    moves_.redirect(now_us, id, course.target, course.shortest_delay);
   }
   asker.answer(api::done(installation_[id].name() + (same && !again ? ": renewed" : ": changed")));
 }
@@ -154,12 +155,12 @@ void Jogs::renew(std::int64_t now_us, const api::Asker& asker, MotorId id) {
   asker.answer(api::Accepted{});
   // Without a limit it ends where a run is as long as it may be; but not as long as it is renewed.
   const motion::Motor& motor = installation_[id];
-  const std::int64_t farthest = motor.farthest(jog.course.direction, jog.course.floor);
+  const std::int64_t farthest = motor.farthest(jog.course.direction, jog.course.shortest_delay);
   if (std::abs(farthest - jog.course.target) >
       std::abs(jog.course.target - motor.position_steps())) {
     jog.course.target = farthest;
     say_limit(id);
-    moves_.redirect(now_us, id, farthest, jog.course.floor);
+    moves_.redirect(now_us, id, farthest, jog.course.shortest_delay);
   }
   asker.answer(api::done(motor.name() + ": renewed"));
 }
@@ -213,7 +214,7 @@ void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps,
   if (now < axis.start_tick()) {
     return ramp_down(now_us, id, {ended.outcome, ended.reason + " before it began"});
   }
-  if ((motor.farthest(direction, jog.course.floor) - target) * direction < 0) {
+  if ((motor.farthest(direction, jog.course.shortest_delay) - target) * direction < 0) {
     return ramp_down(
         now_us, id,
         {api::Outcome::kStopped, after + " would be beyond its soft limit; ramped down at once"});
@@ -224,7 +225,7 @@ void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps,
   open_.say(id, api::Outcome::kReached,
             {ended.outcome, "stands " + after + (own ? "" : ", " + ended.reason)});
   open_.unsay(id, api::Outcome::kStopped);
-  moves_.redirect(now_us, id, target, jog.course.floor);
+  moves_.redirect(now_us, id, target, jog.course.shortest_delay);
 }
 
 void Jogs::ramp_down(std::int64_t now_us, MotorId id, OpenMoves::Saying saying) {

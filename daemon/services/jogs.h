@@ -34,7 +34,7 @@ class Jogs final : public Service {
   struct Course {
     int direction;
     std::int64_t target;
-    bushd_delay floor;
+    bushd_delay shortest_delay;
   };
   struct Jog {
     api::Asker opened_by;  // whose result it is

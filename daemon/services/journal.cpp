@@ -119,7 +119,7 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
     line["array"] = {{"array", followed->number}, {"column", followed->motor}};
   }
   if (late_ns != 0) line["late_ns"] = late_ns;
-  if (motor.axis().floor() != 0) line["floor"] = motor.axis().floor();
+  if (motor.axis().shortest_delay() != 0) line["shortest_delay"] = motor.axis().shortest_delay();
   if (const bushd_emission& emission = mcu.config.emission.settings;
       emission.mode != BUSHD_EMISSION_EVEN) {
     line["emission"] = fieldbus::kEmissionNames.at(emission.mode);
@@ -135,11 +135,11 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
 
 std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>& motors) {
   nlohmann::json line = {{"event", "line"}, {"way", ++last_id_}, {"longest", longest}};
-  for (const auto& [id, increment, floor, table] : motors) {
+  for (const auto& [id, increment, shortest_delay, table] : motors) {
     tell_table(id, *table);
     line["motors"].push_back({{"motor", installation_[id].name()},
                               {"increment", increment},
-                              {"floor", floor},
+                              {"shortest_delay", shortest_delay},
                               {"table_file", table->path()},
                               {"table_sha256", table->content_hash()}});
   }
@@ -158,7 +158,7 @@ std::uint64_t Journal::path_laid(const std::vector<MotorId>& motors, const motio
     line["motors"].push_back({{"motor", installation_[motors[i]].name()},
                               {"from_steps", path.point(0, i)},
                               {"to_steps", path.point(path.segments(), i)},
-                              {"floor", path.motors()[i].floor},
+                              {"shortest_delay", path.motors()[i].shortest_delay},
                               {"table_file", table.path()},
                               {"table_sha256", table.content_hash()}});
   }
@@ -196,7 +196,8 @@ void Journal::changed(MotorId motor, const motion::Change& change) {
                          {"motor", installation_[motor].name()},
                          {"tick", change.at}};
   if (change.target_steps) line["target_steps"] = *change.target_steps;
-  if (change.target_steps && change.floor != 0) line["floor"] = change.floor;
+  if (change.target_steps && change.shortest_delay != 0)
+    line["shortest_delay"] = change.shortest_delay;
   if (change.target_steps && installation_[motor].axis().line()) {
     line["run_steps"] = change.run_steps;
   }

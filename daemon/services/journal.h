@@ -24,7 +24,7 @@ class Journal final : public Service {
   struct OnWay {
     MotorId motor;
     std::uint32_t increment;
-    bushd_delay floor;
+    bushd_delay shortest_delay;
     tables::TablePtr table;
   };
   std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);

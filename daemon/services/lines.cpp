@@ -55,8 +55,8 @@ void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& 
   // The ways of one motor stand together.
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     for (const motion::Way& way : ways) {
-      const auto& [table, from, to, floor] = way.motors()[i];
-      DryRun::Part part{line.motors[i], to - from, way.floor(), from};
+      const auto& [table, from, to, shortest_delay] = way.motors()[i];
+      DryRun::Part part{line.motors[i], to - from, way.shortest_delay(), from};
       if (way.longest() != 0) part.line = way.share(i, 0, way.longest());
       if (part.line) part.line->in_mcus = by_mcus;
       parts.push_back(std::move(part));
@@ -93,7 +93,7 @@ void Lines::log(Line& line) {
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     motors.push_back({.motor = line.motors[i],
                       .increment = line.way.increment(i),
-                      .floor = line.way.motors()[i].floor,
+                      .shortest_delay = line.way.motors()[i].shortest_delay,
                       .table = table_of(line, i)});
   }
   line.way.set_number(journal_.line_laid(line.way.longest(), motors));
@@ -126,7 +126,7 @@ bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
   const bushd_table& table = line.way.table()->view();
   return std::ranges::all_of(installation_.mcus_of(line.motors), [&](McuId id) {
     const Mcu& mcu = installation_[id];
-    return mcu.can_run_line(table, line.way.floor(), has_all_of(line, mcu)) &&
+    return mcu.can_run_line(table, line.way.shortest_delay(), has_all_of(line, mcu)) &&
            !makes_another(mcu, number);
   });
 }
@@ -170,7 +170,8 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     share.line = number;
     share.in_mcus = by_mcus;
     const BusId bus = installation_.mcu_of(line.motors[i]).config.bus;
-    motor.start_line(on_line, std::move(share), start.at(bus), line.path ? 0 : line.way.floor());
+    motor.start_line(on_line, std::move(share), start.at(bus),
+                     line.path ? 0 : line.way.shortest_delay());
   }
   moves_.begin_on_line(motors, line.pace);
 }
@@ -276,32 +277,32 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   if (line.points.size() > 1) {
     return refuse("the line ends in a last approach for backlash; " + stop);
   }
-  std::vector<bushd_delay> floors;
+  std::vector<bushd_delay> shortest_delays;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     const motion::Motor& motor = installation_[line.motors[i]];
     if (motor.axis().stopping() || motor.is_paused() || motor.as<motion::OnLine>()->stands) {
       return refuse(motor.name() + " is being stopped or paused; wait for that, or resume it");
     }
-    const auto floor = moves_.floor_of(line.motors[i], request.speed);
-    if (!floor) return refuse(floor.error().text());
-    floors.push_back(floor_on(line, i, *floor));
+    const auto shortest_delay = moves_.shortest_delay_of(line.motors[i], request.speed);
+    if (!shortest_delay) return refuse(shortest_delay.error().text());
+    shortest_delays.push_back(shortest_delay_on(line, i, *shortest_delay));
   }
   std::vector<units::Steps> targets;
   const auto step = step_of(line, motors, request, targets);
   if (!step) return refuse(step.error().text());
-  line.way.set_floors(floors);
+  line.way.set_shortest_delays(shortest_delays);
   asker.answer(api::Accepted{});
   moves_.take_over(line.motors, asker);
   line.target = *step;
   Point& to = line.points.front();
-  to.floors = floors;
+  to.shortest_delays = shortest_delays;
   to.asked_for = std::move(targets);
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     to.steps[i] = line.way.position_at(i, *step);
     motion::OnLine now = *installation_[line.motors[i]].as<motion::OnLine>();
     now.target_steps = to.steps[i];
     now.last_run = true;
-    installation_[line.motors[i]].aim_on_line(now, *step, line.way.floor());
+    installation_[line.motors[i]].aim_on_line(now, *step, line.way.shortest_delay());
   }
   open(asker, *number, line);
   moves_.redirect_on_line(now_us, line.motors);

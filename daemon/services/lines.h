@@ -69,10 +69,10 @@ class Lines final : public Service {
   void step(std::int64_t now_us) override;
 
  private:
-  // Where a way leads, and the floor of each motor's steps on it.
+  // Where a way leads, and the shortest delay of each motor's steps on it.
   struct Point {
     std::vector<std::int64_t> steps;
-    std::vector<bushd_delay> floors;
+    std::vector<bushd_delay> shortest_delays;
     std::vector<units::Steps> asked_for{};  // of the last point of a line
   };
   // By the trigger.
@@ -131,7 +131,8 @@ class Lines final : public Service {
   Result<void> on_one_bus(const std::vector<MotorId>& motors) const;
   Result<std::vector<Point>> points_of(const Line& line, const api::MoveLine& request) const;
   tables::TablePtr table_of(const Line& line, std::size_t motor) const;
-  bushd_delay floor_on(const Line& line, std::size_t motor, bushd_delay floor) const;
+  bushd_delay shortest_delay_on(const Line& line, std::size_t motor,
+                                bushd_delay shortest_delay) const;
   motion::Way lay(const Line& line, const std::vector<std::int64_t>& from, const Point& to) const;
   Result<void> fits_duration(Line& line, std::optional<double> duration_s) const;
 
@@ -158,7 +159,7 @@ class Lines final : public Service {
   Result<Incoming> begin_points(const api::Asker& asker, const api::MovePath& request) const;
   Result<void> same_scales(const Incoming& incoming) const;
   Result<void> add_points(Incoming& incoming, const api::MovePath& request) const;
-  Result<bushd_delay> floor_to(Incoming& incoming, std::int64_t point, double speed) const;
+  Result<bushd_delay> shortest_delay_to(Incoming& incoming, std::int64_t point, double speed) const;
   Result<void> may_follow(const Incoming& incoming) const;
   Result<void> may_begin(const Line& line) const;
   void begin_path(std::int64_t now_us, Coming coming);

@@ -157,11 +157,11 @@ Result<Lines::Incoming> Lines::begin_points(const api::Asker& asker,
   std::vector<std::int64_t> begin;
   Point& to = line.points.emplace_back();
   for (const MotorId id : line.motors) {
-    const auto floor = moves_.floor_of(id, request.speed);
-    if (!floor) return fail(floor.error());
+    const auto shortest_delay = moves_.shortest_delay_of(id, request.speed);
+    if (!shortest_delay) return fail(shortest_delay.error());
     line.tables.push_back(installation_.table_of(id));
-    motors.push_back({&line.tables.back()->view(), *floor});
-    to.floors.push_back(*floor);
+    motors.push_back({&line.tables.back()->view(), *shortest_delay});
+    to.shortest_delays.push_back(*shortest_delay);
     begin.push_back(installation_[id].position_steps());
     incoming.scales.push_back(installation_[id].coordinates().scale());
     incoming.low.push_back({0, begin.back()});
@@ -194,7 +194,7 @@ Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request)
   const Line& line = incoming.line;
   const std::size_t width = line.motors.size();
   std::vector<std::int64_t> point(width);
-  std::vector<bushd_delay> floors;
+  std::vector<bushd_delay> shortest_delays;
   for (std::size_t at = 0; at < request.positions.size(); at += width) {
     const std::int32_t row = ++incoming.rows;
     for (std::size_t m = 0; m < width; ++m) {
@@ -211,11 +211,12 @@ Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request)
       if (*steps > incoming.high[m].steps) incoming.high[m] = {row, *steps};
     }
     if (!request.speeds.empty()) {
-      auto floor = floor_to(incoming, point.front(), request.speeds[at]);
-      if (!floor) return fail(fmt::format("point {}, {}", row, floor.error().text()));
-      floors.assign(1, *floor);
+      auto shortest_delay = shortest_delay_to(incoming, point.front(), request.speeds[at]);
+      if (!shortest_delay)
+        return fail(fmt::format("point {}, {}", row, shortest_delay.error().text()));
+      shortest_delays.assign(1, *shortest_delay);
     }
-    line.path->add(point, floors);
+    line.path->add(point, shortest_delays);
   }
   if (line.path->steps() <= static_cast<std::uint64_t>(motion::Motor::kMaxPosition)) return {};
   return fail(fmt::format("the path has more than {} steps; make several paths of it",
@@ -223,7 +224,8 @@ Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request)
 }
 
 // Of the way to a point of a motor with speeds.
-Result<bushd_delay> Lines::floor_to(Incoming& incoming, std::int64_t point, double speed) const {
+Result<bushd_delay> Lines::shortest_delay_to(Incoming& incoming, std::int64_t point,
+                                             double speed) const {
   const Line& line = incoming.line;
   const MotorId id = line.motors.front();
   const std::int64_t way = point - line.path->point(line.path->segments(), 0);
@@ -235,10 +237,10 @@ Result<bushd_delay> Lines::floor_to(Incoming& incoming, std::int64_t point, doub
                 "give speeds in the order of their positions");
   }
   if (direction != 0) incoming.direction = direction;
-  if (speed == 0) return line.points.front().floors.front();
-  const auto floor = moves_.floor_of(id, api::Speed{.per_s = speed});
-  if (!floor) return fail(floor.error());
-  return std::max(*floor, line.points.front().floors.front());
+  if (speed == 0) return line.points.front().shortest_delays.front();
+  const auto shortest_delay = moves_.shortest_delay_of(id, api::Speed{.per_s = speed});
+  if (!shortest_delay) return fail(shortest_delay.error());
+  return std::max(*shortest_delay, line.points.front().shortest_delays.front());
 }
 
 // All stand at its beginning, points are still the steps that they were, and each motor may go to
@@ -250,7 +252,7 @@ Result<void> Lines::may_follow(const Incoming& incoming) const {
   for (std::size_t m = 0; m < line.motors.size(); ++m) {
     const motion::Motor& motor = installation_[line.motors[m]];
     for (const auto& [row, steps] : {incoming.low[m], incoming.high[m]}) {
-      const auto may = motor.may_move_to(steps, line.points.front().floors[m]);
+      const auto may = motor.may_move_to(steps, line.points.front().shortest_delays[m]);
       if (may) continue;
       const std::string where = row == 0 ? "" : fmt::format("point {}, ", row);
       return fail(fmt::format("{}{}: {}", where, motor.name(), may.error().text()));

@@ -77,7 +77,8 @@ Result<void> Lines::may_wait(const Line& line) const {
       }
     }
     if (auto has_table = check_table(line, mcu); !has_table) return has_table;
-    if (!mcu.keeps_up_with(line.way.table()->view(), line.way.floor(), has_all_of(line, mcu))) {
+    if (!mcu.keeps_up_with(line.way.table()->view(), line.way.shortest_delay(),
+                           has_all_of(line, mcu))) {
       return fail(fmt::format(
           "MCU {} makes no line as fast as this one by itself; give a lower --speed, or move them "
           "without a trigger",
@@ -115,7 +116,7 @@ Result<void> Lines::check_table(const Line& line, const Mcu& mcu) const {
 
 void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
-  const bushd_delay floor = line.way.floor();
+  const bushd_delay shortest_delay = line.way.shortest_delay();
   std::map<McuId, std::vector<link::BusMaster::ArmedOnLine>> parts;
   std::vector<motion::LineShare> shares;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
@@ -125,7 +126,7 @@ void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
     shares.back().waits = true;
     const Mcu& mcu = installation_.mcu_of(line.motors[i]);
     parts[mcu.id].push_back({.motor = installation_[line.motors[i]].output().value,
-                             .run = mcu.line_run(shares.back(), floor, 0)});
+                             .run = mcu.line_run(shares.back(), shortest_delay, 0)});
   }
   std::map<McuId, std::uint8_t> numbers;
   for (const auto& [mcu, of_mcu] : parts) {
@@ -138,7 +139,8 @@ void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
     on_line.target_steps = line.points.back().steps[i];
     on_line.last_run = line.points.size() == 1;
     const McuId mcu = installation_.config()[line.motors[i]].mcu;
-    installation_[line.motors[i]].arm_line(numbers[mcu], on_line, std::move(shares[i]), floor);
+    installation_[line.motors[i]].arm_line(numbers[mcu], on_line, std::move(shares[i]),
+                                           shortest_delay);
   }
   installation_.changed = true;
 }

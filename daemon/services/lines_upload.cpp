@@ -58,7 +58,8 @@ std::optional<Lines::WantedTable> Lines::table_to_upload(const Line& line, bool 
   const bushd_table& table = wanted.table->view();
   for (const McuId id : wanted.all) {
     const Mcu& mcu = installation_[id];
-    if (!mcu.keeps_up_with(table, line.way.floor(), has_all_of(line, mcu))) return std::nullopt;
+    if (!mcu.keeps_up_with(table, line.way.shortest_delay(), has_all_of(line, mcu)))
+      return std::nullopt;
     if (mcu.has_table(table)) continue;
     if (!mcu.can_upload(table) || mcu.uploads() || !installation_.rests(mcu)) return std::nullopt;
     wanted.mcus.push_back(id);

@@ -97,23 +97,24 @@ Result<std::vector<Lines::Point>> Lines::points_of(const Line& line,
   bool approach = false;
   for (std::size_t i = 0; i < motors.size(); ++i) {
     const motion::Motor& motor = installation_[motors[i]];
-    const auto floor = moves_.floor_of(motors[i], request.speed);
-    if (!floor) return fail(floor.error());
-    const auto target = moves_.target_of(motors[i], request.motors[i].amount, request.kind, *floor);
+    const auto shortest_delay = moves_.shortest_delay_of(motors[i], request.speed);
+    if (!shortest_delay) return fail(shortest_delay.error());
+    const auto target =
+        moves_.target_of(motors[i], request.motors[i].amount, request.kind, *shortest_delay);
     if (!target) return fail(target.error());
-    const auto legs = motor.legs_to(target->whole, *floor);
+    const auto legs = motor.legs_to(target->whole, *shortest_delay);
     if (!legs) return fail(motor.name() + ": " + legs.error().message);
     const motion::Leg& last = legs->back();
     const bool straight = legs->size() == 1;
-    const bushd_delay fast = floor_on(line, i, *floor);
-    const bushd_delay slow = floor_on(line, i, last.floor);
+    const bushd_delay fast = shortest_delay_on(line, i, *shortest_delay);
+    const bushd_delay slow = shortest_delay_on(line, i, last.shortest_delay);
     approach = approach || !straight;
     to.steps.push_back(target->whole);
-    to.floors.push_back(straight ? slow : fast);
+    to.shortest_delays.push_back(straight ? slow : fast);
     back.steps.push_back(straight ? target->whole : legs->front().target);
-    back.floors.push_back(fast);
+    back.shortest_delays.push_back(fast);
     again.steps.push_back(target->whole);
-    again.floors.push_back(slow);
+    again.shortest_delays.push_back(slow);
     to.asked_for.push_back(*target);
     again.asked_for.push_back(*target);
   }
@@ -126,12 +127,14 @@ tables::TablePtr Lines::table_of(const Line& line, std::size_t motor) const {
   return line.by ? line.by : installation_.table_of(line.motors[motor]);
 }
 
-// A floor of the motor, which is in units of its own table, in those of the table that it goes by.
-bushd_delay Lines::floor_on(const Line& line, std::size_t motor, bushd_delay floor) const {
-  if (!line.by) return floor;
+// The shortest delay of the motor, converted from units of its own table to those of the table that
+// it goes by.
+bushd_delay Lines::shortest_delay_on(const Line& line, std::size_t motor,
+                                     bushd_delay shortest_delay) const {
+  if (!line.by) return shortest_delay;
   const std::uint64_t unit_ns = line.by->view().time_unit_ns;
   const std::uint64_t own_ns = installation_.table_of(line.motors[motor])->view().time_unit_ns;
-  return (floor * own_ns + unit_ns - 1) / unit_ns;
+  return (shortest_delay * own_ns + unit_ns - 1) / unit_ns;
 }
 
 motion::Way Lines::lay(const Line& line, const std::vector<std::int64_t>& from,
@@ -141,7 +144,7 @@ motion::Way Lines::lay(const Line& line, const std::vector<std::int64_t>& from,
     all.push_back({.table = &table_of(line, i)->view(),
                    .from = from[i],
                    .to = to.steps[i],
-                   .floor = to.floors[i]});
+                   .shortest_delay = to.shortest_delays[i]});
   }
   return motion::Way(std::move(all));
 }

@@ -27,7 +27,7 @@ void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
     }
     std::int64_t from = motor.position_steps();
     for (const motion::Leg& leg : part.legs) {
-      planned.push_back({part.motor, leg.target - from, leg.floor, from});
+      planned.push_back({part.motor, leg.target - from, leg.shortest_delay, from});
       from = leg.target;
     }
   }
@@ -56,24 +56,25 @@ Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
 
 Result<Moves::Part> Moves::part_of(MotorId motor, const api::Amount& amount,
                                    const api::Move& move) const {
-  const auto floor = floor_of(motor, move.speed);
-  if (!floor) return fail(floor.error());
-  const auto target = target_of(motor, amount, move.kind, *floor);
+  const auto shortest_delay = shortest_delay_of(motor, move.speed);
+  if (!shortest_delay) return fail(shortest_delay.error());
+  const auto target = target_of(motor, amount, move.kind, *shortest_delay);
   if (!target) return fail(target.error());
-  auto legs = installation_[motor].legs_to(target->whole, *floor);
+  auto legs = installation_[motor].legs_to(target->whole, *shortest_delay);
   if (!legs) return fail(installation_[motor].name() + ": " + legs.error().message);
   return Part{.motor = motor, .target = *target, .legs = std::move(*legs)};
 }
 
-Result<bushd_delay> Moves::floor_of(MotorId id, const std::optional<api::Speed>& speed) const {
+Result<bushd_delay> Moves::shortest_delay_of(MotorId id,
+                                             const std::optional<api::Speed>& speed) const {
   const motion::Motor& motor = installation_[id];
-  auto floor = motor.floor_at(speed);
-  if (!floor) return fail(motor.name() + ": " + floor.error().message);
-  return floor;
+  auto shortest_delay = motor.shortest_delay_at(speed);
+  if (!shortest_delay) return fail(motor.name() + ": " + shortest_delay.error().message);
+  return shortest_delay;
 }
 
 Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api::Move::Kind kind,
-                                      bushd_delay floor) const {
+                                      bushd_delay shortest_delay) const {
   const motion::Motor& motor = installation_[id];
   const bool absolute = kind == api::Move::Kind::kAbsolute;
   const auto counted = absolute ? motor.position_of(amount) : motor.distance_of(amount);
@@ -90,7 +91,8 @@ Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api
   const auto from = absolute ? Result<units::Steps>() : motor.distance_from();
   if (!from) return refuse(from.error());
   const units::Steps target = *from + *counted;
-  if (const auto may = motor.may_move_to(target.whole, floor); !may) return refuse(may.error());
+  if (const auto may = motor.may_move_to(target.whole, shortest_delay); !may)
+    return refuse(may.error());
   return target;
 }
 
@@ -120,19 +122,19 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   open_.open(asker, motors, OpenMoves::Purpose::kMove);
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
-    const auto& [target, floor] = part.legs.front();
+    const auto& [target, shortest_delay] = part.legs.front();
     if (!motor.stands()) {
-      motor.aim(target, floor);
+      motor.aim(target, shortest_delay);
     } else {
-      motor.start(target, start[installation_.mcu_of(part.motor).config.bus], floor);
+      motor.start(target, start[installation_.mcu_of(part.motor).config.bus], shortest_delay);
       unbegun_.insert(part.motor);
       to_begin_.push_back(part.motor);
     }
     motor.go_on({part.legs.begin() + 1, part.legs.end()});
     motor.ask_for(part.target);
-    const auto fastest = std::ranges::min_element(part.legs, {}, &motion::Leg::floor);
+    const auto fastest = std::ranges::min_element(part.legs, {}, &motion::Leg::shortest_delay);
     open_.planned(part.motor, static_cast<int>(part.legs.size()),
-                  motor.axis().most_steps_per_s(fastest->floor));
+                  motor.axis().most_steps_per_s(fastest->shortest_delay));
   }
   if (unbegun_.size() <= kBeginsPerSlice) work();
   retarget(now_us, moving);
@@ -186,27 +188,29 @@ void Moves::take_over(const std::vector<MotorId>& motors, const api::Asker& by) 
 }
 
 void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::int64_t target,
-                bushd_delay floor) {
+                bushd_delay shortest_delay) {
   while (begins()) begin_next();
   motion::Motor& motor = installation_[id];
   if (motor.has_plan()) take_over({id}, asker);
   open_.open(asker, {id}, OpenMoves::Purpose::kJog);
   motor.jogs(true);
   motor.go_on({});
-  if (!motor.stands()) return redirect(now_us, id, target, floor);
-  open_.planned(id, 1, motor.axis().most_steps_per_s(floor));
+  if (!motor.stands()) return redirect(now_us, id, target, shortest_delay);
+  open_.planned(id, 1, motor.axis().most_steps_per_s(shortest_delay));
   const Mcu& mcu = installation_.mcu_of(id);
-  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), floor);
+  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), shortest_delay);
 }
 
-void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target, bushd_delay floor) {
-  installation_[id].aim(target, floor);
-  open_.planned(id, 1, installation_[id].axis().most_steps_per_s(floor));
+void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target,
+                     bushd_delay shortest_delay) {
+  installation_[id].aim(target, shortest_delay);
+  open_.planned(id, 1, installation_[id].axis().most_steps_per_s(shortest_delay));
   retarget(now_us, {id});
 }
 
-void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start, bushd_delay floor) {
-  installation_[id].start(target, start, floor);
+void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start,
+                      bushd_delay shortest_delay) {
+  installation_[id].start(target, start, shortest_delay);
   begin(id);
 }
 
@@ -214,11 +218,11 @@ Result<std::int64_t> Moves::go_on(std::int64_t now_us, MotorId id, const api::Am
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   const auto part = part_of(id, position, {.kind = api::Move::Kind::kAbsolute});
   if (!part) return fail(part.error());
-  const auto& [target, floor] = part->legs.front();
+  const auto& [target, shortest_delay] = part->legs.front();
   installation_[id].go_on({part->legs.begin() + 1, part->legs.end()});
   installation_[id].ask_for(part->target);
   const Mcu& mcu = installation_.mcu_of(id);
-  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), floor);
+  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), shortest_delay);
   return part->legs.back().target;
 }
 
@@ -229,14 +233,14 @@ void Moves::begin(MotorId id) {
   const motion::Tick start = motor.axis().start_tick();
   const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
   // A jog will change, and of what is streamed only ticks that have not been run can be taken back.
-  const bool by_table =
-      installation_.by_table(mcu, steps, motor.axis().floor()) && !(mcu.streams() && motor.jogs());
+  const bool by_table = installation_.by_table(mcu, steps, motor.axis().shortest_delay()) &&
+                        !(mcu.streams() && motor.jogs());
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
   } else if (by_table) {
     mcu.begin_table_run(motor.output(), start,
-                        {static_cast<std::int32_t>(steps), motor.axis().floor()});
+                        {static_cast<std::int32_t>(steps), motor.axis().shortest_delay()});
   } else {
     mcu.begin(motor.output(), start);
   }
@@ -246,7 +250,8 @@ void Moves::begin(MotorId id) {
 void Moves::start_leg(std::int64_t now_us, MotorId id) {
   const motion::Leg leg = installation_[id].take_leg();
   const Mcu& mcu = installation_.mcu_of(id);
-  start_run(id, leg.target, mcu.earliest_start(now_us, installation_[id].output()), leg.floor);
+  start_run(id, leg.target, mcu.earliest_start(now_us, installation_[id].output()),
+            leg.shortest_delay);
 }
 
 void Moves::begin_on_line(const std::vector<MotorId>& motors,
@@ -380,7 +385,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
               } else {
                 mcu.follow_table_run(
                     motor.output(), started.start,
-                    {static_cast<std::int32_t>(started.steps), motor.axis().floor()});
+                    {static_cast<std::int32_t>(started.steps), motor.axis().shortest_delay()});
               }
             },
             [&](const motion::event::Executed& executed) { journal_.changed(id, executed.change); },

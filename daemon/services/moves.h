@@ -39,15 +39,17 @@ class Moves final : public Service {
   // Checks where a motor of a request may go, "NAME: WHY" if not. A distance counts from
   // motion::Motor::distance_from. The steps of it are `whole`.
   Result<units::Steps> target_of(MotorId motor, const api::Amount& amount, api::Move::Kind kind,
-                                 bushd_delay floor) const;
-  // motion::Motor::floor_at, "NAME: WHY" if there is none.
-  Result<bushd_delay> floor_of(MotorId motor, const std::optional<api::Speed>& speed) const;
+                                 bushd_delay shortest_delay) const;
+  // motion::Motor::shortest_delay_at, "NAME: WHY" if there is none.
+  Result<bushd_delay> shortest_delay_of(MotorId motor,
+                                        const std::optional<api::Speed>& speed) const;
 
   // Opens a motion of one motor, from rest or in place of what it does. Precondition: it may.
   void jog(std::int64_t now_us, const api::Asker& asker, MotorId motor, std::int64_t target,
-           bushd_delay floor);
+           bushd_delay shortest_delay);
   // Gives an open motion that jog() has opened another target. Precondition: the motor moves.
-  void redirect(std::int64_t now_us, MotorId motor, std::int64_t target, bushd_delay floor);
+  void redirect(std::int64_t now_us, MotorId motor, std::int64_t target,
+                bushd_delay shortest_delay);
 
   // Those that move ramp down and stay in their moves, until they are resumed or stopped.
   void pause(std::int64_t now_us, const std::vector<MotorId>& motors);
@@ -119,7 +121,8 @@ class Moves final : public Service {
   Result<Part> part_of(MotorId motor, const api::Amount& amount, const api::Move& move) const;
   void start_leg(std::int64_t now_us, MotorId motor);
   // From rest; the motor is part of an open move.
-  void start_run(MotorId motor, std::int64_t target, motion::Tick start, bushd_delay floor);
+  void start_run(MotorId motor, std::int64_t target, motion::Tick start,
+                 bushd_delay shortest_delay);
   // Its plan is made: it is logged, and its MCU gets it. One that may not begin now ends.
   void begin(MotorId motor);
   bool may_begin(const std::vector<MotorId>& motors);

@@ -28,7 +28,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
     const MotorId motor = (*motors)[i];
     moves[installation_.config()[motor].mcu].push_back(
         {.motor = installation_[motor].output().value,
-         .run = {static_cast<std::int32_t>(steps[i]), floor_of(motor, request)}});
+         .run = {static_cast<std::int32_t>(steps[i]), shortest_delay_of(motor, request)}});
   }
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
   std::map<McuId, std::uint8_t> numbers;
@@ -40,7 +40,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
     const MotorId motor = (*motors)[i];
     installation_[motor].ask_for(target_of(motor, request.motors[i].amount, request));
     installation_[motor].arm(numbers[installation_.config()[motor].mcu], steps[i],
-                             floor_of(motor, request));
+                             shortest_delay_of(motor, request));
   }
   installation_.changed = true;
 }
@@ -50,10 +50,10 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
   if (!motors) return motors;
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   for (std::size_t i = 0; i < motors->size(); ++i) {
-    const auto floor = moves_.floor_of((*motors)[i], request.speed);
-    if (!floor) return fail(floor.error());
+    const auto shortest_delay = moves_.shortest_delay_of((*motors)[i], request.speed);
+    if (!shortest_delay) return fail(shortest_delay.error());
     const auto target = moves_.target_of((*motors)[i], request.motors[i].amount,
-                                         api::Move::Kind::kRelative, *floor);
+                                         api::Move::Kind::kRelative, *shortest_delay);
     if (!target) return fail(target.error());
   }
   if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
@@ -65,13 +65,14 @@ Result<std::vector<MotorId>> Trigger::motors_of(const api::Arm& request) const {
 }
 
 // Precondition, as of what follows: motors_of has no objection.
-bushd_delay Trigger::floor_of(MotorId motor, const api::Arm& request) const {
-  return *moves_.floor_of(motor, request.speed);
+bushd_delay Trigger::shortest_delay_of(MotorId motor, const api::Arm& request) const {
+  return *moves_.shortest_delay_of(motor, request.speed);
 }
 
 units::Steps Trigger::target_of(MotorId motor, const api::Amount& amount,
                                 const api::Arm& request) const {
-  return *moves_.target_of(motor, amount, api::Move::Kind::kRelative, floor_of(motor, request));
+  return *moves_.target_of(motor, amount, api::Move::Kind::kRelative,
+                           shortest_delay_of(motor, request));
 }
 
 std::vector<std::int64_t> Trigger::steps_of(const std::vector<MotorId>& motors,
@@ -96,7 +97,7 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps, const api::Arm& re
     return fail(motor.name() + ": MCU " + mcu.name() +
                 " has no trigger input; move it without one, or by an MCU that has");
   }
-  if (!bushd_delay_is_code(floor_of(id, request)) && !mcu.can_run_slowly()) {
+  if (!bushd_delay_is_code(shortest_delay_of(id, request)) && !mcu.can_run_slowly()) {
     return fail(fmt::format(
         "{}: MCU {} makes no steps that are so slow by itself; ask for {:.6g} steps/s or more "
         "(--speed --steps), or move it without a trigger",

@@ -45,7 +45,7 @@ class Trigger final : public Service {
   units::Steps target_of(MotorId motor, const api::Amount& amount, const api::Arm& request) const;
   std::vector<std::int64_t> steps_of(const std::vector<MotorId>& motors,
                                      const api::Arm& request) const;
-  bushd_delay floor_of(MotorId motor, const api::Arm& request) const;
+  bushd_delay shortest_delay_of(MotorId motor, const api::Arm& request) const;
   Result<void> may_arm(MotorId motor, std::int64_t steps, const api::Arm& request) const;
   void follow();
 

@@ -40,12 +40,12 @@ static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
   homing->stage = (uint8_t)stage;
   homing->readings = 0;
 #if BUSHD_SLOW_RUNS
-  const bushd_delay floor = homing->slow_floor;
+  const bushd_delay shortest_delay = homing->slow_shortest_delay;
 #else
-  const bushd_delay floor = 0;
+  const bushd_delay shortest_delay = 0;
 #endif
   bushd_run_start(&mcu->motor[homing->motor].made.run, &homing->slow, homing->slow_steps, direction,
-                  floor);
+                  shortest_delay);
 }
 
 static void end(bushd_mcu* mcu, bushd_homing stage) {
@@ -119,7 +119,7 @@ static void end_fast(bushd_mcu* mcu) {
   homing->meets_limit = false;
   homing->turned = true;
   bushd_run* run = &mcu->motor[homing->motor].made.run;
-  bushd_run_start(run, run->table, homing->most_steps, -homing->direction, homing->floor);
+  bushd_run_start(run, run->table, homing->most_steps, -homing->direction, homing->shortest_delay);
 }
 
 static void watch_silence(bushd_mcu* mcu) {
@@ -240,7 +240,7 @@ static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
 bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   bushd_mcu_homing* homing = &mcu->homing;
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
-  if (!bushd_mcu_runs_so_slowly(mcu, message->floor) ||
+  if (!bushd_mcu_runs_so_slowly(mcu, message->shortest_delay) ||
       !bushd_mcu_runs_so_slowly(mcu, message->slow_delay)) {
     return BUSHD_E_LENGTH;
   }
@@ -259,7 +259,7 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   homing->motor = message->motor;
   homing->direction = message->direction;
   homing->turned = begins != message->direction;
-  homing->floor = message->floor;
+  homing->shortest_delay = message->shortest_delay;
   homing->most_steps = message->most_steps;
   homing->slow_steps = message->slow_steps;
   homing->home_steps = message->position_steps;
@@ -267,7 +267,7 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
 #if BUSHD_SLOW_RUNS
   if (!bushd_delay_is_code(message->slow_delay)) {
     homing->slow.cruise = UINT16_MAX;
-    homing->slow_floor = message->slow_delay;
+    homing->slow_shortest_delay = message->slow_delay;
   }
 #endif
   homing->slow.accel.code = homing->slow.decel.code = &homing->slow.cruise;
@@ -276,6 +276,7 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   const uint16_t bit = motor_bit(message->motor);
   mcu->homed &= (uint16_t)~bit;
   mcu->local.held &= (uint16_t)~bit;
-  bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, begins, message->floor);
+  bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, begins,
+                            message->shortest_delay);
   return BUSHD_OK;
 }

@@ -13,18 +13,18 @@ typedef struct bushd_mcu bushd_mcu;
 typedef struct bushd_mcu_homing {
   uint8_t stage;  // bushd_homing
   uint8_t motor;
-  int8_t direction;     // towards the switch
-  uint8_t readings;     // of it in a row, as they are waited for
-  bool turned;          // the fast stage goes the other way: a limit came before the switch
-  bool meets_limit;     // it ramps down because of one
-  bushd_delay floor;    // of the fast stage
-  uint32_t most_steps;  // of the fast stage
-  uint32_t slow_steps;  // of each slow one, at most
-  int32_t home_steps;   // the position to be set
-  int32_t seen_steps;   // where the motor stood at the first of the readings
-  bushd_table slow;     // of a single code: its cruise delay
+  int8_t direction;            // towards the switch
+  uint8_t readings;            // of it in a row, as they are waited for
+  bool turned;                 // the fast stage goes the other way: a limit came before the switch
+  bool meets_limit;            // it ramps down because of one
+  bushd_delay shortest_delay;  // of the fast stage
+  uint32_t most_steps;         // of the fast stage
+  uint32_t slow_steps;         // of each slow one, at most
+  int32_t home_steps;          // the position to be set
+  int32_t seen_steps;          // where the motor stood at the first of the readings
+  bushd_table slow;            // of a single code: its cruise delay
 #if BUSHD_SLOW_RUNS
-  bushd_delay slow_floor;  // beyond that code; 0: none
+  bushd_delay slow_shortest_delay;  // beyond that code; 0: none
 #endif
 } bushd_mcu_homing;
 

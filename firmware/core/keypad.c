@@ -91,7 +91,7 @@ void bushd_mcu_keypad_refuse(bushd_mcu* mcu) {
   keypad->due = true;
 }
 
-uint16_t bushd_mcu_keypad_floor(const bushd_mcu* mcu, const bushd_table* table) {
+uint16_t bushd_mcu_keypad_shortest_delay(const bushd_mcu* mcu, const bushd_table* table) {
   const uint32_t ns = delay_of(&mcu->local.pad) * BUSHD_KEYPAD_UNIT_NS;
   const uint32_t units = (ns - 1u) / table->time_unit_ns + 1u;
   return units < UINT16_MAX ? (uint16_t)units : UINT16_MAX;

@@ -59,7 +59,7 @@ void bushd_mcu_keypad_refuse(bushd_mcu* mcu);
 void bushd_mcu_keypad_wait_for_release(bushd_mcu* mcu);
 // Its delay in time units of this table, rounded up, or the longest that a run may have. A
 // division.
-uint16_t bushd_mcu_keypad_floor(const bushd_mcu* mcu, const bushd_table* table);
+uint16_t bushd_mcu_keypad_shortest_delay(const bushd_mcu* mcu, const bushd_table* table);
 // Its speed in 1/64 step/s, rounded down. A division.
 int32_t bushd_mcu_keypad_speed(const bushd_mcu* mcu);
 

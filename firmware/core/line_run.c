@@ -23,7 +23,8 @@ static bushd_status check_table(const bushd_mcu* mcu, const bushd_line_part* par
   const bushd_table* table = bushd_mcu_checked_table(mcu, part->slot);
   if (table == NULL) return BUSHD_E_NO_TABLE;
   const bool slow_only = (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
-  if (slow_only && !bushd_run_is_slow(table, part->floor, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
+  if (slow_only &&
+      !bushd_run_is_slow(table, part->shortest_delay, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
     return BUSHD_E_CAPACITY;
   }
   const uint32_t most = bushd_table_max_steps_per_tick(table, mcu->tick_ns);
@@ -81,7 +82,7 @@ static void place_all(bushd_mcu* mcu) {
 // The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
 static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
   bushd_run_start(&mcu->line.run, bushd_mcu_checked_table(mcu, part->slot), part->steps, 1,
-                  part->floor);
+                  part->shortest_delay);
   if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;
   mcu->line.slot = part->slot;
   mcu->line.longest = part->longest;

@@ -80,10 +80,11 @@ static void begin_held(bushd_mcu* mcu) {
       mcu->local.held &= (uint16_t)~motor_bit(m);
     } else {
       const bushd_table* table = bushd_mcu_table_of(mcu, &mcu->motor[m]);
-      const uint16_t floor = mcu->local.by_keypad ? bushd_mcu_keypad_floor(mcu, table) : 0;
+      const uint16_t shortest_delay =
+          mcu->local.by_keypad ? bushd_mcu_keypad_shortest_delay(mcu, table) : 0;
       const uint32_t counted = bushd_mcu_steps_counted(mcu, m, mcu->local.wish);
       const uint32_t steps = counted < INT32_MAX ? counted : INT32_MAX;
-      bushd_mcu_begin_by_itself(mcu, m, steps, mcu->local.wish, floor);
+      bushd_mcu_begin_by_itself(mcu, m, steps, mcu->local.wish, shortest_delay);
     }
   }
 }

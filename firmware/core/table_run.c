@@ -43,7 +43,7 @@ void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_
 bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns) {
   bushd_mcu_made* made = &mcu->motor[entry->motor].made;
   bushd_run_start(&made->run, &mcu->tables.slot[entry->slot].table, entry->steps, entry->direction,
-                  entry->floor);
+                  entry->shortest_delay);
   return bushd_mcu_ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
 }
 
@@ -52,7 +52,7 @@ static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
   const bushd_mcu_motor* motor = &mcu->motor[entry->motor];
   if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
   if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
-  if (!bushd_mcu_runs_so_slowly(mcu, entry->floor)) return BUSHD_E_FORMAT;
+  if (!bushd_mcu_runs_so_slowly(mcu, entry->shortest_delay)) return BUSHD_E_FORMAT;
   // There is room for one run.
   return motor->mode == BUSHD_MCU_STREAM ? BUSHD_OK : BUSHD_E_STATE;
 }
@@ -115,9 +115,10 @@ uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction)
 }
 
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
-                               bushd_delay floor) {
+                               bushd_delay shortest_delay) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction, floor);
+  bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction,
+                  shortest_delay);
   motor->mode = BUSHD_MCU_AUTONOMOUS;
   motor->exact = true;
   mcu->autonomous |= motor_bit(m);

@@ -26,10 +26,10 @@ void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_
 // its position is beyond +-(2^31 - 1).
 uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction);
 // A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
-// ends: it is `autonomous` until it rests. `floor`: as of bushd_run_start. Precondition: so many
-// steps are counted.
+// ends: it is `autonomous` until it rests. `shortest_delay`: as of bushd_run_start. Precondition:
+// so many steps are counted.
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
-                               bushd_delay floor);
+                               bushd_delay shortest_delay);
 // Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
 // since stays so.
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);

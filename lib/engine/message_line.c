@@ -38,7 +38,7 @@ bushd_line_entry bushd_next_line_entry(const uint8_t** at) {
 static void put_line(writer* w, const bushd_line_part* line, const bushd_line_entry* entries,
                      uint8_t count) {
   put8(w, line->slot);
-  put16(w, line->floor);
+  put16(w, line->shortest_delay);
   put32(w, line->longest);
   put32(w, line->from);
   put32(w, line->steps);
@@ -51,7 +51,7 @@ static void put_line(writer* w, const bushd_line_part* line, const bushd_line_en
 // To the payload's end.
 static bushd_status get_line(reader* r, bushd_line_part* line, bool in_range) {
   line->slot = get8(r);
-  line->floor = get16(r);
+  line->shortest_delay = get16(r);
   line->longest = get32(r);
   line->from = get32(r);
   line->steps = get32(r);

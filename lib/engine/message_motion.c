@@ -143,11 +143,11 @@ bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks
 // First byte of an entry of TABLE_TICKS and TABLE_RUN: the motor, its direction, and what follows.
 #define HEAD_MOTOR 0x0Fu
 #define HEAD_POSITIVE 0x80u
-#define HEAD_PARTS 0x40u                  // TABLE_TICKS: the parts follow; else it cruises
-#define HEAD_SINCE_NS 0x20u               // TABLE_TICKS
-#define HEAD_LEAD 0x10u                   // TABLE_TICKS
-#define HEAD_SLOT_SHIFT 4u                // TABLE_RUN: three bits
-#define STEPS_FLOOR UINT32_C(0x80000000)  // TABLE_RUN, with the steps: a floor follows
+#define HEAD_PARTS 0x40u                    // TABLE_TICKS: the parts follow; else it cruises
+#define HEAD_SINCE_NS 0x20u                 // TABLE_TICKS
+#define HEAD_LEAD 0x10u                     // TABLE_TICKS
+#define HEAD_SLOT_SHIFT 4u                  // TABLE_RUN: three bits
+#define STEPS_LIMITED UINT32_C(0x80000000)  // TABLE_RUN, with the steps: a shortest delay follows
 
 static void put_entry(writer* w, const bushd_table_ticks_entry* entry, uint8_t flags) {
   const bushd_run_state* const state = &entry->state;
@@ -243,19 +243,19 @@ static void put_run_entries(writer* w, const bushd_table_run_entry* entries, uin
     uint8_t head = (uint8_t)(entries[i].motor | entries[i].slot << HEAD_SLOT_SHIFT);
     if (entries[i].direction > 0) head |= HEAD_POSITIVE;
     put8(w, head);
-    const bushd_delay floor = entries[i].floor;
-    put32(w, entries[i].steps | (floor != 0 ? STEPS_FLOOR : 0));
-    if (floor == 0) continue;
-    if (high_of(floor) != 0) put16(w, 0);
-    put16(w, (uint16_t)floor);
-    if (high_of(floor) != 0) put32(w, high_of(floor));
+    const bushd_delay shortest_delay = entries[i].shortest_delay;
+    put32(w, entries[i].steps | (shortest_delay != 0 ? STEPS_LIMITED : 0));
+    if (shortest_delay == 0) continue;
+    if (high_of(shortest_delay) != 0) put16(w, 0);
+    put16(w, (uint16_t)shortest_delay);
+    if (high_of(shortest_delay) != 0) put32(w, high_of(shortest_delay));
   }
 }
 
-// `in_range`: a floor that is announced is one.
-static bushd_delay get_floor(reader* r, bool* in_range) {
-  const uint16_t floor = get16(r);
-  if (floor != 0) return floor;
+// `in_range`: a shortest delay that is announced is one.
+static bushd_delay get_shortest_delay(reader* r, bool* in_range) {
+  const uint16_t shortest_delay = get16(r);
+  if (shortest_delay != 0) return shortest_delay;
 #if BUSHD_SLOW_RUNS
   if (r->end - r->at >= LONG_DELAY) {
     const uint16_t low = get16(r);
@@ -270,10 +270,11 @@ static bushd_delay get_floor(reader* r, bool* in_range) {
 static bushd_table_run_entry get_run_entry(reader* r, bool* in_range) {
   const uint8_t head = get8(r);
   const uint32_t steps = get32(r);
-  const bushd_delay floor = (steps & STEPS_FLOOR) != 0 ? get_floor(r, in_range) : (bushd_delay)0;
-  const bushd_table_run_entry entry = {(uint8_t)(head & HEAD_MOTOR),
-                                       (uint8_t)(head >> HEAD_SLOT_SHIFT & 7u),
-                                       head & HEAD_POSITIVE ? 1 : -1, steps & ~STEPS_FLOOR, floor};
+  const bushd_delay shortest_delay =
+      (steps & STEPS_LIMITED) != 0 ? get_shortest_delay(r, in_range) : (bushd_delay)0;
+  const bushd_table_run_entry entry = {
+      (uint8_t)(head & HEAD_MOTOR), (uint8_t)(head >> HEAD_SLOT_SHIFT & 7u),
+      head & HEAD_POSITIVE ? 1 : -1, steps & ~STEPS_LIMITED, shortest_delay};
   return entry;
 }
 
@@ -379,12 +380,12 @@ size_t bushd_encode_home(const bushd_home* message, uint8_t* payload) {
   put8(&w, message->motor);
   put8(&w, (uint8_t)message->direction);
   put32(&w, message->most_steps);
-  put16(&w, (uint16_t)message->floor);
+  put16(&w, (uint16_t)message->shortest_delay);
   put32(&w, message->slow_steps);
   put16(&w, (uint16_t)message->slow_delay);
   put32(&w, (uint32_t)message->position_steps);
-  if ((high_of(message->floor) | high_of(message->slow_delay)) != 0) {
-    put32(&w, high_of(message->floor));
+  if ((high_of(message->shortest_delay) | high_of(message->slow_delay)) != 0) {
+    put32(&w, high_of(message->shortest_delay));
     put32(&w, high_of(message->slow_delay));
   }
   return (size_t)(w.at - payload);
@@ -395,18 +396,18 @@ bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* 
   message->motor = get8(&r);
   message->direction = (int8_t)get8(&r);
   message->most_steps = get32(&r);
-  message->floor = get16(&r);
+  message->shortest_delay = get16(&r);
   message->slow_steps = get32(&r);
   message->slow_delay = get16(&r);
   message->position_steps = (int32_t)get32(&r);
   bool in_range = true;
 #if BUSHD_SLOW_RUNS
   if (r.at != r.end) {
-    const uint32_t floor = get32(&r);
+    const uint32_t shortest_delay = get32(&r);
     const uint32_t slow_delay = get32(&r);
-    message->floor = with_high((uint16_t)message->floor, floor);
+    message->shortest_delay = with_high((uint16_t)message->shortest_delay, shortest_delay);
     message->slow_delay = with_high((uint16_t)message->slow_delay, slow_delay);
-    in_range = (floor | slow_delay) != 0;
+    in_range = (shortest_delay | slow_delay) != 0;
   }
 #endif
   return finish(&r, in_range && message->motor < BUSHD_MOTORS_PER_MCU &&

@@ -22,9 +22,10 @@ extern "C" {
 #define BUSHD_HOME_UNIT_NS 10000u
 typedef struct bushd_home {
   uint8_t motor;
-  int8_t direction;        // towards the switch: +1, -1
-  uint32_t most_steps;     // of the fast approach, below 2^31
-  bushd_delay floor;       // no delay of it is shorter, time units of the motor's table; 0: none
+  int8_t direction;     // towards the switch: +1, -1
+  uint32_t most_steps;  // of the fast approach, below 2^31
+  bushd_delay
+      shortest_delay;      // no delay of it is shorter, time units of the motor's table; 0: none
   uint32_t slow_steps;     // at most as many in each of the slow stages; 1 .. 2^31 - 1
   bushd_delay slow_delay;  // of a slow step, BUSHD_HOME_UNIT_NS; >= 1
   int32_t position_steps;
@@ -130,16 +131,16 @@ typedef struct bushd_table_run {
   uint8_t epoch;
   uint32_t first_tick;
   uint8_t count;           // of entries, >= 1
-  const uint8_t* entries;  // 5 bytes each, or 7 with a floor, or 13
+  const uint8_t* entries;  // 5 bytes each, or 7 with a shortest delay, or 13
 } bushd_table_run;
 #define BUSHD_TABLE_RUN_HEADER 5u
 #define BUSHD_TABLE_RUN_MAX_ENTRY 13u
 typedef struct bushd_table_run_entry {
   uint8_t motor;
-  uint8_t slot;       // of the table; must be the one assigned to the motor
-  int8_t direction;   // +1, -1
-  uint32_t steps;     // 1 .. 2^31 - 1
-  bushd_delay floor;  // no delay is shorter, time units of the table; 0: none
+  uint8_t slot;                // of the table; must be the one assigned to the motor
+  int8_t direction;            // +1, -1
+  uint32_t steps;              // 1 .. 2^31 - 1
+  bushd_delay shortest_delay;  // no delay is shorter, time units of the table; 0: none
 } bushd_table_run_entry;
 
 // The entry of a table run's or a trigger's at *at, which moves on to the next one.

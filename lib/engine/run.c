@@ -2,8 +2,9 @@
 // max(A(j-1), D(N-j), c): a lead (a step taken over in its middle), steps on the accelerating side,
 // steps at cruise, steps on the decelerating side. Both sides are sorted, so A(j-1) - D(N-j) never
 // rises with j and one binary search finds where deceleration takes over; codes not above c count
-// as cruise. A floor is a longer c. To slow down to a floor a run brakes, on the decelerating side
-// as far as it lies below the floor, in place of speeding up. run_ticks.c goes through the parts.
+// as cruise. A shortest delay of the run is a longer c. To slow down to a shortest delay a run
+// brakes, on the decelerating side as far as it lies below the shortest delay, in place of speeding
+// up. run_ticks.c goes through the parts.
 #include "engine/run.h"
 
 #include "engine/run_parts.h"
@@ -73,14 +74,14 @@ static void cut(bushd_run* run, uint16_t first, uint32_t steps) {
   run->decel_left = down;
 }
 
-static bushd_delay cruise_above(const bushd_table* table, bushd_delay floor) {
-  return floor > table->cruise ? floor : table->cruise;
+static bushd_delay cruise_above(const bushd_table* table, bushd_delay shortest_delay) {
+  return shortest_delay > table->cruise ? shortest_delay : table->cruise;
 }
 
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction,
-                     bushd_delay floor) {
+                     bushd_delay shortest_delay) {
   clear(run, table, direction);
-  run->cruise = cruise_above(table, floor);
+  run->cruise = cruise_above(table, shortest_delay);
   cut(run, 0, steps);
 }
 
@@ -171,13 +172,13 @@ static void brake(bushd_run* run, uint32_t to_stop, uint32_t steps) {
   run->decel_left = decel_codes;
 }
 
-bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, bushd_delay floor) {
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, bushd_delay shortest_delay) {
   const bushd_delay delay = bushd_run_delay(run);
   if (delay == 0) return false;
   const uint32_t to_stop = bushd_table_steps_to_stop(run->table, delay);
   if (to_stop > steps_after) return false;
   run->lead_delay = delay;
-  run->cruise = cruise_above(run->table, floor);
+  run->cruise = cruise_above(run->table, shortest_delay);
   if (delay < run->cruise) {
     brake(run, to_stop, steps_after);
     return true;

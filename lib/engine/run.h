@@ -43,7 +43,7 @@ typedef struct bushd_run {
   bushd_since since;     // whole time units since the last step; before the run begins (begin_late)
                          // negative
   uint32_t since_ns;     // and the rest, < time_unit_ns
-  bushd_delay cruise;    // the table's cruise delay, or the run's floor above it
+  bushd_delay cruise;    // the table's cruise delay, or the run's shortest delay above it
   bushd_delay lead_delay;  // of a step with a delay of its own, before all others; 0: none
   uint16_t accel_at;       // next index on the accelerating side
   uint16_t accel_end;  // and where that part ends; of a ramp-down, where it lies before accel_at,
@@ -58,11 +58,12 @@ typedef struct bushd_run {
 
 // A move of `steps` (>= 0) from rest; direction is +1 or -1. The first tick expanded is the one in
 // which the move starts at its beginning. O(log steps).
-//   floor  no delay is shorter, time units; the table's own delays where they are longer. 0: none.
+//   shortest delay  no delay is shorter, time units; the table's own delays where they are longer.
+//   0: none.
 //          Beyond all codes it is the delay of every step
 // Precondition: the table passed bushd_table_check.
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction,
-                     bushd_delay floor);
+                     bushd_delay shortest_delay);
 
 // Puts the beginning of a run that has just been started `ns` after the beginning of its first
 // tick. Precondition: ns < length of the ticks that it will be expanded in. O(1).
@@ -94,18 +95,18 @@ void bushd_run_ramp_down_after_step(bushd_run* run);
 // the running one. For run_plan.c.
 void bushd_run_leave_out_slow(bushd_run* run);
 
-// Changes where the run ends, in its direction, and its floor: the running step, of delay x, is
-// completed, and `steps_after` more follow. They take up the accelerating side where x stands in
-// it: with a the first index of A(a) <= x, or the one after it if A(a) == x, and k the fewest steps
-// with D(k) <= x, the delay before step j of these n is
+// Changes where the run ends, in its direction, and its shortest delay: the running step, of delay
+// x, is completed, and `steps_after` more follow. They take up the accelerating side where x stands
+// in it: with a the first index of A(a) <= x, or the one after it if A(a) == x, and k the fewest
+// steps with D(k) <= x, the delay before step j of these n is
 //
-//     max( A(a+j-1), D(n-j), c, floor(j) ),   floor(j) = min( floor, D(k-j) ) while j <= k, else
-//     floor
+//     max( A(a+j-1), D(n-j), c, f(j) ),   f(j) = min( shortest_delay, D(k-j) ) while j <= k, else
+//     shortest_delay
 //
-// so that the run goes on speeding up, slows down to its floor, holds cruise, or ramps down,
-// whatever it did before. Returns false, and changes nothing, if a ramp-down takes more steps than
-// that (the run would overshoot) or the run is done. O(log steps).
-bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, bushd_delay floor);
+// so that the run goes on speeding up, slows down to its shortest delay, holds cruise, or ramps
+// down, whatever it did before. Returns false, and changes nothing, if a ramp-down takes more steps
+// than that (the run would overshoot) or the run is done. O(log steps).
+bool bushd_run_retarget(bushd_run* run, uint32_t steps_after, bushd_delay shortest_delay);
 
 // The next `ticks` displacements of `tick_ns` each into out[0], out[stride], ... ; after the end of
 // the run they are 0. If that came in the middle of a step, the first fine one after it leads back

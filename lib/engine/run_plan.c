@@ -49,9 +49,9 @@ void bushd_run_ramp_down_once(bushd_run* run) {
 #endif
 }
 
-bool bushd_run_is_slow(const bushd_table* table, bushd_delay floor, uint32_t tick_ns,
+bool bushd_run_is_slow(const bushd_table* table, bushd_delay shortest_delay, uint32_t tick_ns,
                        uint32_t delay_ns) {
   const uint16_t fastest = bushd_table_fastest(table);
-  const bushd_delay shortest = fastest > floor ? fastest : floor;
+  const bushd_delay shortest = fastest > shortest_delay ? fastest : shortest_delay;
   return tick_ns >= BUSHD_SLOW_LINE_TICK_NS && (uint64_t)shortest * table->time_unit_ns >= delay_ns;
 }

@@ -28,55 +28,57 @@ bool ramps_down(const bushd_run& run) {
 
 }  // namespace
 
-double Axis::duration_ticks(std::int64_t steps, bushd_delay floor) const {
+double Axis::duration_ticks(std::int64_t steps, bushd_delay shortest_delay) const {
   const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
-  if (!bushd_delay_is_code(floor)) {  // the delay of all, maybe longer than units are counted
-    return std::ceil(static_cast<double>(count) * static_cast<double>(floor) *
+  if (!bushd_delay_is_code(
+          shortest_delay)) {  // the delay of all, maybe longer than units are counted
+    return std::ceil(static_cast<double>(count) * static_cast<double>(shortest_delay) *
                      table_->time_unit_ns / tick_ns_);
   }
   bushd_run run;
-  bushd_run_start(&run, table_, count, 1, floor);
+  bushd_run_start(&run, table_, count, 1, shortest_delay);
   const double ns = static_cast<double>(bushd_run_units_left(&run)) * table_->time_unit_ns;
   return std::ceil(ns / tick_ns_);
 }
 
-double Axis::most_steps_per_s(bushd_delay floor) const {
-  const bushd_delay delay = std::max<bushd_delay>(bushd_table_fastest(table_), floor);
+double Axis::most_steps_per_s(bushd_delay shortest_delay) const {
+  const bushd_delay delay = std::max<bushd_delay>(bushd_table_fastest(table_), shortest_delay);
   return 1e9 / (static_cast<double>(delay) * table_->time_unit_ns);
 }
 
 void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns,
-                 bushd_delay floor) {
+                 bushd_delay shortest_delay) {
   busy_ = true;
   start_ = start;
   late_ns_ = late_ns;
   from_ = from_steps;
   target_ = from_steps + steps;
-  floor_ = floor;
+  shortest_delay_ = shortest_delay;
   stopping_ = false;
   stale_ = false;
   change_.reset();
   share_.reset();
   followed_.reset();
   const auto count = static_cast<std::uint32_t>(steps < 0 ? -steps : steps);
-  restart(base_.run, count, steps < 0 ? -1 : 1, floor);
+  restart(base_.run, count, steps < 0 ? -1 : 1, shortest_delay);
   base_.tick = start;
   head_ = base_;
   plan_end();
 }
 
-void Axis::restart(bushd_run& run, std::uint32_t steps, int direction, bushd_delay floor) const {
-  bushd_run_start(&run, &run_table(), steps, direction, floor);
+void Axis::restart(bushd_run& run, std::uint32_t steps, int direction,
+                   bushd_delay shortest_delay) const {
+  bushd_run_start(&run, &run_table(), steps, direction, shortest_delay);
   bushd_run_begin_late(&run, late_ns_);
 }
 
-void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, bushd_delay floor,
-                      std::uint32_t late_ns) {
+void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start,
+                      bushd_delay shortest_delay, std::uint32_t late_ns) {
   busy_ = true;
   start_ = start;
   late_ns_ = late_ns;
   from_ = from_steps;
-  floor_ = floor;
+  shortest_delay_ = shortest_delay;
   stopping_ = false;
   stale_ = false;
   change_.reset();
@@ -86,7 +88,7 @@ void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start, bush
   share_from_steps_ = line_steps(0);
   target_ = from_ + share_->direction * (line_steps(run_target_) - share_from_steps_);
   base_.run = {};
-  if (!on_path()) restart(base_.run, run_target_, 1, floor);
+  if (!on_path()) restart(base_.run, run_target_, 1, shortest_delay);
   base_.tick = start;
   bushd_line_start(&base_.line, share_->increment, share_->longest);
   bushd_line_go_to(&base_.line, share_->from);
@@ -123,16 +125,16 @@ void Axis::stop() {
   stale_ = true;
 }
 
-void Axis::aim(std::int64_t target_steps, bushd_delay floor) {
+void Axis::aim(std::int64_t target_steps, bushd_delay shortest_delay) {
   stopping_ = false;
   target_ = target_steps;
-  floor_ = floor;
+  shortest_delay_ = shortest_delay;
   stale_ = true;
 }
 
-void Axis::aim_on_line(std::uint32_t line_step, bushd_delay floor) {
+void Axis::aim_on_line(std::uint32_t line_step, bushd_delay shortest_delay) {
   run_target_ = line_step - share_->from;
-  aim(from_ + share_->direction * (line_steps(run_target_) - share_from_steps_), floor);
+  aim(from_ + share_->direction * (line_steps(run_target_) - share_from_steps_), shortest_delay);
 }
 
 bool Axis::change(Tick at, std::uint32_t least_end) {
@@ -146,7 +148,8 @@ bool Axis::change(Tick at, std::uint32_t least_end) {
   unchanged_end_ = end_;
   const Tick unchanged_over = over_tick();
   if (at >= std::max(over_tick(), start_ + 1)) return false;
-  change_ = Change{.at = at, .target_steps = {}, .floor = floor_, .run_steps = run_target_};
+  change_ = Change{
+      .at = at, .target_steps = {}, .shortest_delay = shortest_delay_, .run_steps = run_target_};
   if (!stopping_) change_->target_steps = target_;
   if (stopping_ && share_ && !on_path() && least_end > share_->from) {
     change_->run_steps = least_end - share_->from;
@@ -158,7 +161,7 @@ bool Axis::change(Tick at, std::uint32_t least_end) {
   const bool same_end = planned_end_ == planned_end && planned_run_steps_ == planned_run_steps;
   const bool same_speed =
       stopping_ || on_path() ||
-      base_.run.cruise == std::max<bushd_delay>(run_table().cruise, change_->floor);
+      base_.run.cruise == std::max<bushd_delay>(run_table().cruise, change_->shortest_delay);
   if (share_ && at >= unchanged_end_) end_ = unchanged_end_;  // it has made all of its steps
   if (!same_end || !same_speed) {
     // Its MCU makes the run to its end, also when the motor has made its last step.
@@ -278,12 +281,12 @@ void Axis::take_change(Place& place) const {
     return;
   }
   if (change_->at <= start_ && share_) {
-    return restart(run, change_->target_steps ? change_->run_steps : 0, 1, change_->floor);
+    return restart(run, change_->target_steps ? change_->run_steps : 0, 1, change_->shortest_delay);
   }
   if (change_->at <= start_) {
     const std::int64_t steps = change_->target_steps.value_or(from_) - from_;
     return restart(run, static_cast<std::uint32_t>(std::abs(steps)), steps < 0 ? -1 : 1,
-                   change_->floor);
+                   change_->shortest_delay);
   }
   if (change_->target_steps) {
     // What is left of the way after the running step.
@@ -293,7 +296,7 @@ void Axis::take_change(Place& place) const {
     // The ramp-down of a line is not shortened (bushd_run_ramp_down_once).
     const bool possible = !share_ || !ramps_down(run) || after + 1 >= bushd_run_steps_left(&run);
     if (possible && after >= 0 &&
-        bushd_run_retarget(&run, static_cast<std::uint32_t>(after), change_->floor)) {
+        bushd_run_retarget(&run, static_cast<std::uint32_t>(after), change_->shortest_delay)) {
       return;
     }
   }

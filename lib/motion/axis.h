@@ -40,8 +40,9 @@ using Tick = std::int64_t;
 struct Change {
   Tick at;
   std::optional<std::int64_t> target_steps;
-  bushd_delay floor = 0;  // of the run from then on (engine/run.h)
-  // Of a line's run, with a target: where that ends. The line's floor is in the line's time units.
+  bushd_delay shortest_delay = 0;  // of the run from then on (engine/run.h)
+  // Of a line's run, with a target: where that ends. The line's shortest delay is in the line's
+  // time units.
   std::uint32_t run_steps = 0;
 };
 
@@ -82,13 +83,13 @@ class Axis {
   std::uint32_t tick_ns() const { return tick_ns_; }
   std::uint32_t time_unit_ns() const { return table_->time_unit_ns; }
 
-  // A floor is the shortest delay of a run, beside the table's own (engine/run.h); 0: none.
+  // `shortest_delay`: no delay of the run is shorter (engine/run.h). 0: only the table counts.
 
   // How long a move of `steps` takes, in ticks, rounded up; for any number of steps.
-  double duration_ticks(std::int64_t steps, bushd_delay floor = 0) const;
+  double duration_ticks(std::int64_t steps, bushd_delay shortest_delay = 0) const;
 
   // What no step of a run is faster than.
-  double most_steps_per_s(bushd_delay floor) const;
+  double most_steps_per_s(bushd_delay shortest_delay) const;
 
   // Longer moves are beyond what tick numbers and times are made for: a month of the shortest
   // ticks, years of the longest.
@@ -98,12 +99,12 @@ class Axis {
   // or `late_ns` after it. Precondition: !busy(), |steps| < 2^31, duration_ticks(steps) <=
   // kMaxDurationTicks, late_ns less than a tick.
   void start(std::int64_t from_steps, std::int64_t steps, Tick start, std::uint32_t late_ns = 0,
-             bushd_delay floor = 0);
+             bushd_delay shortest_delay = 0);
 
-  // The same for a part of a line; `floor` in the line's time units.
+  // The same for a part of a line; `shortest_delay` in the line's time units.
   // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks; of a path late_ns
   // is 0.
-  void start_line(std::int64_t from_steps, LineShare share, Tick start, bushd_delay floor,
+  void start_line(std::int64_t from_steps, LineShare share, Tick start, bushd_delay shortest_delay,
                   std::uint32_t late_ns = 0);
 
   // Follows a trajectory, whose first row is where it stands.
@@ -125,9 +126,9 @@ class Axis {
   // What is wanted of the motor from now on: rest, or another target. The plan follows with
   // change(). Precondition: busy().
   void stop();
-  void aim(std::int64_t target_steps, bushd_delay floor = 0);
+  void aim(std::int64_t target_steps, bushd_delay shortest_delay = 0);
   // Of a line: an end of it, by its steps.
-  void aim_on_line(std::uint32_t line_step, bushd_delay floor);
+  void aim_on_line(std::uint32_t line_step, bushd_delay shortest_delay);
 
   // The plan does not yet do what is wanted, and can be changed: of two changes the first must have
   // been executed (or known to have failed) before the second is planned, for the MCU may have
@@ -157,8 +158,8 @@ class Axis {
 
   // The run as it is at the beginning of tick `first`, and for how many ticks (1 .. max_ticks) it
   // gives what render() would: up to the next change or the run's end. Nothing before the start, in
-  // a start tick in whose middle it begins, while it slows down to a floor, in a ramp-down that
-  // leaves out its slowest steps, and after the end.
+  // a start tick in whose middle it begins, while it slows down to a shortest delay, in a ramp-down
+  // that leaves out its slowest steps, and after the end.
   // Preconditions as of render().
   struct RunSegment {
     bushd_run run;
@@ -195,7 +196,7 @@ class Axis {
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t planned_end_steps() const { return planned_end_; }
   std::int64_t target_steps() const { return target_; }
-  bushd_delay floor() const { return floor_; }
+  bushd_delay shortest_delay() const { return shortest_delay_; }
   // Where the motor will stand when all is done: after a second run, if it takes one.
   std::int64_t end_steps() const { return stopping_ ? planned_end_ : target_; }
   // Of the step that runs at the last executed tick; 0 when not moving.
@@ -274,7 +275,8 @@ class Axis {
   Tick end_of(const Place& place) const;
   Tick own_end_of(const Place& place) const;
   void plan_end();
-  void restart(bushd_run& run, std::uint32_t steps, int direction, bushd_delay floor) const;
+  void restart(bushd_run& run, std::uint32_t steps, int direction,
+               bushd_delay shortest_delay) const;
   const bushd_table& run_table() const { return share_ ? share_->table->view() : *table_; }
 
   const bushd_table* table_;
@@ -287,7 +289,7 @@ class Axis {
   std::int64_t from_ = 0;
   std::int64_t planned_end_ = 0;
   std::int64_t target_ = 0;
-  bushd_delay floor_ = 0;
+  bushd_delay shortest_delay_ = 0;
   bool stopping_ = false;
   bool stale_ = false;            // what is wanted has changed since the last change()
   std::optional<Change> change_;  // planned and not yet executed

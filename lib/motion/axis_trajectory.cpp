@@ -22,7 +22,7 @@ void Axis::start_trajectory(TrajectoryShare share, Tick start) {
   busy_ = true;
   start_ = start;
   late_ns_ = 0;
-  floor_ = 0;
+  shortest_delay_ = 0;
   stopping_ = false;
   stale_ = false;
   change_.reset();

@@ -35,39 +35,41 @@ std::string Motor::busy_text() const {
   return name() + (is<Armed>() ? " waits for the trigger" : " moves");
 }
 
-void Motor::start(std::int64_t target, Tick start, bushd_delay floor) {
+void Motor::start(std::int64_t target, Tick start, bushd_delay shortest_delay) {
   activity_ = Moving{};
   pause_ = Pause::kNo;
-  axis_.start(position_, target - position_, start, 0, floor);
+  axis_.start(position_, target - position_, start, 0, shortest_delay);
 }
 
-void Motor::arm(std::uint8_t number, std::int64_t steps, bushd_delay floor) {
+void Motor::arm(std::uint8_t number, std::int64_t steps, bushd_delay shortest_delay) {
   activity_ = Armed{.number = number, .steps = steps};
-  axis_.start(position_, steps, kNever, 0, floor);
+  axis_.start(position_, steps, kNever, 0, shortest_delay);
 }
 
 void Motor::arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
-                     bushd_delay floor) {
-  axis_.start_line(position_, std::move(share), kNever, floor);
+                     bushd_delay shortest_delay) {
+  axis_.start_line(position_, std::move(share), kNever, shortest_delay);
   const std::int64_t steps = axis_.target_steps() - position_;
   activity_ = Armed{.number = number, .steps = steps, .on_line = on_line};
 }
 
-void Motor::aim(std::int64_t target, bushd_delay floor) {
+void Motor::aim(std::int64_t target, bushd_delay shortest_delay) {
   pause_ = Pause::kNo;
-  axis_.aim(target, floor);
+  axis_.aim(target, shortest_delay);
 }
 
-void Motor::start_line(const OnLine& on_line, LineShare share, Tick start, bushd_delay floor) {
+void Motor::start_line(const OnLine& on_line, LineShare share, Tick start,
+                       bushd_delay shortest_delay) {
   activity_ = on_line;
   pause_ = Pause::kNo;
   further_.clear();
-  axis_.start_line(position_, std::move(share), start, floor);
+  axis_.start_line(position_, std::move(share), start, shortest_delay);
 }
 
-void Motor::aim_on_line(const OnLine& on_line, std::uint32_t line_step, bushd_delay floor) {
+void Motor::aim_on_line(const OnLine& on_line, std::uint32_t line_step,
+                        bushd_delay shortest_delay) {
   activity_ = on_line;
-  axis_.aim_on_line(line_step, floor);
+  axis_.aim_on_line(line_step, shortest_delay);
 }
 
 void Motor::follow(TrajectoryShare share, Tick start) {
@@ -80,7 +82,7 @@ void Motor::follow(TrajectoryShare share, Tick start) {
 
 Leg Motor::take_leg() {
   if (position_ != axis_.target_steps() || further_.empty()) {
-    return {.target = axis_.target_steps(), .floor = axis_.floor()};
+    return {.target = axis_.target_steps(), .shortest_delay = axis_.shortest_delay()};
   }
   const Leg next = further_.front();
   further_.erase(further_.begin());
@@ -99,7 +101,7 @@ void Motor::resume() {
     on_line->resumes = is_paused();
     return;
   }
-  if (pause_ == Pause::kRamps) axis_.aim(axis_.target_steps(), axis_.floor());
+  if (pause_ == Pause::kRamps) axis_.aim(axis_.target_steps(), axis_.shortest_delay());
   pause_ = Pause::kNo;
 }
 
@@ -341,10 +343,10 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
       activity_ = *armed.on_line;
       LineShare share = *axis_.line();
       share.waits = false;
-      axis_.start_line(axis_.from_steps(), share, start, axis_.floor(), mcu.start_ns);
+      axis_.start_line(axis_.from_steps(), share, start, axis_.shortest_delay(), mcu.start_ns);
     } else {
       activity_ = Moving{};
-      axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns, axis_.floor());
+      axis_.start(axis_.from_steps(), armed.steps, start, mcu.start_ns, axis_.shortest_delay());
     }
     if (armed.stops) axis_.stop();
     moving_now().by_others = armed.stops && armed.ended_by.has_value();

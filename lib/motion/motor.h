@@ -43,7 +43,7 @@ struct MotorSetup {
 // A motion is made of these, with a rest between any two.
 struct Leg {
   std::int64_t target;
-  bushd_delay floor;  // of Axis
+  bushd_delay shortest_delay;  // of Axis
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.
@@ -191,17 +191,17 @@ class Motor {
   // another target, and nothing else.
   Result<void> may_be_used() const;  // for any motion
   // Beyond that.
-  Result<void> may_move_to(std::int64_t target, bushd_delay floor = 0) const;
+  Result<void> may_move_to(std::int64_t target, bushd_delay shortest_delay = 0) const;
   // Whether it may be moved by its MCU alone, as much as so many steps to either side.
   Result<void> may_be_moved_within(std::int64_t steps) const;
   // How far it may go from here in a direction: to its soft limit, as far as positions are counted,
   // or for as long as a run may take. Where it stands, if that is not in this direction.
-  std::int64_t farthest(int direction, bushd_delay floor) const;
+  std::int64_t farthest(int direction, bushd_delay shortest_delay) const;
   // The legs of a move there, in place of what it does now. Errors: one of them may not be made.
-  Result<std::vector<Leg>> legs_to(std::int64_t target, bushd_delay floor) const;
-  // The floor of runs at max_speed and at this speed, whichever is slower. Error: no speed, or one
-  // slower than any delay.
-  Result<bushd_delay> floor_at(const std::optional<words::Speed>& speed) const;
+  Result<std::vector<Leg>> legs_to(std::int64_t target, bushd_delay shortest_delay) const;
+  // The shortest delay of runs at max_speed and at this speed, whichever is slower. Error: no
+  // speed, or one slower than any delay.
+  Result<bushd_delay> shortest_delay_at(const std::optional<words::Speed>& speed) const;
   // An amount in steps. Errors: not finite, beyond what is counted.
   Result<std::int64_t> steps_of_position(const words::Amount& position) const;
   // The same, not rounded.
@@ -211,15 +211,15 @@ class Motor {
   std::int64_t lowest() const;
   std::int64_t highest() const;
 
-  // Requests. Preconditions: it may. Floors are those of Axis.
+  // Requests. Preconditions: it may. Shortest delays are those of Axis.
   // From rest, or from the turning point of a motion.
-  void start(std::int64_t target, Tick start, bushd_delay floor = 0);
-  void aim(std::int64_t target, bushd_delay floor = 0);
+  void start(std::int64_t target, Tick start, bushd_delay shortest_delay = 0);
+  void aim(std::int64_t target, bushd_delay shortest_delay = 0);
   // Where all requests so far lead; nothing: nobody has said that in numbers.
   void ask_for(std::optional<units::Steps> target) { asked_for_ = target; }
   // As start() and aim(), for a run of a line.
-  void start_line(const OnLine& on_line, LineShare share, Tick start, bushd_delay floor);
-  void aim_on_line(const OnLine& on_line, std::uint32_t line_step, bushd_delay floor);
+  void start_line(const OnLine& on_line, LineShare share, Tick start, bushd_delay shortest_delay);
+  void aim_on_line(const OnLine& on_line, std::uint32_t line_step, bushd_delay shortest_delay);
   // From rest, along a trajectory whose first row is where it stands.
   void follow(TrajectoryShare share, Tick start);
   // Whether it moves along a trajectory.
@@ -245,8 +245,9 @@ class Motor {
   bool jogs() const { return jogs_; }
   void hold(bool now) { held_ = now; }
   bool is_held() const { return held_; }
-  void arm(std::uint8_t number, std::int64_t steps, bushd_delay floor = 0);
-  void arm_line(std::uint8_t number, const OnLine& on_line, LineShare share, bushd_delay floor);
+  void arm(std::uint8_t number, std::int64_t steps, bushd_delay shortest_delay = 0);
+  void arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
+                bushd_delay shortest_delay);
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by`: why, if nobody has asked for it.
   void stop(std::optional<std::string> ended_by = {});

@@ -30,7 +30,7 @@ Result<void> Motor::may_be_used() const {
   return {};
 }
 
-Result<void> Motor::may_move_to(std::int64_t target, bushd_delay floor) const {
+Result<void> Motor::may_move_to(std::int64_t target, bushd_delay shortest_delay) const {
   if (uncertain_reason_) {
     return fail("its position is uncertain, because " + *uncertain_reason_ + "; " +
                 (setup_.has_home ? "run " + words::remedy("home", name()) + ", or " : "") +
@@ -67,12 +67,12 @@ Result<void> Motor::may_move_to(std::int64_t target, bushd_delay floor) const {
         switch_at(direction) +
         " is active: motion in this direction is inhibited; move it in the other direction");
   }
-  if (axis_.duration_ticks(steps, floor) > Axis::kMaxDurationTicks) {
+  if (axis_.duration_ticks(steps, shortest_delay) > Axis::kMaxDurationTicks) {
     const double tick_days = axis_.tick_ns() * 1e-9 / 86400;
     return fail(fmt::format(
         "{} steps would take {:.1f} days at that speed; the longest move is {:.1f} days: move it "
         "faster, or in parts",
-        steps, axis_.duration_ticks(steps, floor) * tick_days,
+        steps, axis_.duration_ticks(steps, shortest_delay) * tick_days,
         Axis::kMaxDurationTicks * tick_days));
   }
   return {};
@@ -115,63 +115,63 @@ Result<std::int64_t> Motor::rounded_distance_from() const {
   return target_steps();
 }
 
-Result<bushd_delay> Motor::floor_at(const std::optional<words::Speed>& speed) const {
-  bushd_delay floor = 0;
+Result<bushd_delay> Motor::shortest_delay_at(const std::optional<words::Speed>& speed) const {
+  bushd_delay shortest_delay = 0;
   if (setup_.max_speed) {
     const auto slowest = setup_.coordinates.delay_at(*setup_.max_speed, axis_.time_unit_ns());
     if (!slowest) return fail("max_speed: " + slowest.error().message);
-    floor = *slowest;
+    shortest_delay = *slowest;
   }
-  if (!speed) return floor;
+  if (!speed) return shortest_delay;
   const units::Coordinates in_steps;
   const auto delay = (speed->in_steps ? in_steps : setup_.coordinates)
                          .delay_at(speed->per_s, axis_.time_unit_ns());
   if (!delay) return fail(delay.error());
-  return std::max<bushd_delay>(floor, *delay);
+  return std::max<bushd_delay>(shortest_delay, *delay);
 }
 
-std::int64_t Motor::farthest(int direction, bushd_delay floor) const {
+std::int64_t Motor::farthest(int direction, bushd_delay shortest_delay) const {
   Range range{.low = -kMaxPosition, .high = kMaxPosition};
   if (setup_.soft_limits) range = allowed_steps();
   const std::int64_t limit = direction > 0 ? range.high : range.low;
   const std::int64_t steps = std::min((limit - position_) * direction, kMaxPosition);
   if (steps <= 0) return position_;
-  if (axis_.duration_ticks(steps, floor) <= Axis::kMaxDurationTicks) {
+  if (axis_.duration_ticks(steps, shortest_delay) <= Axis::kMaxDurationTicks) {
     return position_ + direction * steps;
   }
   std::int64_t low = 0;
   std::int64_t high = steps;
   while (high - low > 1) {
     const std::int64_t middle = low + (high - low) / 2;
-    (axis_.duration_ticks(middle, floor) <= Axis::kMaxDurationTicks ? low : high) = middle;
+    (axis_.duration_ticks(middle, shortest_delay) <= Axis::kMaxDurationTicks ? low : high) = middle;
   }
   return position_ + direction * low;
 }
 
-Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, bushd_delay floor) const {
-  if (auto may = may_move_to(target, floor); !may) return fail(may.error());
+Result<std::vector<Leg>> Motor::legs_to(std::int64_t target, bushd_delay shortest_delay) const {
+  if (auto may = may_move_to(target, shortest_delay); !may) return fail(may.error());
   const auto backlash = setup_.coordinates.steps_of_distance(setup_.backlash);
   const std::int64_t way = target - position_;
   if (!backlash || *backlash == 0 || (way == 0 && stands())) {
-    return std::vector<Leg>{{target, floor}};
+    return std::vector<Leg>{{target, shortest_delay}};
   }
-  bushd_delay slow = floor;
+  bushd_delay slow = shortest_delay;
   if (setup_.backlash_speed) {
-    const auto approach = floor_at(words::Speed{.per_s = *setup_.backlash_speed});
+    const auto approach = shortest_delay_at(words::Speed{.per_s = *setup_.backlash_speed});
     if (!approach) return fail("backlash_speed: " + approach.error().message);
-    slow = std::max(floor, *approach);
+    slow = std::max(shortest_delay, *approach);
   }
   // As the EPICS motor record does it: straight, if it is in the direction of the last approach and
   // as slow. One that moves may have to come back first, so that its direction says nothing.
   const bool from_that_side = stands() && (way < 0) == (*backlash < 0);
-  if (from_that_side && (slow == floor || std::abs(way) <= std::abs(*backlash))) {
+  if (from_that_side && (slow == shortest_delay || std::abs(way) <= std::abs(*backlash))) {
     return std::vector<Leg>{{target, slow}};
   }
   const std::int64_t start = target - *backlash;
-  if (auto may = may_move_to(start, floor); !may) {
+  if (auto may = may_move_to(start, shortest_delay); !may) {
     return fail("the start of its last approach, for backlash: " + may.error().message);
   }
-  return std::vector<Leg>{{start, floor}, {target, slow}};
+  return std::vector<Leg>{{start, shortest_delay}, {target, slow}};
 }
 
 Motor::Range Motor::allowed_steps() const {

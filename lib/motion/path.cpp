@@ -36,7 +36,7 @@ Path::Path(std::vector<Motor> motors, std::span<const std::int64_t> begin, Corne
   prepare(points);
 }
 
-void Path::add(std::span<const std::int64_t> point, std::span<const bushd_delay> floors) {
+void Path::add(std::span<const std::int64_t> point, std::span<const bushd_delay> shortest_delays) {
   const std::size_t width = motors_.size();
   const std::int64_t* from = &points_[points_.size() - width];
   std::uint64_t longest = 0;
@@ -46,8 +46,9 @@ void Path::add(std::span<const std::int64_t> point, std::span<const bushd_delay>
   if (longest != 0) {
     points_.insert(points_.end(), point.begin(), point.end());
     start_.push_back(start_.back() + longest);
-    floors_.insert(floors_.end(), floors.begin(), floors.end());
-    if (floors.empty() && !floors_.empty()) floors_.resize(floors_.size() + width, 0);
+    shortest_delays_.insert(shortest_delays_.end(), shortest_delays.begin(), shortest_delays.end());
+    if (shortest_delays.empty() && !shortest_delays_.empty())
+      shortest_delays_.resize(shortest_delays_.size() + width, 0);
     phase_ = Phase::kCorners;
   }
   row_segments_.push_back(static_cast<std::uint32_t>(start_.size() - 1));
@@ -63,8 +64,8 @@ Path::Path(const Path& whole, std::uint32_t begin, std::size_t last)
   const std::size_t first = whole.segment_at(begin);
   points_ = part(whole.points_, first * width, (last + 2) * width);
   start_ = part(whole.start_, first, last + 2);
-  if (!whole.floors_.empty()) {
-    floors_ = part(whole.floors_, first * width, (last + 1) * width);
+  if (!whole.shortest_delays_.empty()) {
+    shortest_delays_ = part(whole.shortest_delays_, first * width, (last + 1) * width);
   }
   prepare(segments());
   phase_ = Phase::kCorners;
@@ -81,11 +82,11 @@ void Path::choose_unit() {
   for (std::size_t m = 0; m < motors_.size(); ++m) {
     const std::uint64_t own_ns = motors_[m].table->time_unit_ns;
     unit_ns_ = std::min<std::uint32_t>(unit_ns_, motors_[m].table->time_unit_ns);
-    bushd_delay floor = motors_[m].floor;
-    for (std::size_t i = m; i < floors_.size(); i += motors_.size()) {
-      floor = std::max(floor, floors_[i]);
+    bushd_delay shortest_delay = motors_[m].shortest_delay;
+    for (std::size_t i = m; i < shortest_delays_.size(); i += motors_.size()) {
+      shortest_delay = std::max(shortest_delay, shortest_delays_[i]);
     }
-    slowest_ns = std::max(slowest_ns, floor * own_ns);
+    slowest_ns = std::max(slowest_ns, shortest_delay * own_ns);
   }
   unit_ns_ = std::max(unit_ns_, static_cast<std::uint32_t>((slowest_ns >> 31) + 1));
   unit_ratio_.clear();
@@ -169,8 +170,10 @@ std::uint32_t Path::flat(std::size_t segment, const std::vector<PathShare>& shar
 
 bushd_delay Path::own_least(std::size_t segment, std::size_t motor) const {
   const bushd_delay least =
-      std::max<bushd_delay>(motors_[motor].table->cruise, motors_[motor].floor);
-  return floors_.empty() ? least : std::max(least, floors_[segment * motors_.size() + motor]);
+      std::max<bushd_delay>(motors_[motor].table->cruise, motors_[motor].shortest_delay);
+  return shortest_delays_.empty()
+             ? least
+             : std::max(least, shortest_delays_[segment * motors_.size() + motor]);
 }
 
 bool Path::rests_at(std::size_t segment) const {

@@ -39,15 +39,15 @@ class Path {
     kContinuous  // pass them
   };
   struct Motor {
-    const bushd_table* table;  // outlives the path
-    bushd_delay floor = 0;     // none of its steps has a shorter delay
+    const bushd_table* table;        // outlives the path
+    bushd_delay shortest_delay = 0;  // none of its steps has a shorter delay
   };
   // `begin`: where they stand. `points`: as many as are to come, if that is known.
   Path(std::vector<Motor> motors, std::span<const std::int64_t> begin, Corners corners,
        std::size_t points = 0);
-  // The next point. `floors`: as that of a motor, of the way there; none: of none. Preconditions:
-  // |to - from| < 2^32, steps() < 2^31 before plan() is called, which has not been.
-  void add(std::span<const std::int64_t> point, std::span<const bushd_delay> floors = {});
+  // The next point. `shortest_delays`: as that of a motor, on the way there; empty: no limits.
+  // Preconditions: |to - from| < 2^32, steps() < 2^31 before plan() is called, which has not been.
+  void add(std::span<const std::int64_t> point, std::span<const bushd_delay> shortest_delays = {});
   Path(const Path&) = delete;
   Path& operator=(const Path&) = delete;
 
@@ -162,7 +162,7 @@ class Path {
   std::vector<Motor> motors_;
   std::vector<std::int64_t> points_;
   Corners corners_;
-  std::vector<bushd_delay> floors_;
+  std::vector<bushd_delay> shortest_delays_;
   std::vector<std::uint32_t> row_segments_;  // of each given point: segments before it
   std::vector<std::uint64_t> start_;
   std::uint32_t first_step_ = 0;

@@ -17,7 +17,7 @@ constexpr int kShareBits = 40;
 // More than that in a tick no table allows, and no MCU takes.
 constexpr Position kMostInATick = 127 * Trajectory::kStep;
 
-SignedWide floor_of(SignedWide numerator, SignedWide denominator) {
+SignedWide shortest_delay_of(SignedWide numerator, SignedWide denominator) {
   const SignedWide quotient = numerator / denominator;
   return numerator % denominator < 0 ? quotient - 1 : quotient;
 }
@@ -57,8 +57,8 @@ SignedWide Trajectory::speed_at(std::size_t row, std::size_t motor, std::int64_t
   const SignedWide before = position(row, motor) - position(row - 1, motor);
   const SignedWide after = position(row + 1, motor) - position(row, motor);
   const SignedWide both_ns = before_ns + after_ns;
-  return floor_of(before * times_ns / before_ns * after_ns, both_ns) +
-         floor_of(after * times_ns / after_ns * before_ns, both_ns);
+  return shortest_delay_of(before * times_ns / before_ns * after_ns, both_ns) +
+         shortest_delay_of(after * times_ns / after_ns * before_ns, both_ns);
 }
 
 Trajectory::Segment Trajectory::segment(std::size_t row, std::size_t motor) const {
@@ -80,7 +80,8 @@ Trajectory::Segment Trajectory::segment(std::size_t row, std::size_t motor) cons
 
 Position Trajectory::Segment::at(std::int64_t time_ns) const {
   const SignedWide t = time_ns - begin_ns;
-  if (k2 == 0 && k3 == 0) return begin + static_cast<Position>(floor_of(k1 * t, length_ns));
+  if (k2 == 0 && k3 == 0)
+    return begin + static_cast<Position>(shortest_delay_of(k1 * t, length_ns));
   const SignedWide u = (t << kShareBits) / length_ns;
   SignedWide sum = k3;
   for (const SignedWide k : {k2, k1, SignedWide{0}}) sum = ((sum * u) >> kShareBits) + k;

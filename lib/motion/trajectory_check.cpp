@@ -26,7 +26,8 @@ double start_speed(const bushd_table& table) {
 }
 
 double least_delay_ns(const TrajectoryCheck::Motor& motor) {
-  return static_cast<double>(std::max<bushd_delay>(bushd_table_fastest(motor.table), motor.floor)) *
+  return static_cast<double>(
+             std::max<bushd_delay>(bushd_table_fastest(motor.table), motor.shortest_delay)) *
          unit_ns(*motor.table);
 }
 

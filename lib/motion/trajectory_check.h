@@ -3,7 +3,7 @@
 // Judged are the steps as the motors' MCUs are told of them, each tick a straight piece. With A, D
 // and c of the table, F = 1 / A(0), and rest also wherever the motor turns round:
 //
-//     every delay >= c, and >= the floor of the motor's max_speed
+//     every delay >= c, and >= the shortest delay of the motor's max_speed
 //     delay j after rest >= A(j), j = 1, 2 ...; delay i before rest >= D(i), i = 0, 1 ..., where a
 //     delay as long as A(0) and D(0) begins and ends a motion: as one of them while it is less
 //     than twice as long, beyond that as rest
@@ -39,7 +39,7 @@ class TrajectoryCheck {
  public:
   struct Motor {
     const bushd_table* table;  // outlives the check
-    bushd_delay floor;
+    bushd_delay shortest_delay;
     std::int64_t lowest;  // steps where it may be
     std::int64_t highest;
   };

@@ -15,7 +15,7 @@ Way::Way(std::vector<Motor> motors) : motors_(std::move(motors)) {
   for (std::size_t i = 0; i < motors_.size(); ++i) longest_ = std::max(longest_, increment(i));
   if (longest_ == 0) return;
   table_ = std::make_shared<const tables::Envelope>(parts(), longest_);
-  floor_ = table_->floor();
+  shortest_delay_ = table_->shortest_delay();
   limiting_ = tables::limiting_part(parts(), longest_);
 }
 
@@ -26,30 +26,33 @@ std::uint32_t Way::increment(std::size_t motor) const {
 std::vector<tables::LinePart> Way::parts() const {
   std::vector<tables::LinePart> parts;
   for (std::size_t i = 0; i < motors_.size(); ++i) {
-    parts.push_back({motors_[i].table, increment(i), motors_[i].floor});
+    parts.push_back({motors_[i].table, increment(i), motors_[i].shortest_delay});
   }
   return parts;
 }
 
-double Way::duration_ns(bushd_delay floor) const {
+double Way::duration_ns(bushd_delay shortest_delay) const {
   if (longest_ == 0) return 0;
-  if (!bushd_delay_is_code(floor)) {  // the delay of all, maybe longer than units are counted
-    return static_cast<double>(longest_) * static_cast<double>(floor) * table_->view().time_unit_ns;
+  if (!bushd_delay_is_code(
+          shortest_delay)) {  // the delay of all, maybe longer than units are counted
+    return static_cast<double>(longest_) * static_cast<double>(shortest_delay) *
+           table_->view().time_unit_ns;
   }
   bushd_run run;
-  bushd_run_start(&run, &table_->view(), longest_, 1, floor);
+  bushd_run_start(&run, &table_->view(), longest_, 1, shortest_delay);
   return static_cast<double>(bushd_run_units_left(&run)) * table_->view().time_unit_ns;
 }
 
 double Way::most_steps_per_s(std::size_t motor) const {
   if (longest_ == 0) return 0;
-  const bushd_delay delay = std::max<bushd_delay>(bushd_table_fastest(&table_->view()), floor_);
+  const bushd_delay delay =
+      std::max<bushd_delay>(bushd_table_fastest(&table_->view()), shortest_delay_);
   const double run = 1e9 / (static_cast<double>(delay) * table_->view().time_unit_ns);
   return run * increment(motor) / longest_;
 }
 
 std::int64_t Way::position_at(std::size_t motor, std::uint32_t step) const {
-  const auto& [table, from, to, floor] = motors_[motor];
+  const auto& [table, from, to, shortest_delay] = motors_[motor];
   if (longest_ == 0) return from;
   bushd_line line;
   bushd_line_start(&line, increment(motor), longest_);
@@ -68,22 +71,22 @@ LineShare Way::share(std::size_t motor, std::uint32_t from, std::uint32_t to) co
           .to = to};
 }
 
-void Way::set_floors(std::span<const bushd_delay> floors) {
-  for (std::size_t i = 0; i < motors_.size(); ++i) motors_[i].floor = floors[i];
-  floor_ = table_->floor_of(parts(), longest_);
+void Way::set_shortest_delays(std::span<const bushd_delay> shortest_delays) {
+  for (std::size_t i = 0; i < motors_.size(); ++i) motors_[i].shortest_delay = shortest_delays[i];
+  shortest_delay_ = table_->shortest_delay_of(parts(), longest_);
 }
 
-// With a floor that this table's units would need more than 16 bits for they are longer.
+// With a shortest delay that this table's units would need more than 16 bits for they are longer.
 void Way::make_slower(double duration_ns) {
   const double delay_ns = duration_ns / longest_;
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     if (increment(i) != longest_) continue;
-    motors_[i].floor =
+    motors_[i].shortest_delay =
         static_cast<bushd_delay>(std::ceil(delay_ns / motors_[i].table->time_unit_ns));
     break;
   }
   table_ = std::make_shared<const tables::Envelope>(parts(), longest_);
-  floor_ = table_->floor();
+  shortest_delay_ = table_->shortest_delay();
 }
 
 Result<void> Way::take(double duration_s, double longest_ns) {
@@ -109,8 +112,8 @@ Result<void> Way::take(double duration_s, double longest_ns) {
     make_slower(wanted_ns);
     return {};
   }
-  // The least floor by which it is so long: the longer the floor, the longer the line.
-  bushd_delay low = floor_;
+  // The least value by which it is so long: the longer the shortest delay, the longer the line.
+  bushd_delay low = shortest_delay_;
   bushd_delay high = UINT16_MAX;
   while (low < high) {
     const bushd_delay middle = low + (high - low) / 2;
@@ -120,7 +123,7 @@ Result<void> Way::take(double duration_s, double longest_ns) {
       low = middle + 1;
     }
   }
-  floor_ = low;
+  shortest_delay_ = low;
   return {};
 }
 

@@ -21,7 +21,7 @@ class Way {
     const bushd_table* table;  // outlives the way
     std::int64_t from;
     std::int64_t to;  // |to - from| < 2^31
-    bushd_delay floor;
+    bushd_delay shortest_delay;
   };
   Way() = default;
   // At least one motor.
@@ -34,25 +34,25 @@ class Way {
   std::uint32_t increment(std::size_t motor) const;
   // In steps of the motor with most of them; 0: none moves, and all else says nothing.
   std::uint32_t longest() const { return longest_; }
-  bushd_delay floor() const { return floor_; }  // of its runs
+  bushd_delay shortest_delay() const { return shortest_delay_; }  // of its runs
   const std::shared_ptr<const tables::Envelope>& table() const { return table_; }
   // By whose table it takes so long.
   std::size_t limiting() const { return limiting_; }
-  double duration_ns() const { return duration_ns(floor_); }
+  double duration_ns() const { return duration_ns(shortest_delay_); }
   double most_steps_per_s(std::size_t motor) const;
   // Where a motor is when the way's run has made so many steps of it.
   std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
   // A motor's share of a run between these steps of the way.
   LineShare share(std::size_t motor, std::uint32_t from, std::uint32_t to) const;
 
-  // Other floors of the motors.
-  void set_floors(std::span<const bushd_delay> floors);
+  // Other shortest delays of the motors.
+  void set_shortest_delays(std::span<const bushd_delay> shortest_delays);
   // Takes at least this long, and not much longer. Errors: more or less than what is possible.
   Result<void> take(double duration_s, double longest_ns);
 
  private:
   std::vector<tables::LinePart> parts() const;
-  double duration_ns(bushd_delay floor) const;
+  double duration_ns(bushd_delay shortest_delay) const;
   void make_slower(double duration_ns);
 
   std::vector<Motor> motors_;
@@ -60,7 +60,7 @@ class Way {
   std::uint32_t longest_ = 0;
   std::shared_ptr<const tables::Envelope> table_;
   std::shared_ptr<RunBlocks> blocks_ = std::make_shared<RunBlocks>();
-  bushd_delay floor_ = 0;
+  bushd_delay shortest_delay_ = 0;
   std::size_t limiting_ = 0;
 };
 

@@ -30,7 +30,7 @@ class Scale {
 };
 
 bushd_delay least_delay(const LinePart& part) {
-  return std::max<bushd_delay>(part.table->cruise, part.floor);
+  return std::max<bushd_delay>(part.table->cruise, part.shortest_delay);
 }
 
 bushd_delay slowest_code(const LinePart& part) {
@@ -135,18 +135,20 @@ Envelope::Envelope(std::span<const LinePart> parts, std::uint32_t longest) {
     return static_cast<std::uint16_t>(most);
   };
   view_.cruise = greatest([](const LinePart& part) { return part.table->cruise; });
-  floor_ = floor_of(parts, longest);
+  shortest_delay_ = shortest_delay_of(parts, longest);
   accel_.code = side_of(parts, scale, longest, false, view_.cruise);
   decel_.code = side_of(parts, scale, longest, true, view_.cruise);
   view_.accel = accel_.index();
   view_.decel = decel_.code == accel_.code ? view_.accel : decel_.index();  // the same codes
 }
 
-bushd_delay Envelope::floor_of(std::span<const LinePart> parts, std::uint32_t longest) const {
+bushd_delay Envelope::shortest_delay_of(std::span<const LinePart> parts,
+                                        std::uint32_t longest) const {
   const Scale scale(longest, view_.time_unit_ns);
-  std::uint64_t floor = 0;
-  for (const LinePart& part : parts) floor = std::max(floor, scale.delay(part, part.floor));
-  return floor;
+  std::uint64_t shortest_delay = 0;
+  for (const LinePart& part : parts)
+    shortest_delay = std::max(shortest_delay, scale.delay(part, part.shortest_delay));
+  return shortest_delay;
 }
 
 std::size_t limiting_part(std::span<const LinePart> parts, std::uint32_t longest) {
@@ -156,8 +158,9 @@ std::size_t limiting_part(std::span<const LinePart> parts, std::uint32_t longest
     if (parts[i].increment == 0) continue;
     const Envelope alone(parts.subspan(i, 1), longest);
     bushd_table table = alone.view();
-    // The same run (engine/run.h); of its own parts a floor has 16 bits.
-    table.cruise = static_cast<std::uint16_t>(std::max<bushd_delay>(table.cruise, alone.floor()));
+    // The same run (engine/run.h); of its own parts a shortest delay has 16 bits.
+    table.cruise =
+        static_cast<std::uint16_t>(std::max<bushd_delay>(table.cruise, alone.shortest_delay()));
     const std::uint64_t time_ns = move_time(table, longest).time_ns;
     if (time_ns <= longest_ns) continue;
     longest_ns = time_ns;

@@ -5,10 +5,10 @@
 //     D(k) = max r(i) D_i(k) where r(i) = 1, else r(i) D_i( max(0, floor(r(i) k) - 1) )
 //     c    = max r(i) c_i
 //
-// and the floor of the run likewise. A run by it leaves no two steps of a motor closer together
-// than the motor's own table does, whenever the run is made to ramp down, unless that shortens a
-// run that ramps down already. So a slow start or a low top speed of one motor costs only where it
-// acts. Of motors with one table and equal ways it is that table.
+// and the shortest delay of the run = max r(i) (that of motor i). A run by it leaves no two steps
+// of a motor closer together than the motor's own table does, whenever the run is made to ramp
+// down, unless that shortens a run that ramps down already. So a slow start or a low top speed of
+// one motor costs only where it acts. Of motors with one table and equal ways it is that table.
 #pragma once
 
 #include <cstddef>
@@ -21,9 +21,9 @@
 namespace bushd::tables {
 
 struct LinePart {
-  const bushd_table* table;  // passed bushd_table_check
-  std::uint32_t increment;   // |N|
-  bushd_delay floor = 0;     // none of its steps has a shorter delay; 0: none
+  const bushd_table* table;        // passed bushd_table_check
+  std::uint32_t increment;         // |N|
+  bushd_delay shortest_delay = 0;  // none of its steps has a shorter delay; 0: none
 };
 
 // Not copied: view() points into it.
@@ -38,11 +38,11 @@ class Envelope {
   static constexpr std::size_t kMostCodes = 32767;  // of a side
 
   // Passed bushd_table_check, and both sides are indexed. Its time unit is the shortest of the
-  // motors', or a longer one if the slowest delay, or floor, would not fit 16 bits.
+  // motors', or a longer one if the slowest delay, or shortest delay, would not fit 16 bits.
   const bushd_table& view() const { return view_; }
-  bushd_delay floor() const { return floor_; }
-  // With other floors of its motors, which may have more bits.
-  bushd_delay floor_of(std::span<const LinePart> parts, std::uint32_t longest) const;
+  bushd_delay shortest_delay() const { return shortest_delay_; }
+  // With other shortest delays of its motors, which may have more bits.
+  bushd_delay shortest_delay_of(std::span<const LinePart> parts, std::uint32_t longest) const;
 
  private:
   struct Side {
@@ -54,7 +54,7 @@ class Envelope {
 
   Side accel_;
   Side decel_;
-  bushd_delay floor_ = 0;
+  bushd_delay shortest_delay_ = 0;
   bushd_table view_{};
 };
 

@@ -28,8 +28,8 @@ class LineScript : public Script, public testing::WithParamInterface<Target> {
     }
   }
 
-  void begin_line(std::uint32_t from = 0, std::uint16_t floor = 0) {
-    begin({0, floor, kLongest, from, kLongest - from, 0, nullptr}, kEntries);
+  void begin_line(std::uint32_t from = 0, std::uint16_t shortest_delay = 0) {
+    begin({0, shortest_delay, kLongest, from, kLongest - from, 0, nullptr}, kEntries);
   }
   void begin(const bushd_line_part& line, const std::vector<bushd_line_entry>& entries) {
     tell_time();
@@ -163,11 +163,11 @@ TEST_P(LineScript, SilenceEndsItInTheSameTick) {
 
 // When the steps of a motor are due, counted from the run's beginning: by the codes of the table
 // and the statement of the protocol.
-std::vector<TimeNs> due_times(std::uint32_t increment, std::uint16_t floor) {
+std::vector<TimeNs> due_times(std::uint32_t increment, std::uint16_t shortest_delay) {
   const std::vector<std::uint16_t> codes = ramp();
   std::vector<TimeNs> ends{0};  // of the run's steps
   for (std::size_t j = 1; j <= kLongest; ++j) {
-    std::uint16_t delay = std::max(kCruise, floor);
+    std::uint16_t delay = std::max(kCruise, shortest_delay);
     if (j <= codes.size()) delay = std::max(delay, codes[j - 1]);
     if (kLongest - j < codes.size()) delay = std::max(delay, codes[kLongest - j]);
     ends.push_back(ends.back() + TimeNs{delay} * kUnitNs);
@@ -189,10 +189,13 @@ TEST_P(LineScript, TriggeredEveryStepIsWithinASlotOfItsTime) {
   for (const bushd_format format : {BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE}) {
     ASSERT_NO_FATAL_FAILURE(make_ready(format, motors_));
     const auto number = static_cast<std::uint8_t>(format + 1);
-    const auto floor = static_cast<std::uint16_t>(format == BUSHD_FORMAT_FINE ? 0 : kCruise + 11);
+    const auto shortest_delay =
+        static_cast<std::uint16_t>(format == BUSHD_FORMAT_FINE ? 0 : kCruise + 11);
     const auto delay_us = static_cast<std::uint32_t>(50 + random() % 20'000);
-    const bushd_line_trigger message{
-        number, BUSHD_EDGE_RISING, delay_us, {0, floor, kLongest, 0, kLongest, 0, nullptr}};
+    const bushd_line_trigger message{number,
+                                     BUSHD_EDGE_RISING,
+                                     delay_us,
+                                     {0, shortest_delay, kLongest, 0, kLongest, 0, nullptr}};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(bushd_encode_line_trigger(
         &message, kEntries.data(), static_cast<std::uint8_t>(kEntries.size()), payload.data()));
@@ -208,7 +211,7 @@ TEST_P(LineScript, TriggeredEveryStepIsWithinASlotOfItsTime) {
     EXPECT_EQ(master_.poll(kReal).trigger_state, BUSHD_TRIGGER_STARTED);
     expect_the_same_reports();
     for (const bushd_line_entry& entry : kEntries) {
-      const std::vector<TimeNs> due = due_times(entry.increment, floor);
+      const std::vector<TimeNs> due = due_times(entry.increment, shortest_delay);
       for (const std::size_t mcu : {0, 1}) {
         SCOPED_TRACE("motor " + std::to_string(entry.motor) + (mcu == 0 ? " virtual" : " real"));
         std::vector<Step> made = steps(mcu, entry.motor);

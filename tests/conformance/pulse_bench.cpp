@@ -191,9 +191,9 @@ void PulseBench::take_report() {
   if (axis_.needs_change()) replan();
 }
 
-void PulseBench::begin(std::int64_t steps, std::uint16_t floor) {
+void PulseBench::begin(std::int64_t steps, std::uint16_t shortest_delay) {
   const link::Tick start = master_->earliest_start(now_us_, {0}, 0);
-  axis_.start(counted(), steps, start, 0, floor);
+  axis_.start(counted(), steps, start, 0, shortest_delay);
   master_->begin({0}, 0, start);
 }
 
@@ -210,8 +210,8 @@ void PulseBench::stop() {
   if (axis_.needs_change()) replan();
 }
 
-void PulseBench::aim(std::int64_t target, std::uint16_t floor) {
-  axis_.aim(target, floor);
+void PulseBench::aim(std::int64_t target, std::uint16_t shortest_delay) {
+  axis_.aim(target, shortest_delay);
   if (axis_.needs_change()) replan();
 }
 
@@ -233,7 +233,7 @@ bushd_homing PulseBench::home(int direction, double limit_s) {
   master_->home({0}, {.motor = 0,
                       .direction = static_cast<std::int8_t>(direction),
                       .most_steps = 3000,
-                      .floor = 0,
+                      .shortest_delay = 0,
                       .slow_steps = 200,
                       .slow_delay = 1000,
                       .position_steps = 0});
@@ -278,7 +278,7 @@ std::size_t PulseBench::most_left_out(std::size_t to_go) const {
   return most;
 }
 
-void PulseBench::expect_run(std::size_t from, std::int64_t floor, bool stopped) {
+void PulseBench::expect_run(std::size_t from, std::int64_t shortest_delay, bool stopped) {
   const auto& times = drive_.step_times_ns();
   const std::size_t steps = times.size() - from;
   const auto side = [](const std::vector<std::uint16_t>& codes, std::size_t i) {
@@ -287,7 +287,7 @@ void PulseBench::expect_run(std::size_t from, std::int64_t floor, bool stopped) 
   for (std::size_t j = 2; j <= steps; ++j) {
     const std::size_t to_go = steps - j + (stopped ? most_left_out(steps - j) : 0);
     const std::int64_t least =
-        std::max({side(accel_, j - 1), side(decel_, to_go), kCruise, floor}) * kUnitNs;
+        std::max({side(accel_, j - 1), side(decel_, to_go), kCruise, shortest_delay}) * kUnitNs;
     ASSERT_GE(times[from + j - 1] - times[from + j - 2] + 1, least)
         << "before step " << j << " of " << steps;
   }

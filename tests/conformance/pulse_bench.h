@@ -42,13 +42,13 @@ class PulseBench : private link::TickSource, private sim::EdgeSink {
   void run_for(double seconds);
   void pause(double seconds);  // nobody runs the controller; the drive goes on
   // Moves by so many steps; the caller runs on.
-  void begin(std::int64_t steps, std::uint16_t floor = 0);
+  void begin(std::int64_t steps, std::uint16_t shortest_delay = 0);
   void stop();
-  void aim(std::int64_t target, std::uint16_t floor = 0);
+  void aim(std::int64_t target, std::uint16_t shortest_delay = 0);
   // Until it stands, and has said so.
   void finish(double limit_s = 60);
-  void move(std::int64_t steps, std::uint16_t floor = 0) {
-    begin(steps, floor);
+  void move(std::int64_t steps, std::uint16_t shortest_delay = 0) {
+    begin(steps, shortest_delay);
     finish();
   }
   bushd_homing home(int direction, double limit_s = 200);
@@ -75,8 +75,8 @@ class PulseBench : private link::TickSource, private sim::EdgeSink {
   }
 
   // All steps from the `from`th on are one run: none before A(j-1), D(N-j) and the cruise delay, or
-  // `floor`, after the one before. Times are whole ns: exact to one.
-  void expect_run(std::size_t from, std::int64_t floor = 0, bool stopped = false);
+  // `shortest_delay`, after the one before. Times are whole ns: exact to one.
+  void expect_run(std::size_t from, std::int64_t shortest_delay = 0, bool stopped = false);
   void expect_count() { EXPECT_EQ(counted(), drive_.position_steps() - origin_); }
   // The most steps that may be under way at full speed: 20 ms of bytes, which is 50, and one more
   // byte.

@@ -60,13 +60,13 @@ TEST_P(Port, NoStepIsEarlierThanItsTable) {
 }
 
 // Below the table's slowest delay, between, and none.
-TEST_P(Port, RunsKeepToTheirFloors) {
+TEST_P(Port, RunsKeepToTheirSpeedLimits) {
   PulseBench bench(GetParam());
-  for (const std::uint16_t floor : std::initializer_list<std::uint16_t>{700, 17, 0}) {
+  for (const std::uint16_t shortest_delay : std::initializer_list<std::uint16_t>{700, 17, 0}) {
     const std::size_t made = bench.drive().steps();
-    bench.move(120, floor);
+    bench.move(120, shortest_delay);
     ASSERT_EQ(bench.drive().steps() - made, 120u);
-    ASSERT_NO_FATAL_FAILURE(bench.expect_run(made, floor));
+    ASSERT_NO_FATAL_FAILURE(bench.expect_run(made, shortest_delay));
   }
 }
 
@@ -181,7 +181,7 @@ TEST_P(Port, HomingIsGivenUpOnRequest) {
   bench.master().home({0}, {.motor = 0,
                             .direction = -1,
                             .most_steps = 3000,
-                            .floor = 0,
+                            .shortest_delay = 0,
                             .slow_steps = 200,
                             .slow_delay = 1000,
                             .position_steps = 0});

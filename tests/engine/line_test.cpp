@@ -13,20 +13,20 @@ namespace {
 // Exact, from the definition: numbers over a common denominator in 128 bits.
 __extension__ typedef __int128 Wide;
 
-Wide floor_of(Wide numerator, Wide denominator) {
+Wide shortest_delay_of(Wide numerator, Wide denominator) {
   const Wide quotient = numerator / denominator;
   return numerator % denominator < 0 ? quotient - 1 : quotient;
 }
 
 // floor( r (s - 1/2) + 1/2 ) for s = x / 256, which is a step of the run and a part of the next.
 Wide made_at(Wide increment, Wide longest, Wide x) {
-  return floor_of(increment * (x - 128) + 128 * longest, 256 * longest);
+  return shortest_delay_of(increment * (x - 128) + 128 * longest, 256 * longest);
 }
 
 // The position in 1/256 step: half a step of the run is the least that is told apart.
 Wide position_at(Wide increment, Wide longest, Wide x) {
-  const Wide ruled = floor_of(increment * (x - 128) + 128 * longest, longest);
-  return std::min(ruled, floor_of(2 * increment * x, longest));
+  const Wide ruled = shortest_delay_of(increment * (x - 128) + 128 * longest, longest);
+  return std::min(ruled, shortest_delay_of(2 * increment * x, longest));
 }
 
 TEST(Line, EveryStepIsWhereTheRulePutsIt) {

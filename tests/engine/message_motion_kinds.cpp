@@ -136,12 +136,13 @@ Bytes any_table_run() {
   Bytes payload = random_bytes(BUSHD_TABLE_RUN_HEADER);
   for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((mask >> m & 1) == 0) continue;
-    const bool has_floor = between(0, 2) != 0;
-    const bool is_long = has_floor && between(0, 1) != 0;
-    Bytes entry(is_long ? 13 : has_floor ? 7 : 5);
+    const bool has_shortest_delay = between(0, 2) != 0;
+    const bool is_long = has_shortest_delay && between(0, 1) != 0;
+    Bytes entry(is_long ? 13 : has_shortest_delay ? 7 : 5);
     entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 15) << 4);
-    bushd_put_u32(&entry[1], between<uint32_t>(1, INT32_MAX) | (has_floor ? 0x80000000u : 0u));
-    if (has_floor && !is_long) bushd_put_u16(&entry[5], between<uint16_t>(1, 65535));
+    bushd_put_u32(&entry[1],
+                  between<uint32_t>(1, INT32_MAX) | (has_shortest_delay ? 0x80000000u : 0u));
+    if (has_shortest_delay && !is_long) bushd_put_u16(&entry[5], between<uint16_t>(1, 65535));
     if (is_long) bushd_put_u16(&entry[7], between<uint16_t>(0, 65535));
     if (is_long) bushd_put_u32(&entry[9], between<uint32_t>(1, UINT32_MAX));
     payload.insert(payload.end(), entry.begin(), entry.end());
@@ -318,8 +319,10 @@ Kinds motion_kinds() {
        {any_table_run,
         table_run_again,
         {{"no step", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0})},
-         {"no step, with a floor", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0x80, 9, 0})},
-         {"a floor of no time", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 5, 0, 0, 0x80, 0, 0})},
+         {"no step, with a shortest delay",
+          entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0x80, 9, 0})},
+         {"a shortest delay of no time",
+          entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 5, 0, 0, 0x80, 0, 0})},
          {"no entry", [](Bytes* p) { p->resize(BUSHD_TABLE_RUN_HEADER); }},
          {"a motor twice",
           [](Bytes* p) {

@@ -104,7 +104,7 @@ void put(const bushd_motor_inputs& m, Fields& f) {
 }
 void put(const bushd_home& m, Fields& f) {
   f.add("motor", m.motor).add("direction", m.direction).add("most_steps", m.most_steps);
-  f.add("floor", m.floor);
+  f.add("shortest_delay", m.shortest_delay);
   f.add("slow_steps", m.slow_steps).add("slow_delay", m.slow_delay);
   f.add("position_steps", m.position_steps);
 }
@@ -166,7 +166,7 @@ void put_entries(const uint8_t* entries, uint8_t count, Fields& f) {
   for (uint8_t i = 0; i < count; ++i) {
     const bushd_table_run_entry entry = bushd_next_table_run_entry(&entries);
     append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps,
-                         static_cast<int64_t>(entry.floor)}));
+                         static_cast<int64_t>(entry.shortest_delay)}));
   }
   f.add_text("entries", text);
 }
@@ -175,7 +175,7 @@ void put(const bushd_table_run& m, Fields& f) {
   put_entries(m.entries, m.count, f);
 }
 void put_line(const bushd_line_part& line, Fields& f) {
-  f.add("slot", line.slot).add("floor", line.floor).add("longest", line.longest);
+  f.add("slot", line.slot).add("shortest_delay", line.shortest_delay).add("longest", line.longest);
   f.add("from", line.from).add("steps", line.steps);
   std::string text;
   const uint8_t* at = line.entries;

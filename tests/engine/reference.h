@@ -3,8 +3,8 @@
 //
 //   delay before step j of N = max(A(j-1), D(N-j), c);  step j falls at the sum of the first j
 //   delays; position at time t = steps whose time is <= t, in the fine format plus the elapsed
-//   share of the running delay, rounded down to 1/256 step. A floor is one more term of the
-//   maximum.
+//   share of the running delay, rounded down to 1/256 step. The run's shortest delay is one more
+//   term of the maximum.
 //
 // Shares no code with lib/engine: sides are plain vectors, times are 128-bit counts of 1/256 ns.
 #pragma once
@@ -37,10 +37,10 @@ struct Step {
 
 class Reference {
  public:
-  static Reference move(const Law& law, size_t steps, uint64_t floor = 0) {
+  static Reference move(const Law& law, size_t steps, uint64_t shortest_delay = 0) {
     Reference r(law);
     for (size_t j = 1; j <= steps; ++j) {
-      Wide delay = std::max<Wide>(law.cruise, floor);
+      Wide delay = std::max<Wide>(law.cruise, shortest_delay);
       if (law.accel_at(j - 1) > delay) delay = law.accel_at(j - 1);
       if (law.decel_at(steps - j) > delay) delay = law.decel_at(steps - j);
       r.append(delay);
@@ -93,8 +93,8 @@ class Reference {
 
   // From `ns` on: the running step, then `after` more, the accelerating side taken up where its
   // delay stands. Returns false if it cannot come to rest within so few steps, or is at rest.
-  // The floor is approached along the decelerating side.
-  bool retarget_at(uint64_t ns, size_t after, uint64_t floor = 0) {
+  // The shortest delay is approached along the decelerating side.
+  bool retarget_at(uint64_t ns, size_t after, uint64_t shortest_delay = 0) {
     const size_t made = steps_at(ns);
     if (made == steps_.size()) return false;
     const Wide delay = steps_[made].delay / (Wide{law_.unit_ns} * 256);
@@ -106,7 +106,8 @@ class Reference {
     while (law_.accel_at(a) > delay) ++a;
     if (law_.accel_at(a) == delay) ++a;
     for (size_t j = 1; j <= after; ++j) {
-      const Wide least = j <= k ? std::min(Wide{floor}, law_.decel_at(k - j)) : Wide{floor};
+      const Wide least =
+          j <= k ? std::min(Wide{shortest_delay}, law_.decel_at(k - j)) : Wide{shortest_delay};
       append(
           std::max({law_.accel_at(a + j - 1), law_.decel_at(after - j), Wide{law_.cruise}, least}));
     }

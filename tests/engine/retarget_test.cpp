@@ -82,21 +82,21 @@ TEST(Retarget, ChangesAtAnyTickFollowTheDefinition) {
     const Law law = any_law();
     const TestTable table(law, *rc::gen::arbitrary<bool>());
     const auto steps = between<uint32_t>(1, 120);
-    const uint64_t first_floor = any_long_floor(law);
+    const uint64_t first_shortest_delay = any_long_shortest_delay(law);
     Flight flight{.run = {},
-                  .reference = Reference::move(law, steps, first_floor),
+                  .reference = Reference::move(law, steps, first_shortest_delay),
                   .tick_ns = any_tick_ns(law),
                   .fine = *rc::gen::arbitrary<bool>(),
                   .direction = *rc::gen::element(1, -1)};
-    bushd_run_start(&flight.run, table.view(), steps, flight.direction, first_floor);
+    bushd_run_start(&flight.run, table.view(), steps, flight.direction, first_shortest_delay);
     for (int changes = between(1, 4); changes > 0; --changes) {
       const uint64_t left = flight.reference.units_left_at(flight.now_ns()) * law.unit_ns;
       flight.fly(std::min<uint64_t>(between<uint64_t>(0, left / flight.tick_ns + 1), kMostTicks));
       const auto after = between<uint32_t>(0, between(0, 1) != 0 ? 10 : 150);
       const bushd_run before = flight.run;
-      const uint64_t floor = any_long_floor(law);
-      const bool taken = bushd_run_retarget(&flight.run, after, floor);
-      RC_ASSERT(taken == flight.reference.retarget_at(flight.now_ns(), after, floor));
+      const uint64_t shortest_delay = any_long_shortest_delay(law);
+      const bool taken = bushd_run_retarget(&flight.run, after, shortest_delay);
+      RC_ASSERT(taken == flight.reference.retarget_at(flight.now_ns(), after, shortest_delay));
       if (!taken) {
         RC_ASSERT(bushd_run_delay(&flight.run) == bushd_run_delay(&before));
         RC_ASSERT(bushd_run_steps_left(&flight.run) == bushd_run_steps_left(&before));
@@ -171,7 +171,7 @@ TEST(Retarget, NearerEndsAsSoonAsTheTableAllowsAndNotBefore) {
   EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{10, 20, 30, 40, 50}));
 }
 
-TEST(Retarget, SlowsDownToAFloorAlongTheDeceleratingSideAndSpeedsUpFromItAgain) {
+TEST(Retarget, SlowsDownToASpeedLimitAlongTheDeceleratingSideAndSpeedsUpFromItAgain) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 1000, 500);
   ASSERT_EQ(bushd_run_delay(&run), 10);
@@ -183,7 +183,7 @@ TEST(Retarget, SlowsDownToAFloorAlongTheDeceleratingSideAndSpeedsUpFromItAgain) 
   EXPECT_EQ(delays_left(run), (std::vector<uint32_t>{35, 30, 20, 20, 30, 40, 50}));
 }
 
-TEST(Retarget, AFloorSlowerThanTheTablesSlowestDelayIsReachedByItsWholeSide) {
+TEST(Retarget, ASpeedLimitSlowerThanTheTablesSlowestDelayIsReachedByItsWholeSide) {
   const TestTable table(kRamp, true);
   bushd_run run = after_units(table, 1000, 500);
   ASSERT_TRUE(bushd_run_retarget(&run, 6, 60));

@@ -32,7 +32,7 @@ std::vector<uint16_t> delays_left(bushd_run run) {
 bushd_run any_run(const TestTable& table) {
   bushd_run run;
   const auto steps = between<uint32_t>(1, 120);
-  bushd_run_start(&run, table.view(), steps, 1, any_floor(table.law()));
+  bushd_run_start(&run, table.view(), steps, 1, any_shortest_delay(table.law()));
   const auto advance = [&run](uint32_t most) {
     for (auto n = between<uint32_t>(0, most); n > 0 && !bushd_run_done(&run); --n) {
       const uint64_t unit_ns = run.table->time_unit_ns;
@@ -43,7 +43,7 @@ bushd_run any_run(const TestTable& table) {
   };
   advance(steps - 1);
   if (between(0, 1) == 0) {
-    bushd_run_retarget(&run, between<uint32_t>(0, 200), any_floor(table.law()));
+    bushd_run_retarget(&run, between<uint32_t>(0, 200), any_shortest_delay(table.law()));
     advance(10);
   }
   return run;
@@ -99,8 +99,8 @@ TEST(RunPlan, RampsDownToTheEndOfTheTableFromWhereItStands) {
 TEST(RunPlan, IsSlowByItsShortestDelayAndTheTick) {
   const TestTable table({{300, 28}, {400, 29}, 27, 10'000}, false);
   const TestTable fast({{300, 28}, {400, 29}, 26, 10'000}, false);
-  const auto is_slow = [](const TestTable& of, uint16_t floor, uint32_t tick_ns) {
-    return bushd_run_is_slow(of.view(), floor, tick_ns, BUSHD_SLOW_LINE_DELAY_NS);
+  const auto is_slow = [](const TestTable& of, uint16_t shortest_delay, uint32_t tick_ns) {
+    return bushd_run_is_slow(of.view(), shortest_delay, tick_ns, BUSHD_SLOW_LINE_DELAY_NS);
   };
   EXPECT_TRUE(is_slow(table, 0, 2'400'000));
   EXPECT_FALSE(is_slow(table, 0, 2'399'999));

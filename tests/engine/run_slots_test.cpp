@@ -36,11 +36,11 @@ TEST(RunSlots, EveryStepFallsIntoItsSlotByTheSumOfTheDelays) {
     const auto steps = between<uint32_t>(1, 200);
     const int direction = between(0, 1) != 0 ? 1 : -1;
     const auto late_ns = between<uint32_t>(0, 2) == 0 ? between<uint32_t>(0, tick_ns - 1) : 0;
-    const uint64_t floor = any_long_floor(table.law());
-    auto reference = Reference::move(table.law(), steps, floor);
+    const uint64_t shortest_delay = any_long_shortest_delay(table.law());
+    auto reference = Reference::move(table.law(), steps, shortest_delay);
     reference.begin_late(late_ns);
     bushd_run run;
-    bushd_run_start(&run, table.view(), steps, direction, floor);
+    bushd_run_start(&run, table.view(), steps, direction, shortest_delay);
     bushd_run_begin_late(&run, late_ns);
     size_t made = 0;
     for (uint64_t tick = 0; tick < 3000 && !bushd_run_done(&run); ++tick) {
@@ -126,7 +126,7 @@ TEST(RunSlots, LeavesTheRunWhereAnExpandedTickLeavesIt) {
     const uint32_t tick_ns = any_tick_ns(table.law());
     bushd_run by_ticks;
     bushd_run_start(&by_ticks, table.view(), between<uint32_t>(1, 300), -1,
-                    any_long_floor(table.law()));
+                    any_long_shortest_delay(table.law()));
     bushd_run mixed = by_ticks;
     for (int tick = 0; tick < 400; ++tick) {
       if (tick == 50) {

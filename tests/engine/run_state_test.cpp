@@ -34,14 +34,14 @@ bushd_run any_run(const TestTable& table, Format format, uint32_t tick_ns) {
   const int direction = *rc::gen::element(1, -1);
   bushd_run_start(&run, table.view(),
                   *rc::gen::element<uint32_t>(between<uint32_t>(1, 300), INT32_MAX), direction,
-                  any_floor(table.law()));
+                  any_shortest_delay(table.law()));
   for (int again = between(0, 3); again >= 0; --again) {
     expand(&run, format, tick_ns, between<size_t>(0, 60));
     if (again == 0) break;
     if (between(0, 1) == 0) {
       bushd_run_ramp_down(&run);
     } else {
-      bushd_run_retarget(&run, between<uint32_t>(0, 300), any_floor(table.law()));
+      bushd_run_retarget(&run, between<uint32_t>(0, 300), any_shortest_delay(table.law()));
     }
   }
   return run;
@@ -102,7 +102,7 @@ TEST(RunState, FramesInARowMakeTheMove) {
     const Format format = *rc::gen::element(Format::kCoarse, Format::kFine);
     bushd_run run;
     bushd_run_start(&run, tables.host.view(), between<uint32_t>(1, 300), 1,
-                    any_floor(tables.host.law()));
+                    any_shortest_delay(tables.host.law()));
     uint64_t steps = 0;
     const uint32_t asked = bushd_run_steps_left(&run);
     for (int frames = 0; frames < 400 && !bushd_run_done(&run); ++frames) {
@@ -202,7 +202,7 @@ bushd_run_state hostile_state(const Law& law) {
   state.cruise_left =
       *rc::gen::element<uint32_t>(0, 0, 0, 1, 5, INT32_MAX, UINT32_MAX - 1, UINT32_MAX);
   state.decel_left = any_number_for(law.decel);
-  state.cruise = any_floor(law);
+  state.cruise = any_shortest_delay(law);
   return state;
 }
 

@@ -355,7 +355,8 @@ TEST(Run, TakesOverInTheMiddleOfAStep) {
   holds("taken over == definition", [] {
     const TestTable table(any_law(), *rc::gen::arbitrary<bool>());
     // A delay that a run of this table can have: not below cruise.
-    const uint64_t delay = std::max<uint64_t>(table.law().cruise, any_long_floor(table.law()));
+    const uint64_t delay =
+        std::max<uint64_t>(table.law().cruise, any_long_shortest_delay(table.law()));
     const auto fraction = *rc::gen::arbitrary<uint8_t>();
     const int direction = *rc::gen::element(1, -1);
     const uint32_t tick_ns = any_tick_ns(table.law());

@@ -76,7 +76,7 @@ inline Law any_law() {
 }
 
 // None, one of the table's delays, or another.
-inline uint16_t any_floor(const Law& law) {
+inline uint16_t any_shortest_delay(const Law& law) {
   switch (between(0, 4)) {
     case 0:
       return 0;
@@ -92,9 +92,9 @@ inline uint16_t any_floor(const Law& law) {
 }
 
 // That, or one beyond all codes, up to a step an hour.
-inline uint64_t any_long_floor(const Law& law) {
+inline uint64_t any_long_shortest_delay(const Law& law) {
   const uint64_t longest = BUSHD_LONGEST_DELAY_NS / law.unit_ns;
-  if (longest <= UINT16_MAX || between(0, 1) != 0) return any_floor(law);
+  if (longest <= UINT16_MAX || between(0, 1) != 0) return any_shortest_delay(law);
   const auto factor = *rc::gen::element<uint64_t>(1, 2, 100, 100'000, 100'000'000);
   return std::min(longest, (UINT16_MAX + between<uint64_t>(1, 70'000)) * factor);
 }

@@ -116,7 +116,7 @@ TEST(Vectors, Moves) {
       const size_t ticks = expected.size() / (row.at("format") == "fine" ? 2 : 1);
       bushd_run run;
       bushd_run_start(&run, table.view(), static_cast<uint32_t>(std::abs(steps)),
-                      steps < 0 ? -1 : 1, number<uint16_t>(row, "floor"));
+                      steps < 0 ? -1 : 1, number<uint16_t>(row, "shortest_delay"));
       std::vector<uint8_t> got;
       const std::string stop = row.at("ramp_down_at_tick");
       const size_t before = stop.empty() ? 0 : std::stoul(stop);
@@ -155,7 +155,7 @@ TEST(Vectors, RunStates) {
       const auto tick = number<size_t>(row, "tick");
       bushd_run run;
       bushd_run_start(&run, table.view(), static_cast<uint32_t>(std::abs(steps)),
-                      steps < 0 ? -1 : 1, number<uint16_t>(row, "floor"));
+                      steps < 0 ? -1 : 1, number<uint16_t>(row, "shortest_delay"));
       std::vector<uint8_t> before;
       const std::string stop = row.at("ramp_down_at_tick");
       const size_t stopped = stop.empty() ? tick : std::stoul(stop);

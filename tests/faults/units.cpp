@@ -203,7 +203,7 @@ std::int64_t Units::delay(std::size_t index, const Request& request) const {
                request.speed_in_steps ? kMicro : motors_[index].micro_per_step);
 }
 
-std::int64_t Units::floor_ns(std::size_t index, const Request& request) const {
+std::int64_t Units::shortest_delay_ns(std::size_t index, const Request& request) const {
   return delay(index, request) * unit_ns(index);
 }
 
@@ -212,7 +212,7 @@ bool Units::approach_is_slower(std::size_t index, const Request& request) const 
   return delay(index, motor.approach_micro, motor.micro_per_step) > delay(index, request);
 }
 
-std::int64_t Units::approach_floor_ns(std::size_t index, const Request& request) const {
+std::int64_t Units::approach_shortest_delay_ns(std::size_t index, const Request& request) const {
   const Motor& motor = motors_[index];
   return std::max(delay(index, motor.approach_micro, motor.micro_per_step), delay(index, request)) *
          unit_ns(index);

@@ -46,13 +46,13 @@ class Units {
   };
   std::optional<Limits> limits(std::size_t motor) const;
   // No delay of such a request is shorter, in nanoseconds.
-  std::int64_t floor_ns(std::size_t motor, const Request& request) const;
+  std::int64_t shortest_delay_ns(std::size_t motor, const Request& request) const;
 
   // Signed, in steps: where the last approach of a move comes from; 0: from either side.
   std::int64_t backlash_steps(std::size_t motor) const;
   // It is no faster than that, and slower than the move that was asked for.
   bool approach_is_slower(std::size_t motor, const Request& request) const;
-  std::int64_t approach_floor_ns(std::size_t motor, const Request& request) const;
+  std::int64_t approach_shortest_delay_ns(std::size_t motor, const Request& request) const;
 
   // What is wrong with the numbers for users, if something is.
   std::optional<std::string> check(std::size_t motor, const bushd::api::MotorState& state);

@@ -167,7 +167,7 @@ class Witness {
   struct JogOpen {
     TimeNs renewed_ns;
     std::int64_t keepalive_ms;
-    std::int64_t floor_ns;                     // of the fastest of its speeds
+    std::int64_t shortest_delay_ns;            // of the fastest of its speeds
     bool let_go = false;                       // by its client, which has not begun again
     std::optional<std::int64_t> ends_after{};  // steps, from here:
     std::int64_t ends_from = 0;
@@ -298,7 +298,7 @@ class Witness {
   }
   void module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& accepted, bool on_line);
   void module_ended(TimeNs now_ns, Motor& motor, const End& end, bool whole);
-  void check_program(TimeNs now_ns, const Motor& motor, TimeNs floor_ns);
+  void check_program(TimeNs now_ns, const Motor& motor, TimeNs shortest_delay_ns);
   bool is_of_module(const Motor& motor) const {
     return motor.move && std::get<1>(*motor.move) == Crates::kBushd2Client;
   }

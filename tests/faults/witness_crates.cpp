@@ -135,24 +135,24 @@ void Witness::module_ended(TimeNs now_ns, Motor& motor, const End& end, bool who
   const bool approach = units_.backlash_steps(of) != 0;
   const Request& request = asked_.at(*motor.move).request;
   if (reached && whole) {
-    check_program(now_ns, motor, approach ? units_.approach_floor_ns(of, request) : 0);
+    check_program(now_ns, motor, approach ? units_.approach_shortest_delay_ns(of, request) : 0);
   }
   crates_.motion_ended(reached);
   motor.move.reset();
 }
 
 // From its first step to its last it has taken the time of its codes, of which none is shorter than
-// the floor, rounded up to a code. Ticks are emitted up to 1/64 faster or slower while an MCU is
-// brought into step, each of the two steps is up to a tick off, and the last one may be late by one
-// more (sim/pace.h).
-void Witness::check_program(TimeNs now_ns, const Motor& motor, TimeNs floor_ns) {
+// the shortest delay, rounded up to a code. Ticks are emitted up to 1/64 faster or slower while an
+// MCU is brought into step, each of the two steps is up to a tick off, and the last one may be late
+// by one more (sim/pace.h).
+void Witness::check_program(TimeNs now_ns, const Motor& motor, TimeNs shortest_delay_ns) {
   if (!program_ || std::abs(program_->steps) < 2) return;
   const TimeNs tick_ns = config_.buses.front().tick_ns();
   TimeNs due_ns = 0;
   TimeNs rounding_ns = 0;
   for (const TimeNs delay_ns : program_->delays_ns) {
-    due_ns += std::max(delay_ns, floor_ns);
-    if (delay_ns < floor_ns) rounding_ns += program_->unit_ns;
+    due_ns += std::max(delay_ns, shortest_delay_ns);
+    if (delay_ns < shortest_delay_ns) rounding_ns += program_->unit_ns;
   }
   const TimeNs took_ns =
       plant_.last_step_ns(motor.mcu, motor.output) - plant_.first_step_ns(motor.mcu, motor.output);

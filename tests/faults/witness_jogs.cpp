@@ -153,18 +153,19 @@ void Witness::jog_accepted(TimeNs now_ns, const Key& key, Asked& asked) {
     return;
   }
   if (motor.held) violated(now_ns, motor.name + " is held, and jogs: " + text_of(request));
-  const std::int64_t floor_ns = units_.floor_ns(index_of(motor), request);
+  const std::int64_t shortest_delay_ns = units_.shortest_delay_ns(index_of(motor), request);
   if (own) {
     motor.stops = false;
     open->jog->let_go = false;
     open->jog->ends_after.reset();
     open->jog->renewed_ns = now_ns;
     open->jog->keepalive_ms = request.keepalive_ms;
-    open->jog->floor_ns = std::min(open->jog->floor_ns, floor_ns);
+    open->jog->shortest_delay_ns = std::min(open->jog->shortest_delay_ns, shortest_delay_ns);
     return keep_within(now_ns, motor);
   }
-  asked.jog =
-      JogOpen{.renewed_ns = now_ns, .keepalive_ms = request.keepalive_ms, .floor_ns = floor_ns};
+  asked.jog = JogOpen{.renewed_ns = now_ns,
+                      .keepalive_ms = request.keepalive_ms,
+                      .shortest_delay_ns = shortest_delay_ns};
   accepted_motion(now_ns, key, asked, 0);
 }
 
@@ -231,7 +232,8 @@ void Witness::check_jog_end(TimeNs now_ns, const Motor& motor, const Asked& aske
   }
   check_steps_after(now_ns, motor, asked, reason);
   const auto& from = asked.from.front();
-  const std::int64_t most = (now_ns - asked.since_ns) / std::max<std::int64_t>(jog.floor_ns, 1);
+  const std::int64_t most =
+      (now_ns - asked.since_ns) / std::max<std::int64_t>(jog.shortest_delay_ns, 1);
   if (from && std::abs(end.stands - *from) > most + most / 1000 + 1) {
     violated(now_ns, fmt::format("{} jogged {} steps, and {} are possible in that time", motor.name,
                                  std::abs(end.stands - *from), most));

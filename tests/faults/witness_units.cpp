@@ -133,18 +133,19 @@ void Witness::check_speed(TimeNs now_ns, const Motor& motor, const Asked& asked,
   const auto& legs = asked.legs[index];
   const bool last = !legs.empty() && asked.leg[index] + 1 == legs.size();
   const bool approach = last && asked.request.ask != Ask::kArm && units_.backlash_steps(of) != 0;
-  const std::int64_t floor_ns =
-      approach ? units_.approach_floor_ns(of, asked.request) : units_.floor_ns(of, asked.request);
-  if (floor_ns == 0 || asked.jog || !motor.run_from) return;
+  const std::int64_t shortest_delay_ns = approach
+                                             ? units_.approach_shortest_delay_ns(of, asked.request)
+                                             : units_.shortest_delay_ns(of, asked.request);
+  if (shortest_delay_ns == 0 || asked.jog || !motor.run_from) return;
   const std::int64_t steps = std::abs(plant_steps(motor) - *motor.run_from);
   // A tick, in which steps lie on a line; and crystals.
   const TimeNs least_ns =
-      (steps - 1) * (floor_ns - floor_ns / 1000) - 2 * config_.buses[0].tick_ns();
+      (steps - 1) * (shortest_delay_ns - shortest_delay_ns / 1000) - 2 * config_.buses[0].tick_ns();
   const TimeNs took_ns = now_ns - plant_.first_step_ns(motor.mcu, motor.output);
   if (took_ns >= least_ns) return;
   violated(now_ns,
            fmt::format("{} made {} steps in {} us, and one takes {} us at least: {}", motor.name,
-                       steps, took_ns / 1000, floor_ns / 1000, text_of(asked.request)));
+                       steps, took_ns / 1000, shortest_delay_ns / 1000, text_of(asked.request)));
 }
 
 void Witness::check_home_speed(TimeNs now_ns, const Asked& asked, std::size_t index) {
@@ -155,9 +156,9 @@ void Witness::check_home_speed(TimeNs now_ns, const Asked& asked, std::size_t in
   const Request at_speed{.client = {},
                          .ask = Ask::kHome,
                          .speed_micro = static_cast<std::int64_t>(*home->speed * 1e6)};
-  const std::int64_t floor_ns = units_.floor_ns(index_of(motor), at_speed);
+  const std::int64_t shortest_delay_ns = units_.shortest_delay_ns(index_of(motor), at_speed);
   const std::int64_t steps = std::abs(plant_steps(motor) - *from);
-  if (now_ns - asked.since_ns >= steps * (floor_ns - floor_ns / 1000)) return;
+  if (now_ns - asked.since_ns >= steps * (shortest_delay_ns - shortest_delay_ns / 1000)) return;
   violated(now_ns, fmt::format("{} made {} steps to its home, too fast", motor.name, steps));
 }
 

@@ -8,14 +8,15 @@ namespace {
 
 constexpr std::uint16_t kMotors = 0b0110;
 
-// Steps of a table run whose delays are `floor` at least, from rest.
-Law floored(const Law& law, std::uint32_t floor_ns) {
+// Steps of a table run whose delays are `shortest_delay` at least, from rest.
+Law limited(const Law& law, std::uint32_t shortest_delay_ns) {
   Law slower = law;
-  const auto floor = static_cast<std::uint16_t>((floor_ns + law.unit_ns - 1) / law.unit_ns);
+  const auto shortest_delay =
+      static_cast<std::uint16_t>((shortest_delay_ns + law.unit_ns - 1) / law.unit_ns);
   for (auto* codes : {&slower.accel, &slower.decel}) {
-    for (std::uint16_t& code : *codes) code = std::max(code, floor);
+    for (std::uint16_t& code : *codes) code = std::max(code, shortest_delay);
   }
-  slower.cruise = std::max(slower.cruise, floor);
+  slower.cruise = std::max(slower.cruise, shortest_delay);
   return slower;
 }
 
@@ -37,7 +38,7 @@ class Keypad : public Streams {
   // in the one after.
   void expect_steps(std::uint32_t delay_ns, int direction, std::size_t ticks) {
     std::vector<int> expected =
-        steps_by_tick(Reference::move(floored(law, delay_ns), 1000), Rig::kTickNs);
+        steps_by_tick(Reference::move(limited(law, delay_ns), 1000), Rig::kTickNs);
     expected.resize(ticks);
     for (int& n : expected) n *= direction;
     ASSERT_GE(rig.history(1).size(), ticks + 4);

@@ -15,11 +15,14 @@ const std::vector<LineMotor> kOnLine = {{0, 333}, {1, -118}, {2, 1}, {3, 332}};
 
 TEST_P(LineRun, EveryStepFallsIntoItsSlot) {
   std::array<std::int64_t, 4> at{};
-  for (const std::uint16_t floor : {std::uint16_t{0}, static_cast<std::uint16_t>(law.cruise + 3)}) {
-    const Frame line{
-        .first = rig.first_open() + 3, .motors = kOnLine, .longest = 333, .floor = floor};
+  for (const std::uint16_t shortest_delay :
+       {std::uint16_t{0}, static_cast<std::uint16_t>(law.cruise + 3)}) {
+    const Frame line{.first = rig.first_open() + 3,
+                     .motors = kOnLine,
+                     .longest = 333,
+                     .shortest_delay = shortest_delay};
     ASSERT_EQ(start(rig, line), BUSHD_OK);
-    expect_slots(rig, Reference::move(law, 333, floor), line);
+    expect_slots(rig, Reference::move(law, 333, shortest_delay), line);
     for (const LineMotor& motor : kOnLine) at[motor.number] += motor.steps;
   }
   for (std::size_t m = 0; m < 4; ++m) EXPECT_EQ(rig.poll().motor[m].position_steps, at[m]);
@@ -83,7 +86,7 @@ TEST_P(LineRun, RulesOfAStartHold) {
   EXPECT_EQ(start(rig, with([](Frame& f) { f.motors.push_back({4, 1}); })), BUSHD_E_FORMAT);
   EXPECT_EQ(start(rig, with([](Frame& f) {
                     f.longest = INT32_MAX;
-                    f.floor = UINT16_MAX;
+                    f.shortest_delay = UINT16_MAX;
                   })),
             BUSHD_E_CAPACITY)
       << "for ever";
@@ -117,10 +120,11 @@ TEST_P(LineRun, OfASlowMcuIsSlow) {
     const bool slow = disabled != 0;
     Rig other({.queue_ticks = 256, .disabled_capabilities = disabled});
     other.make_ready(fast, format);
-    Frame line{.first = other.first_open() + 3, .motors = kOnLine, .longest = 333, .floor = 269};
+    Frame line{
+        .first = other.first_open() + 3, .motors = kOnLine, .longest = 333, .shortest_delay = 269};
     ASSERT_EQ(start(other, line), slow ? BUSHD_E_CAPACITY : BUSHD_OK);
     if (!slow) continue;
-    line.floor = 270;
+    line.shortest_delay = 270;
     ASSERT_EQ(start(other, line), BUSHD_OK);
     expect_slots(other, Reference::move(fast, 333, 270), line);
   }

@@ -48,7 +48,7 @@ class OfLines : public Streams {
     std::uint32_t longest;
     std::uint32_t from = 0;
     std::uint32_t steps = 0;  // 0: all
-    std::uint16_t floor = 0;
+    std::uint16_t shortest_delay = 0;
     std::uint8_t slot = 0;
     std::uint8_t epoch = 0;
   };
@@ -62,7 +62,7 @@ class OfLines : public Streams {
     message.epoch = of.epoch;
     message.first_tick = of.first;
     message.line = {.slot = of.slot,
-                    .floor = of.floor,
+                    .shortest_delay = of.shortest_delay,
                     .longest = of.longest,
                     .from = of.from,
                     .steps = of.steps == 0 ? of.longest - of.from : of.steps,

@@ -47,7 +47,7 @@ TEST_P(LineTrigger, EveryStepFallsIntoItsSlotCountedFromTheEdge) {
     SCOPED_TRACE(i);
     Arming arming{.number = static_cast<std::uint8_t>(i + 1), .line = line()};
     arming.delay_us = i % 10 == 0 ? 1'650'000 - below(1000) : 50 + below(9000);
-    if (i % 3 == 1) arming.line.floor = static_cast<std::uint16_t>(law.cruise + 5);
+    if (i % 3 == 1) arming.line.shortest_delay = static_cast<std::uint16_t>(law.cruise + 5);
     ASSERT_EQ(arm(rig, arming), BUSHD_OK);
     EXPECT_EQ(rig.poll().armed, 0b1111);
     EXPECT_EQ(rig.poll().moving, 0) << "what waits is at rest";
@@ -64,7 +64,7 @@ TEST_P(LineTrigger, EveryStepFallsIntoItsSlotCountedFromTheEdge) {
     ASSERT_EQ(report.start_tick * kTick + report.start_ns, begin_ns);
     ASSERT_EQ(report.running, 0b1111);
     arming.line.first = report.start_tick;
-    const Reference run = Reference::move(law, 97, arming.line.floor);
+    const Reference run = Reference::move(law, 97, arming.line.shortest_delay);
     const auto end_ns = begin_ns + static_cast<std::int64_t>(run.step(96).end / 256);
     ASSERT_EQ(report.motor[2].known_until,
               static_cast<std::uint16_t>((end_ns + kTick - 1) / kTick));
@@ -137,7 +137,7 @@ TEST_P(LineTrigger, IsForMotorsAtRestWithTablesAndFreeWays) {
   EXPECT_EQ(arm_with([](Arming& a) { a.line.slot = 3; }), BUSHD_E_NO_TABLE);
   EXPECT_EQ(arm_with([](Arming& a) {
               a.line.longest = INT32_MAX;
-              a.line.floor = UINT16_MAX;
+              a.line.shortest_delay = UINT16_MAX;
             }),
             BUSHD_E_CAPACITY);
   ASSERT_EQ(rig.take(ones(kStart, rig.first_open(), 5, 0)), BUSHD_OK);

@@ -16,9 +16,10 @@ class TableRun : public Streams {
     return payload;
   }
   static bushd_status start(Rig& on, std::uint32_t first, std::uint32_t steps, int direction = 1,
-                            std::uint16_t floor = 0) {
-    return on.take(BUSHD_MSG_TABLE_RUN,
-                   run_frame(first, {{0, 0, static_cast<std::int8_t>(direction), steps, floor}}));
+                            std::uint16_t shortest_delay = 0) {
+    return on.take(
+        BUSHD_MSG_TABLE_RUN,
+        run_frame(first, {{0, 0, static_cast<std::int8_t>(direction), steps, shortest_delay}}));
   }
   // The steps of each tick of what motor 0 has done since the history was forgotten, from the tick
   // that was open then on.
@@ -36,11 +37,11 @@ INSTANTIATE_TEST_SUITE_P(Formats, TableRun, testing::Values(BUSHD_FORMAT_FINE, B
 
 TEST_P(TableRun, EveryStepFallsIntoTheSlotOfTheSumOfItsDelays) {
   const auto cruise = law.cruise;
-  for (const auto& [steps, floor] : std::vector<std::pair<std::uint32_t, std::uint16_t>>{
+  for (const auto& [steps, shortest_delay] : std::vector<std::pair<std::uint32_t, std::uint16_t>>{
            {1, 0}, {2, 0}, {23, 0}, {60, 0}, {333, 0}, {333, cruise + 3}, {60, 2 * cruise}}) {
-    const auto reference = Reference::move(law, steps, floor);
+    const auto reference = Reference::move(law, steps, shortest_delay);
     const std::uint32_t first = rig.first_open() + 3;
-    ASSERT_EQ(start(rig, first, steps, 1, floor), BUSHD_OK);
+    ASSERT_EQ(start(rig, first, steps, 1, shortest_delay), BUSHD_OK);
     while (rig.tick() != first) rig.pass();
     std::size_t made = 0;
     for (std::uint64_t tick = 0; rig.poll().moving != 0; ++tick, rig.pass()) {

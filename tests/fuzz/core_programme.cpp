@@ -73,7 +73,7 @@ void send_table_run(Programmed& mcu, Input& input) {
                   .slot = static_cast<std::uint8_t>(how % BUSHD_TABLE_SLOTS),
                   .direction = static_cast<std::int8_t>((how & 0x80) != 0 ? 1 : -1),
                   .steps = (how & 0x40) != 0 ? 0xFFFFu * input.u16() : input.u8(),
-                  .floor = (how & 0x20) != 0 ? input.u16() : std::uint16_t{0}};
+                  .shortest_delay = (how & 0x20) != 0 ? input.u16() : std::uint16_t{0}};
   }
   Payload payload;
   payload.size = bushd_encode_table_run(epoch, first, entries.data(), count, payload.bytes.data());

@@ -505,7 +505,7 @@ void home(Bus& bus, Input& input) {
   bus.master().home(mcu, {.motor = motor,
                           .direction = -1,
                           .most_steps = steps,
-                          .floor = 9,
+                          .shortest_delay = 9,
                           .slow_steps = 100,
                           .slow_delay = 1000,
                           .position_steps = 7});

@@ -24,17 +24,17 @@ struct Plan {
   std::int64_t from;
   std::uint32_t tick_ns;
   int direction;
-  std::uint16_t floor;
+  std::uint16_t shortest_delay;
   Reference steps;
 
   Plan(Law the_law, std::int64_t from_steps, std::int64_t by, std::uint32_t tick,
-       std::uint16_t the_floor = 0)
+       std::uint16_t the_shortest_delay = 0)
       : law(std::move(the_law)),
         from(from_steps),
         tick_ns(tick),
         direction(by < 0 ? -1 : 1),
-        floor(the_floor),
-        steps(Reference::move(law, static_cast<std::size_t>(std::abs(by)), floor)) {}
+        shortest_delay(the_shortest_delay),
+        steps(Reference::move(law, static_cast<std::size_t>(std::abs(by)), shortest_delay)) {}
 
   std::uint64_t ns(Tick tick) const { return static_cast<std::uint64_t>(tick) * tick_ns; }
   std::int64_t end_steps() const {
@@ -59,19 +59,20 @@ struct Plan {
   // Both at ticks counted from the start.
   void stop(Tick at) {
     if (at > 0) return steps.ramp_down_at(ns(at));
-    *this = Plan(law, from, 0, tick_ns, floor);
+    *this = Plan(law, from, 0, tick_ns, shortest_delay);
   }
-  void aim(Tick at, std::int64_t target, std::uint16_t to_floor = 0) {
+  void aim(Tick at, std::int64_t target, std::uint16_t to_shortest_delay = 0) {
     if (at <= 0) {
-      *this = Plan(law, from, target - from, tick_ns, to_floor);
+      *this = Plan(law, from, target - from, tick_ns, to_shortest_delay);
       return;
     }
     const auto next = from + direction * static_cast<std::int64_t>(steps.steps_at(ns(at)) + 1);
     const std::int64_t after = (target - next) * direction;
-    if (after < 0 || !steps.retarget_at(ns(at), static_cast<std::size_t>(after), to_floor)) {
+    if (after < 0 ||
+        !steps.retarget_at(ns(at), static_cast<std::size_t>(after), to_shortest_delay)) {
       return stop(at);
     }
-    floor = to_floor;
+    shortest_delay = to_shortest_delay;
   }
 };
 
@@ -178,11 +179,12 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
     const auto random_steps = [] { return between<std::int64_t>(-60, 60); };
     const std::int64_t by = random_steps();
     RC_PRE(by != 0);
-    const std::uint16_t first_floor = between(0, 1) != 0 ? test::any_floor(any.law()) : 0;
-    Plan plan(any.law(), 5, by, tick_ns, first_floor);
+    const std::uint16_t first_shortest_delay =
+        between(0, 1) != 0 ? test::any_shortest_delay(any.law()) : 0;
+    Plan plan(any.law(), 5, by, tick_ns, first_shortest_delay);
     RC_PRE(plan.end_tick() < 3000);
     Axis random(*any.view(), tick_ns, format);
-    random.start(5, by, 0, 0, first_floor);
+    random.start(5, by, 0, 0, first_shortest_delay);
     Tick now = -10;              // executed up to here
     std::optional<Plan> before;  // without the change that is not yet executed
     Tick change_at = 0;
@@ -191,7 +193,8 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
         if (between(0, 2) == 0) {
           random.stop();
         } else {
-          random.aim(5 + random_steps(), between(0, 1) != 0 ? test::any_floor(any.law()) : 0);
+          random.aim(5 + random_steps(),
+                     between(0, 1) != 0 ? test::any_shortest_delay(any.law()) : 0);
         }
       }
       const bool failed = before && now <= std::max<Tick>(change_at, 0) && between(0, 3) == 0;
@@ -200,14 +203,16 @@ TEST_P(AxisChange, AnySequenceOfChangesIsThatOfTheSimulation) {
         before.reset();
         const Tick at = now + between<Tick>(1, 12);
         Plan changed = plan;
-        random.stopping()
-            ? changed.stop(at)
-            : changed.aim(at, random.target_steps(), static_cast<std::uint16_t>(random.floor()));
+        random.stopping() ? changed.stop(at)
+                          : changed.aim(at, random.target_steps(),
+                                        static_cast<std::uint16_t>(random.shortest_delay()));
         const bool over = at >= std::max<Tick>(plan.end_tick(), 1);
-        const auto cruise = [&](std::uint16_t floor) { return std::max(any.law().cruise, floor); };
+        const auto cruise = [&](std::uint16_t shortest_delay) {
+          return std::max(any.law().cruise, shortest_delay);
+        };
         const bool faster_or_slower =
-            !random.stopping() &&
-            cruise(static_cast<std::uint16_t>(random.floor())) != cruise(plan.floor);
+            !random.stopping() && cruise(static_cast<std::uint16_t>(random.shortest_delay())) !=
+                                      cruise(plan.shortest_delay);
         const bool differs = !over && (changed.end_steps() != plan.end_steps() || faster_or_slower);
         RC_ASSERT(random.change(at) == differs);
         if (differs) {

@@ -14,8 +14,8 @@
 namespace bushd::motion {
 namespace {
 
-using test::any_floor;
 using test::any_law;
+using test::any_shortest_delay;
 using test::between;
 using test::Law;
 using test::Reference;
@@ -26,7 +26,7 @@ struct Line {
   std::vector<std::unique_ptr<TestTable>> tables;
   std::shared_ptr<const tables::Envelope> envelope;
   LineShare share;  // of the motor that is looked at
-  std::uint16_t floor = 0;
+  std::uint16_t shortest_delay = 0;
   std::uint32_t tick_ns = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
 
@@ -66,7 +66,7 @@ Line any_line() {
   line.tick_ns = static_cast<std::uint32_t>(std::min<std::uint64_t>(line.tick_ns, most));
   line.format = between(0, 1) == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
   if (between(0, 2) == 0) {
-    line.floor = between<std::uint16_t>(1, line.envelope->view().accel.code[0]);
+    line.shortest_delay = between<std::uint16_t>(1, line.envelope->view().accel.code[0]);
   }
   line.share = {.table = line.envelope,
                 .blocks = std::make_shared<RunBlocks>(),
@@ -107,10 +107,12 @@ std::int64_t signed_256(const Line& line, std::int16_t out) {
   return bushd_coarse_to_fine(static_cast<std::uint8_t>(out));
 }
 
-bool ramps_down(const Reference& reference, const Law& law, std::uint64_t ns, std::uint16_t floor) {
+bool ramps_down(const Reference& reference, const Law& law, std::uint64_t ns,
+                std::uint16_t shortest_delay) {
   const std::size_t made = reference.steps_at(ns);
   const std::size_t left = reference.steps() - made;
-  const Wide speeding_up = std::max<Wide>({law.accel_at(made), Wide{law.cruise}, Wide{floor}});
+  const Wide speeding_up =
+      std::max<Wide>({law.accel_at(made), Wide{law.cruise}, Wide{shortest_delay}});
   return law.decel_at(left - 1) > speeding_up;
 }
 
@@ -119,10 +121,10 @@ TEST(LineOfAnAxis, EveryTickIsWhereTheLineIs) {
     const Line line = any_line();
     const Law law = line.law();
     const std::uint32_t run_steps = line.share.to - line.share.from;
-    Reference run = Reference::move(law, run_steps, line.floor);
+    Reference run = Reference::move(law, run_steps, line.shortest_delay);
     Axis axis(line.own(), line.tick_ns, line.format);
     const Tick start = 100;
-    axis.start_line(1000, line.share, start, line.floor);
+    axis.start_line(1000, line.share, start, line.shortest_delay);
     const Tick whole = axis.over_tick();
     RC_ASSERT(whole >= axis.end_tick());
     std::optional<Tick> at;
@@ -130,7 +132,7 @@ TEST(LineOfAnAxis, EveryTickIsWhereTheLineIs) {
       at = between<Tick>(start + 1, whole - 1);
       const auto ns = static_cast<std::uint64_t>(*at - start) * line.tick_ns;
       axis.stop();
-      const bool already = ramps_down(run, law, ns, line.floor);
+      const bool already = ramps_down(run, law, ns, line.shortest_delay);
       const std::size_t steps_before = run.steps();
       if (already) {
         run.leave_out_slow(ns);
@@ -160,7 +162,7 @@ TEST(LineOfAnAxis, EveryTickIsWhereTheLineIs) {
         ++tick;
         const auto ns = static_cast<std::uint64_t>(std::max<Tick>(tick - start, 0)) * line.tick_ns;
         const bool changed = !at || tick > *at;
-        const Reference plain = Reference::move(law, run_steps, line.floor);
+        const Reference plain = Reference::move(law, run_steps, line.shortest_delay);
         const Reference& now = changed ? run : plain;
         const std::int64_t whole_rest = made_at(line.share, line.share.to);
         const std::int64_t position = now.position_at(ns);
@@ -186,7 +188,7 @@ TEST(LineOfAnAxis, TellsNoDelayThatItsTableDoesNotAllow) {
     const Line line = any_line();
     RC_PRE(line.share.increment > 0);
     Axis axis(line.own(), line.tick_ns, line.format);
-    axis.start_line(0, line.share, 0, line.floor);
+    axis.start_line(0, line.share, 0, line.shortest_delay);
     for (Tick tick = 0; tick < axis.end_tick();) {
       std::int16_t out = 0;
       const std::uint16_t delay = axis.render(tick++, 1, &out, 1);
@@ -200,11 +202,11 @@ TEST(LineOfAnAxis, TakesANearerEnd) {
   test::holds("it ends at the point of that step, if it can", [] {
     const Line line = any_line();
     Axis axis(line.own(), line.tick_ns, line.format);
-    axis.start_line(0, line.share, 0, line.floor);
+    axis.start_line(0, line.share, 0, line.shortest_delay);
     RC_PRE(axis.over_tick() > 1);
     const Tick at = between<Tick>(1, axis.over_tick() - 1);
     const auto step = between<std::uint32_t>(line.share.from, line.share.to);
-    axis.aim_on_line(step, line.floor);
+    axis.aim_on_line(step, line.shortest_delay);
     axis.change(at);
     RC_ASSERT(axis.line_target() == step);
     // It runs as far as its ramp needs otherwise.

@@ -18,16 +18,16 @@
 
 namespace bushd::test {
 
-// Rows of points of all motors, the first one where they stand; floors of the ways to the others.
-inline std::unique_ptr<motion::Path> path_through(const std::vector<motion::Path::Motor>& motors,
-                                                  const std::vector<std::int64_t>& points,
-                                                  motion::Path::Corners corners,
-                                                  const std::vector<bushd_delay>& floors = {}) {
+// Rows of points of all motors, the first one where they stand, and the shortest delays of the ways
+// to the others.
+inline std::unique_ptr<motion::Path> path_through(
+    const std::vector<motion::Path::Motor>& motors, const std::vector<std::int64_t>& points,
+    motion::Path::Corners corners, const std::vector<bushd_delay>& shortest_delays = {}) {
   const std::size_t width = motors.size();
   const std::span all(points);
   auto path = std::make_unique<motion::Path>(motors, all.first(width), corners);
   for (std::size_t at = width; at < all.size(); at += width) {
-    const std::span slower(floors);
+    const std::span slower(shortest_delays);
     path->add(all.subspan(at, width), slower.empty() ? slower : slower.subspan(at - width, width));
   }
   return path;
@@ -111,8 +111,8 @@ inline std::string too_close(const motion::Path& path, const std::vector<Ran>& r
       const OwnStep& a = steps[i - 1];
       const OwnStep& b = steps[i];
       made = b.begins ? 0 : made + 1;
-      auto least =
-          static_cast<std::uint32_t>(std::max<bushd_delay>(table.cruise, path.motors()[m].floor));
+      auto least = static_cast<std::uint32_t>(
+          std::max<bushd_delay>(table.cruise, path.motors()[m].shortest_delay));
       if (b.begins) {
         if (rests) least = std::max<std::uint32_t>(least, table.accel.code[0]);
       } else {

@@ -28,7 +28,7 @@ struct Planned {
 };
 
 Planned planned(const std::vector<Law>& laws, std::vector<std::int64_t> points,
-                Path::Corners corners, std::vector<bushd_delay> floors = {}) {
+                Path::Corners corners, std::vector<bushd_delay> shortest_delays = {}) {
   Planned made;
   std::vector<Path::Motor> motors;
   for (const Law& law : laws) {
@@ -36,7 +36,7 @@ Planned planned(const std::vector<Law>& laws, std::vector<std::int64_t> points,
     motors.push_back({made.tables.back()->view()});
   }
   made.points = points;
-  made.path = test::path_through(motors, points, corners, floors);
+  made.path = test::path_through(motors, points, corners, shortest_delays);
   while (!made.path->plan(7)) {
   }
   return made;

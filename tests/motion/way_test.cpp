@@ -102,15 +102,15 @@ TEST_F(WayTest, TakesLongerThan16BitsOfItsUnitsTell) {
     ASSERT_TRUE(way.take(asked_s, 1e16));
     EXPECT_GE(way.duration_ns(), asked_s * 1e9);
     EXPECT_LT(way.duration_ns(), asked_s * 1e9 * (1 + 2.0 / UINT16_MAX));
-    EXPECT_TRUE(bushd_delay_is_code(way.floor()));
+    EXPECT_TRUE(bushd_delay_is_code(way.shortest_delay()));
   }
 }
 
-TEST_F(WayTest, TakesOtherFloors) {
+TEST_F(WayTest, TakesOtherSpeedLimits) {
   Way way({{quick_.view(), 0, 1000, 0}, {quick_.view(), 0, 100, 0}});
-  way.set_floors(std::vector<bushd_delay>{0, 4000});
-  EXPECT_EQ(way.floor(), 400U);
-  EXPECT_EQ(way.motors()[1].floor, 4000U);
+  way.set_shortest_delays(std::vector<bushd_delay>{0, 4000});
+  EXPECT_EQ(way.shortest_delay(), 400U);
+  EXPECT_EQ(way.motors()[1].shortest_delay, 4000U);
   EXPECT_EQ(way.most_steps_per_s(1), 250.0);
 }
 

@@ -135,36 +135,36 @@ class Motor:
         verdicts = {min(low, at) <= target <= max(high, at) for at in (nearest_steps, farthest_steps)}
         return verdicts.pop() if len(verdicts) == 1 else None
 
-    def floor(self, speed: Optional[Fraction], in_steps: bool) -> int:
+    def shortest_delay(self, speed: Optional[Fraction], in_steps: bool) -> int:
         """Of all delays of a move, in time units."""
-        floors = [0]
+        shortest_delays = [0]
         for value, scale in ((self.max_speed, self.steps_per_unit), (speed, 1 if in_steps else self.steps_per_unit)):
             if value is None:
                 continue
             if value * scale * LONGEST_DELAY_S < 1:
                 raise Refused("an hour a step")
-            floors.append(above(Fraction(10**9) / (value * scale * self.time_unit_ns)))
-        return max(floors)
+            shortest_delays.append(above(Fraction(10**9) / (value * scale * self.time_unit_ns)))
+        return max(shortest_delays)
 
     def backlash_steps(self) -> int:
         steps = nearest(self.backlash * self.steps_per_unit)
         return -steps if self.negative else steps
 
-    def approach_floor(self, floor: int) -> int:
+    def approach_shortest_delay(self, shortest_delay: int) -> int:
         if self.backlash_speed is None:
-            return floor
-        return max(floor, above(Fraction(10**9) / (self.backlash_speed * self.steps_per_unit * self.time_unit_ns)))
+            return shortest_delay
+        return max(shortest_delay, above(Fraction(10**9) / (self.backlash_speed * self.steps_per_unit * self.time_unit_ns)))
 
-    def legs(self, at: Optional[int], target: int, floor: int) -> list:
-        """Where each leg of a move ends, and its floor; `at`: None if it moves, so that its direction says nothing."""
+    def legs(self, at: Optional[int], target: int, shortest_delay: int) -> list:
+        """Where each leg of a move ends, and its shortest delay; `at`: None if it moves, so that its direction says nothing."""
         backlash = self.backlash_steps()
         if backlash == 0 or at == target:
-            return [(target, floor)]
-        slow = self.approach_floor(floor)
+            return [(target, shortest_delay)]
+        slow = self.approach_shortest_delay(shortest_delay)
         from_that_side = at is not None and (target > at) == (backlash > 0)
-        if from_that_side and (slow == floor or abs(target - at) <= abs(backlash)):
+        if from_that_side and (slow == shortest_delay or abs(target - at) <= abs(backlash)):
             return [(target, slow)]
-        return [(target - backlash, floor), (target, slow)]
+        return [(target - backlash, shortest_delay), (target, slow)]
 
     def direction(self, speed: Fraction, in_steps: bool) -> int:
         """In steps, of a jog."""
@@ -183,7 +183,7 @@ class Motor:
     def jog(self, speed: Fraction, in_steps: bool) -> int:
         """From rest: its direction."""
         self.must_be_free()
-        self.floor(abs(speed), in_steps)
+        self.shortest_delay(abs(speed), in_steps)
         direction = self.direction(speed, in_steps)
         self.farthest(direction)
         if self.trust == "uncertain":

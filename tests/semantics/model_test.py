@@ -41,11 +41,11 @@ class Arithmetic(unittest.TestCase):
 
     def test_speeds(self):
         motor = Motor("m", unit=True, steps_per_unit=Fraction(400), time_unit_ns=40000)
-        self.assertEqual(motor.floor(Fraction(1), False), 63)  # 62.5, never faster
-        self.assertEqual(motor.floor(Fraction(400), True), 63)
-        self.assertEqual(motor.floor(Fraction("0.0000625"), False), 10**6)  # 40 s a step
+        self.assertEqual(motor.shortest_delay(Fraction(1), False), 63)  # 62.5, never faster
+        self.assertEqual(motor.shortest_delay(Fraction(400), True), 63)
+        self.assertEqual(motor.shortest_delay(Fraction("0.0000625"), False), 10**6)  # 40 s a step
         with self.assertRaises(Refused):
-            motor.floor(Fraction("0.0000006"), False)
+            motor.shortest_delay(Fraction("0.0000006"), False)
 
     def test_legs(self):
         motor = Motor("m", unit=True, steps_per_unit=Fraction(400), time_unit_ns=40000, backlash=Fraction("0.1"))

@@ -122,17 +122,17 @@ class Sequence(InMotion):
         amounts = {m.name: self.amount(m, absolute, bases[m.name][0]) for m in motors}
         request = {"to": absolute, "motors": [{"name": m.name, **amounts[m.name].as_json()} for m in motors], **speed}
         targets = {}
-        floors = {}
+        shortest_delays = {}
         refused = None
         for motor in motors:
             base, (first, last) = bases[motor.name]
             try:
                 written = Fraction(repr(speed["speed"])) if speed else None
-                floors[motor.name] = motor.floor(written, speed.get("speed_in_steps", False))
+                shortest_delays[motor.name] = motor.shortest_delay(written, speed.get("speed_in_steps", False))
                 found = motor.targets(absolute, amounts[motor.name], base)
                 self._must_be_within(motor, found, first, last, "is beyond the soft limit")
                 at = first if first == last else None
-                starts = {legs[0][0] for legs in (motor.legs(at, target, floors[motor.name]) for target in found)
+                starts = {legs[0][0] for legs in (motor.legs(at, target, shortest_delays[motor.name]) for target in found)
                           if len(legs) > 1}
                 self._must_be_within(motor, starts, first, last, "the start of its last approach, for backlash")
                 targets[motor.name] = found
@@ -140,7 +140,7 @@ class Sequence(InMotion):
                 return None
             except Refused as why:
                 refused = refused or str(why)
-        return request, targets, floors, refused
+        return request, targets, shortest_delays, refused
 
     @staticmethod
     def _must_be_within(motor, targets, first, last, refused):
@@ -173,12 +173,12 @@ class Sequence(InMotion):
         made = self.make_move(motors, self.at_rest(motors))
         if made is None:
             return None
-        request, targets, floors, refused = made
+        request, targets, shortest_delays, refused = made
         began_us = self.state["now_us"]
         answer = self.ask("move", refused, **request)
         if refused is not None:
             return None
-        return motors, targets, floors, answer["number"], began_us
+        return motors, targets, shortest_delays, answer["number"], began_us
 
     def take_target(self, motor, among, at):
         expect(at in among, f"{motor.name} went to {at}, not to {sorted(among)}")
@@ -189,7 +189,7 @@ class Sequence(InMotion):
         begun = self.begin()
         if begun is None:
             return
-        motors, targets, floors, number, began_us = begun
+        motors, targets, shortest_delays, number, began_us = begun
         end = self.driver.do("end", number=number)
         expect(end["result"] == "reached", f"{end['result']}: {end['reason']}")
         took_us = end["now_us"] - began_us
@@ -199,7 +199,7 @@ class Sequence(InMotion):
             before = motor.steps
             at = end["position_steps"][i]
             self.take_target(motor, targets[motor.name], at)
-            legs = motor.legs(before, at, floors[motor.name])
+            legs = motor.legs(before, at, shortest_delays[motor.name])
             expect(end["legs"][i] == len(legs), f"{motor.name} made {end['legs'][i]} legs, not {len(legs)}")
             least, most = self.duration_us(before, legs)
             if before != at:
@@ -216,14 +216,14 @@ class Sequence(InMotion):
     def duration_us(self, at, legs):
         """At least and, but for what lies between legs, at most."""
         least = most = 0
-        for target, floor in legs:
+        for target, shortest_delay in legs:
             steps = abs(target - at)
             at = target
             if steps == 0:
                 continue
-            # The first delay lies before the first step: of the table, or the floor.
-            shortest = max(floor, self.fastest)
-            first = max(floor, self.slowest)
+            # The first delay lies before the first step: of the table, or the shortest delay.
+            shortest = max(shortest_delay, self.fastest)
+            first = max(shortest_delay, self.slowest)
             least += (first + (steps - 1) * shortest) * self.time_unit_ns / 1000
             most += steps * first * self.time_unit_ns / 1000
         return least, most

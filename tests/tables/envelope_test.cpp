@@ -20,10 +20,11 @@ using tables::Envelope;
 using tables::LinePart;
 
 // Delays by the rule of BUSHD.
-std::vector<Wide> delays_of(const bushd_table& table, std::uint32_t steps, std::uint16_t floor) {
+std::vector<Wide> delays_of(const bushd_table& table, std::uint32_t steps,
+                            std::uint16_t shortest_delay) {
   std::vector<Wide> delays;
   for (std::uint32_t j = 1; j <= steps; ++j) {
-    delays.push_back(std::max(bushd_table_delay(&table, j, steps), floor));
+    delays.push_back(std::max(bushd_table_delay(&table, j, steps), shortest_delay));
   }
   return delays;
 }
@@ -31,11 +32,11 @@ std::vector<Wide> delays_of(const bushd_table& table, std::uint32_t steps, std::
 // From the beginning of step `at` on, counted from 0: that step, then the fewest steps k with D(k)
 // <= its delay; not if it ramps down already.
 void stop_at(std::vector<Wide>& delays, std::size_t at, const bushd_table& table,
-             std::uint16_t floor) {
+             std::uint16_t shortest_delay) {
   const Wide delay = delays[at];
   const Wide at_end = bushd_table_decel(&table, static_cast<std::uint32_t>(delays.size() - 1 - at));
   const Wide speeding_up = std::max<Wide>(
-      {bushd_table_accel(&table, static_cast<std::uint32_t>(at)), table.cruise, floor});
+      {bushd_table_accel(&table, static_cast<std::uint32_t>(at)), table.cruise, shortest_delay});
   if (at_end > speeding_up) return;
   std::uint32_t to_stop = 0;
   while (bushd_table_decel(&table, to_stop) > delay) ++to_stop;
@@ -63,8 +64,9 @@ Line any_line() {
     if (same_unit) law.unit_ns = unit_ns;
     line.tables.push_back(std::make_unique<TestTable>(law, false));
     const auto increment = i == 0 ? line.longest : between<std::uint32_t>(0, line.longest);
-    const std::uint16_t floor = between(0, 2) == 0 ? any_floor(law) : std::uint16_t{0};
-    line.parts.push_back({line.tables.back()->view(), increment, floor});
+    const std::uint16_t shortest_delay =
+        between(0, 2) == 0 ? any_shortest_delay(law) : std::uint16_t{0};
+    line.parts.push_back({line.tables.back()->view(), increment, shortest_delay});
   }
   return line;
 }
@@ -89,7 +91,8 @@ void judge(const LinePart& part, std::uint32_t longest, const std::vector<Wide>&
   const auto made = static_cast<std::uint32_t>(times.size());
   for (std::uint32_t j = 2; j <= made; ++j) {
     const Wide between_steps = (times[j - 1] - times[j - 2]) * unit_ns;
-    const Wide allowed = std::max<bushd_delay>(bushd_table_delay(part.table, j, made), part.floor);
+    const Wide allowed =
+        std::max<bushd_delay>(bushd_table_delay(part.table, j, made), part.shortest_delay);
     RC_ASSERT(between_steps >= allowed * part.table->time_unit_ns * 2 * n);
   }
 }
@@ -101,12 +104,12 @@ TEST(Envelope, NoMotorStepsFasterThanItsOwnTable) {
     const bushd_table& table = envelope.view();
     RC_ASSERT(bushd_table_check(&table, nullptr, nullptr) == BUSHD_OK);
     const std::vector<Wide> whole =
-        delays_of(table, line.longest, static_cast<std::uint16_t>(envelope.floor()));
+        delays_of(table, line.longest, static_cast<std::uint16_t>(envelope.shortest_delay()));
     for (int stops = 0; stops < 8; ++stops) {
       std::vector<Wide> delays = whole;
       if (stops > 0) {
         stop_at(delays, between<std::size_t>(0, delays.size() - 1), table,
-                static_cast<std::uint16_t>(envelope.floor()));
+                static_cast<std::uint16_t>(envelope.shortest_delay()));
       }
       for (const LinePart& part : line.parts) {
         judge(part, line.longest, delays, table.time_unit_ns);
@@ -160,11 +163,11 @@ TEST(Envelope, SidesThatWouldBeTooLongAreCutOff) {
   EXPECT_EQ(envelope.view().cruise, 60);  // 60000 / 1000, and the first 33 of its steps' codes
 }
 
-TEST(Envelope, AFloorIsThatOfItsMotorTimesItsShare) {
+TEST(Envelope, ASpeedLimitIsThatOfItsMotorTimesItsShare) {
   const TestTable table({.accel = {100, 50}, .decel = {100, 50}, .cruise = 50, .unit_ns = 1000},
                         false);
   const std::vector<LinePart> parts{{table.view(), 10}, {table.view(), 3, 501}};
-  EXPECT_EQ(Envelope(parts, 10).floor(), 151U);
+  EXPECT_EQ(Envelope(parts, 10).shortest_delay(), 151U);
   EXPECT_EQ(tables::limiting_part(parts, 10), 1u);
 }
 

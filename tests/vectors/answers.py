@@ -21,17 +21,17 @@ def steps_made(table, delays, time_ns):
     return position([d * table.unit_ns for d in delays], time_ns, 0, False) // 256
 
 
-def move_bytes(name, steps, tick_ns, form, stop, floor):
-    table, fine = TABLES[name].slower(floor), form == "fine"
+def move_bytes(name, steps, tick_ns, form, stop, shortest_delay):
+    table, fine = TABLES[name].slower(shortest_delay), form == "fine"
     delays, _ = delays_of(table, abs(steps), tick_ns, stop)
     values = displacements(delays, table.unit_ns, tick_ns, fine)
     assert sum(values) == 256 * len(delays)
     return encode_displacements(values, -1 if steps < 0 else 1, fine)
 
 
-def run_state(name, steps, tick_ns, form, stop, floor, tick, ticks):
+def run_state(name, steps, tick_ns, form, stop, shortest_delay, tick, ticks):
     """The fields of an entry of TABLE_TICKS behind the motor, at the beginning of `tick`, for `ticks` more."""
-    table = TABLES[name].slower(floor)
+    table = TABLES[name].slower(shortest_delay)
     cruise_delay = table.cruise if table.cruise != TABLES[name].cruise else 0
     direction = -1 if steps < 0 else 1
     delays, stopped_at = delays_of(table, abs(steps), tick_ns, stop if stop is not None and stop <= tick else None)
@@ -52,9 +52,9 @@ def run_state(name, steps, tick_ns, form, stop, floor, tick, ticks):
     ]) + [cruise_delay]
 
 
-def rest_bytes(name, steps, tick_ns, form, stop, floor, tick, ticks):
+def rest_bytes(name, steps, tick_ns, form, stop, shortest_delay, tick, ticks):
     width = 2 if form == "fine" else 1
-    return move_bytes(name, steps, tick_ns, form, stop, floor)[tick * width:(tick + ticks) * width]
+    return move_bytes(name, steps, tick_ns, form, stop, shortest_delay)[tick * width:(tick + ticks) * width]
 
 
 def take_over_bytes(name, delay, fraction, direction, tick_ns, form):

@@ -42,8 +42,8 @@ def c_encoder(index, message, fields):
         lines.append(f"  return bushd_encode_table_ticks({fields['epoch']}, {fields['flags']}, "
                      f"UINT32_C({fields['first_tick']}), {fields['count']}, entries, {len(fields['entries'])}, payload);")
     elif message == "table_run":
-        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {floor}}}"
-                            for motor, slot, direction, steps, floor in fields["entries"])
+        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {shortest_delay}}}"
+                            for motor, slot, direction, steps, shortest_delay in fields["entries"])
         lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
         lines.append(f"  return bushd_encode_table_run({fields['epoch']}, UINT32_C({fields['first_tick']}), entries, "
                      f"{len(fields['entries'])}, payload);")
@@ -58,12 +58,12 @@ def c_encoder(index, message, fields):
                 lines.append(f"  message.{name} = {fields[name]}u;")
         if "edge" in fields:
             lines.append(f"  message.edge = (bushd_edge){fields['edge']};")
-        for name in ("slot", "floor", "longest", "from", "steps"):
+        for name in ("slot", "shortest_delay", "longest", "from", "steps"):
             lines.append(f"  message.line.{name} = {fields[name]}u;")
         lines.append(f"  return bushd_encode_{message}(&message, entries, {len(fields['entries'])}, payload);")
     elif message == "trigger":
-        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {floor}}}"
-                            for motor, slot, direction, steps, floor in fields["entries"])
+        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {shortest_delay}}}"
+                            for motor, slot, direction, steps, shortest_delay in fields["entries"])
         name = "entries" if entries else "NULL"
         if entries:
             lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
@@ -121,11 +121,11 @@ def c_header():
 
     rows = []
     for i, move in enumerate(MOVES):
-        name, steps, tick_ns, form, stop, floor = move
+        name, steps, tick_ns, form, stop, shortest_delay = move
         data = move_bytes(*move)
         out.append(c_array("uint8_t", f"kMove_{i}", data))
         rows.append(f"    {{&kTables[{numbers[name]}], {abs(steps)}, {-1 if steps < 0 else 1}, {tick_ns}, "
-                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {floor}, kMove_{i}, "
+                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {shortest_delay}, kMove_{i}, "
                     f"{len(data)}}},")
     out += ["static const move_vector kMoves[] = {", *rows, "};", ""]
 
@@ -140,11 +140,11 @@ def c_header():
 
     rows = []
     for i, saved in enumerate(RUN_STATES):
-        name, steps, tick_ns, form, stop, floor, tick, ticks = saved
+        name, steps, tick_ns, form, stop, shortest_delay, tick, ticks = saved
         data = rest_bytes(*saved)
         out.append(c_array("uint8_t", f"kRest_{i}", data))
         rows.append(f"    {{&kTables[{numbers[name]}], {abs(steps)}, {-1 if steps < 0 else 1}, {tick_ns}, "
-                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {floor}, {tick}, {ticks}, "
+                    f"{'true' if form == 'fine' else 'false'}, {-1 if stop is None else stop}, {shortest_delay}, {tick}, {ticks}, "
                     f"{c_state(run_state(*saved))}, kRest_{i}, {len(data)}}},")
     out += ["static const run_state_vector kRunStates[] = {", *rows, "};", ""]
 

@@ -23,7 +23,7 @@ PARTS = {
     "motor": [("position_steps", -4), ("known_until", 2)],
     "run_state": [("head", 1), ("since", 2), ("cruise", 2), ("since_ns", 4), ("lead", 2), ("accel_at", 2), ("accel_end", 2),
                   ("cruise_left", 4), ("decel_left", 2)],
-    "table_run": [("head", 1), ("steps", 4), ("floor", 2)],
+    "table_run": [("head", 1), ("steps", 4), ("shortest_delay", 2)],
     "line": [("head", 1), ("increment", 4)],
     "entries": [("address", 1), ("begin", 2)],
     "unique_id": [("unique_id", 8)],

@@ -21,7 +21,7 @@ typedef struct move_vector {
   uint32_t tick_ns;
   bool fine;
   int16_t ramp_down_at_tick;  // -1: none
-  uint16_t floor;             // 0: none
+  uint16_t shortest_delay;    // 0: none
   const uint8_t* displacements;
   uint16_t size;
 } move_vector;
@@ -44,7 +44,7 @@ typedef struct run_state_vector {
   uint32_t tick_ns;
   bool fine;
   int16_t ramp_down_at_tick;  // -1: none
-  uint16_t floor;             // 0: none
+  uint16_t shortest_delay;    // 0: none
   uint16_t tick;              // at whose beginning it is saved
   uint16_t ticks;             // for which it is asked
   bushd_run_state state;
@@ -110,7 +110,7 @@ static bool expands_to(bushd_run* run, uint32_t tick_ns, bool fine, int16_t ramp
 
 static bool check_move(const move_vector* vector) {
   bushd_run run;
-  bushd_run_start(&run, vector->table, vector->steps, vector->direction, vector->floor);
+  bushd_run_start(&run, vector->table, vector->steps, vector->direction, vector->shortest_delay);
   return expands_to(&run, vector->tick_ns, vector->fine, vector->ramp_down_at_tick,
                     vector->displacements, vector->size) &&
          bushd_run_done(&run);
@@ -135,7 +135,7 @@ static bool same_state(const bushd_run_state* a, const bushd_run_state* b) {
 
 static bool check_run_state(const run_state_vector* vector) {
   bushd_run run;
-  bushd_run_start(&run, vector->table, vector->steps, vector->direction, vector->floor);
+  bushd_run_start(&run, vector->table, vector->steps, vector->direction, vector->shortest_delay);
   for (uint16_t n = 0; n <= vector->tick; ++n) {
     if (vector->ramp_down_at_tick == (int16_t)n) bushd_run_ramp_down(&run);
     if (n == vector->tick) break;

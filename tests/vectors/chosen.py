@@ -17,7 +17,7 @@ TABLES = {
     "slow": Table(1000000, [9, 7, 5]),
 }
 
-# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, floor)
+# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, shortest_delay)
 MOVES = [
     ("small", 5, 4000, "coarse", None, 0), ("small", 5, 4000, "fine", None, 0), ("small", -5, 4000, "fine", None, 0),
     ("small", 1, 4000, "coarse", None, 0), ("small", -1, 4000, "coarse", None, 0), ("small", 2, 1000, "fine", None, 0),
@@ -51,7 +51,7 @@ SLOTS = [
     (256, 256, [1000, 1000, 1000, -3000]), (128, 256, [256 * 30 + 7, -256 * 30 - 7]),
 ]
 
-# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, floor, saved at the beginning of tick, ticks)
+# (table, steps, tick_ns, format, ramp-down at the beginning of tick or None, shortest_delay, saved at the beginning of tick, ticks)
 RUN_STATES = [
     ("small", 5, 4000, "fine", None, 0, 0, 6), ("small", -5, 4000, "fine", None, 0, 3, 3),
     ("flat", 40, 2560000, "coarse", None, 0, 1, 5), ("flat", -41, 2560000, "fine", 7, 0, 7, 1),
@@ -112,20 +112,20 @@ FRAMES = [
                                         [15, 1, 0, 65535, 0, 0, 5, 6, 2147483647, 65535, 0]]}),
     (1, 12, "table_ticks", {"epoch": 5, "flags": 2, "first_tick": 0xFFFFFFFF, "count": 1,
                             "entries": [[7, 1, 1, 0, 1, 0, 0, 0, 0, 0, 0]]}),
-    # With floors: one that cruises, one that speeds up; one without.
+    # With shortest delays: one that cruises, one that speeds up; one without.
     (1, 25, "table_ticks", {"epoch": 6, "flags": 8, "first_tick": 1290, "count": 300,
                             "entries": [[0, -1, 1, 9, 0, 0, 0, 0, 0, 0, 60], [1, 1, 0, 7, 39999, 12, 20, 190, 9, 191, 258],
                                         [2, 1, 1, 3, 0, 0, 0, 0, 0, 0, 0]]}),
     (1, 13, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 14, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[1, 0, -1, 1, 513], [15, 7, 1, 2147483647, 0]]}),
-    (1, 26, "line_run", {"epoch": 5, "first_tick": 2000, "slot": 3, "floor": 0, "longest": 700, "from": 0, "steps": 700,
+    (1, 26, "line_run", {"epoch": 5, "first_tick": 2000, "slot": 3, "shortest_delay": 0, "longest": 700, "from": 0, "steps": 700,
                          "entries": [[0, 1, 700], [2, -1, 211]]}),
-    # The rest of one after a pause, with a floor.
-    (1, 27, "line_run", {"epoch": 255, "first_tick": 4294967295, "slot": 7, "floor": 513, "longest": 2147483647,
+    # The rest of one after a pause, with a shortest delay.
+    (1, 27, "line_run", {"epoch": 255, "first_tick": 4294967295, "slot": 7, "shortest_delay": 513, "longest": 2147483647,
                          "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
-    (1, 28, "line_trigger", {"number": 1, "edge": 2, "delay_us": 50, "slot": 3, "floor": 0, "longest": 700, "from": 0,
+    (1, 28, "line_trigger", {"number": 1, "edge": 2, "delay_us": 50, "slot": 3, "shortest_delay": 0, "longest": 700, "from": 0,
                              "steps": 700, "entries": [[0, 1, 700], [2, -1, 211]]}),
-    (1, 29, "line_trigger", {"number": 255, "edge": 1, "delay_us": 1650000, "slot": 7, "floor": 513,
+    (1, 29, "line_trigger", {"number": 255, "edge": 1, "delay_us": 1650000, "slot": 7, "shortest_delay": 513,
                              "longest": 2147483647, "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
     (1, 21, "trigger", {"number": 1, "edge": 2, "delay_us": 50, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 22, "trigger", {"number": 255, "edge": 1, "delay_us": 1650000,
@@ -152,9 +152,9 @@ FRAMES = [
                            "enable_after_watchdog": 0}),
     (1, 26, "motor_inputs", {"motor": 15, "positive": 0, "negative": 3, "home": 8}),
     (2, 27, "motor_inputs", {"motor": 0, "positive": 15, "negative": 15, "home": 15}),
-    (1, 21, "home", {"motor": 3, "direction": -1, "most_steps": 20000, "floor": 77, "slow_steps": 600, "slow_delay": 1000,
+    (1, 21, "home", {"motor": 3, "direction": -1, "most_steps": 20000, "shortest_delay": 77, "slow_steps": 600, "slow_delay": 1000,
                      "position_steps": -310}),
-    (2, 22, "home", {"motor": 15, "direction": 1, "most_steps": 0, "floor": 0, "slow_steps": 1, "slow_delay": 65535,
+    (2, 22, "home", {"motor": 15, "direction": 1, "most_steps": 0, "shortest_delay": 0, "slow_steps": 1, "slow_delay": 65535,
                      "position_steps": 2147483647}),
     (1, 28, "travel", {"number": 7, "kind": 2, "motor": 3, "direction": -1, "edge": 1, "sensor": 0, "steps": 126,
                        "delay_us": 150000, "wait_us": 1500000}),

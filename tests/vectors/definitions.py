@@ -39,9 +39,9 @@ class Table:
         assert kinds == "".join(sorted(kinds, key="acd".index))
         return kinds.count("a"), kinds.count("c"), kinds.count("d")
 
-    def slower(self, floor):
-        """The same with a floor under every delay."""
-        return Table(self.unit_ns, self.accel, self.decel, max(self.cruise, floor))
+    def slower(self, shortest_delay):
+        """The same with a shortest delay under every delay."""
+        return Table(self.unit_ns, self.accel, self.decel, max(self.cruise, shortest_delay))
 
     def ramp_down(self, delay):
         """The delays after a step made at `delay`: the fewest steps k with D(k) <= delay."""

@@ -46,11 +46,11 @@ def csv_files():
 
     write("tables.csv", ["table", "time_unit_ns", "cruise", "accel", "decel", "crc32"],
           [[n, t.unit_ns, t.cruise, join(t.accel), "" if t.decel is t.accel else join(t.decel), t.crc32()] for n, t in TABLES.items()])
-    write("moves.csv", ["table", "steps", "tick_ns", "format", "ramp_down_at_tick", "floor", "displacements"],
+    write("moves.csv", ["table", "steps", "tick_ns", "format", "ramp_down_at_tick", "shortest_delay", "displacements"],
           [[*m[:4], "" if m[4] is None else m[4], m[5], move_bytes(*m).hex()] for m in MOVES])
     write("take_overs.csv", ["table", "delay", "fraction", "direction", "tick_ns", "format", "displacements"],
           [[*t, take_over_bytes(*t).hex()] for t in TAKE_OVERS])
-    write("run_states.csv", ["table", "steps", "tick_ns", "format", "ramp_down_at_tick", "floor", "tick", "ticks", "state",
+    write("run_states.csv", ["table", "steps", "tick_ns", "format", "ramp_down_at_tick", "shortest_delay", "tick", "ticks", "state",
                              "displacements"],
           [[*r[:4], "" if r[4] is None else r[4], *r[5:], field_text([run_state(*r)]), rest_bytes(*r).hex()]
            for r in RUN_STATES])

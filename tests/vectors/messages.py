@@ -17,9 +17,9 @@ LAYOUTS = {
                      ("displacements", [1])]),
     "table_ticks": (0x0C, [("epoch", 1), ("flags", 1), ("first_tick", 4), ("count", 2), ("entries", "run_state")]),
     "table_run": (0x0D, [("epoch", 1), ("first_tick", 4), ("entries", "table_run")]),
-    "line_run": (0x18, [("epoch", 1), ("first_tick", 4), ("slot", 1), ("floor", 2), ("longest", 4), ("from", 4),
+    "line_run": (0x18, [("epoch", 1), ("first_tick", 4), ("slot", 1), ("shortest_delay", 2), ("longest", 4), ("from", 4),
                         ("steps", 4), ("entries", "line")]),
-    "line_trigger": (0x1B, [("number", 1), ("edge", 1), ("delay_us", 4), ("slot", 1), ("floor", 2), ("longest", 4),
+    "line_trigger": (0x1B, [("number", 1), ("edge", 1), ("delay_us", 4), ("slot", 1), ("shortest_delay", 2), ("longest", 4),
                             ("from", 4), ("steps", 4), ("entries", "line")]),
     "trigger": (0x15, [("number", 1), ("edge", 1), ("delay_us", 4), ("entries", "table_run")]),
     "position_compare": (0x16, [("motor", 1), ("arrivals", 1), ("position_steps", -4), ("delay_us", 4), ("width_us", 4)]),
@@ -32,7 +32,7 @@ LAYOUTS = {
                           ("debounce_ticks", 1), ("system_inverted", 1), ("emergency", 1), ("overcurrent", 2),
                           ("enable_after_watchdog", 1)]),
     "motor_inputs": (0x17, [("motor", 1), ("positive", 1), ("negative", 1), ("home", 1)]),
-    "home": (0x13, [("motor", 1), ("direction", -1), ("most_steps", 4), ("floor", 2), ("slow_steps", 4), ("slow_delay", 2),
+    "home": (0x13, [("motor", 1), ("direction", -1), ("most_steps", 4), ("shortest_delay", 2), ("slow_steps", 4), ("slow_delay", 2),
                     ("position_steps", -4)]),
     "travel": (0x19, [("number", 1), ("kind", 1), ("motor", 1), ("direction", -1), ("edge", 1), ("sensor", 1), ("steps", 4),
                       ("delay_us", 4), ("wait_us", 4)]),
@@ -75,11 +75,11 @@ def run_state_bytes(fields, motor, direction, cruises, since, since_ns, lead, ac
     return bytes([head]) + out
 
 
-def table_run_bytes(_, motor, slot, direction, steps, floor):
+def table_run_bytes(_, motor, slot, direction, steps, shortest_delay):
     head = bytes([motor | slot << 4 | (0x80 if direction > 0 else 0)])
-    if not floor:
+    if not shortest_delay:
         return head + steps.to_bytes(4, "little")
-    return head + (steps | 1 << 31).to_bytes(4, "little") + floor.to_bytes(2, "little")
+    return head + (steps | 1 << 31).to_bytes(4, "little") + shortest_delay.to_bytes(2, "little")
 
 
 def line_bytes(_, motor, direction, increment):

@@ -13,15 +13,15 @@ namespace bushd::bench {
 namespace {
 
 constexpr size_t kMotors = 32;
-constexpr uint16_t kHalfSpeed = 1000;  // floor of 5000 steps/s
+constexpr uint16_t kHalfSpeed = 1000;  // shortest delay of 5000 steps/s
 
-void expand_coarse(benchmark::State& state, uint16_t floor = 0) {
+void expand_coarse(benchmark::State& state, uint16_t shortest_delay = 0) {
   const auto block = static_cast<size_t>(state.range(0));
   Moves moves(kMotors);
   std::vector<uint8_t> out(block * kMotors);
   size_t motor_ticks = 0;
   for (auto _ : state) {
-    moves.start(floor);
+    moves.start(shortest_delay);
     while (const size_t active = moves.expand_coarse(block, out.data())) {
       benchmark::DoNotOptimize(out.data());
       benchmark::ClobberMemory();
@@ -36,15 +36,18 @@ BENCHMARK_CAPTURE(expand_coarse, table, 0)
     ->Arg(15)
     ->Arg(64)
     ->Arg(256);
-BENCHMARK_CAPTURE(expand_coarse, floor, kHalfSpeed)->ArgName("block_ticks")->Arg(15)->Arg(64);
+BENCHMARK_CAPTURE(expand_coarse, shortest_delay, kHalfSpeed)
+    ->ArgName("block_ticks")
+    ->Arg(15)
+    ->Arg(64);
 
-void expand_fine(benchmark::State& state, uint16_t floor = 0) {
+void expand_fine(benchmark::State& state, uint16_t shortest_delay = 0) {
   const auto block = static_cast<size_t>(state.range(0));
   Moves moves(kMotors);
   std::vector<int16_t> out(block * kMotors);
   size_t motor_ticks = 0;
   for (auto _ : state) {
-    moves.start(floor);
+    moves.start(shortest_delay);
     while (const size_t active = moves.expand_fine(block, out.data())) {
       benchmark::DoNotOptimize(out.data());
       benchmark::ClobberMemory();
@@ -54,7 +57,7 @@ void expand_fine(benchmark::State& state, uint16_t floor = 0) {
   state.SetItemsProcessed(static_cast<int64_t>(motor_ticks));
 }
 BENCHMARK_CAPTURE(expand_fine, table, 0)->ArgName("block_ticks")->Arg(1)->Arg(7)->Arg(64)->Arg(256);
-BENCHMARK_CAPTURE(expand_fine, floor, kHalfSpeed)->ArgName("block_ticks")->Arg(7)->Arg(64);
+BENCHMARK_CAPTURE(expand_fine, shortest_delay, kHalfSpeed)->ArgName("block_ticks")->Arg(7)->Arg(64);
 
 constexpr uint8_t kFrameMotors = BUSHD_MOTORS_PER_MCU;
 

@@ -45,7 +45,8 @@ class Bench {
     for (std::size_t m = 0; m < kMotors; ++m) {
       tables_.push_back(std::make_unique<bushd::bench::Table>(
           20'000.0, 10'000.0 - 25.0 * static_cast<double>(m), 200));
-      motors.push_back({.table = tables_.back()->view(), .from = 0, .to = steps_of(m), .floor = 0});
+      motors.push_back(
+          {.table = tables_.back()->view(), .from = 0, .to = steps_of(m), .shortest_delay = 0});
     }
     way_ = Way(std::move(motors));
   }
@@ -60,7 +61,7 @@ class Bench {
     for (std::size_t m = 0; m < kMotors; ++m) {
       Axis& axis = axes.emplace_back(*tables_[m]->view(), kTickNs, format_);
       if (line) {
-        axis.start_line(0, way_.share(m, 0, way_.longest()), 0, way_.floor());
+        axis.start_line(0, way_.share(m, 0, way_.longest()), 0, way_.shortest_delay());
       } else {
         axis.start(0, kSteps, 0);
       }

@@ -65,10 +65,10 @@ class Moves {
     }
   }
 
-  // No faster than the floor (engine/run.h), 0: as fast as the tables are.
-  void start(uint16_t floor = 0) {
+  // No faster than the shortest delay (engine/run.h), 0: as fast as the tables are.
+  void start(uint16_t shortest_delay = 0) {
     for (size_t m = 0; m < runs_.size(); ++m) {
-      bushd_run_start(&runs_[m], tables_[m]->view(), kSteps, m % 2 == 0 ? 1 : -1, floor);
+      bushd_run_start(&runs_[m], tables_[m]->view(), kSteps, m % 2 == 0 ? 1 : -1, shortest_delay);
     }
   }
 

@@ -72,15 +72,15 @@ int expand(const Places& places, const Expansion& expansion) {
             steps_per_tick, expansion.tick_us, BUSHD_MAX_STEPS_PER_TICK),
         .file = (*table)->path()});
   }
-  bushd_delay floor = 0;
+  bushd_delay shortest_delay = 0;
   if (expansion.speed) {
     const auto delay = bushd::units::Coordinates().delay_at(*expansion.speed, view->time_unit_ns);
     if (!delay) return refuse(delay.error());
-    floor = *delay;
+    shortest_delay = *delay;
   }
   bushd_run run;
   bushd_run_start(&run, view, static_cast<std::uint32_t>(std::llabs(expansion.steps)),
-                  expansion.steps < 0 ? -1 : 1, floor);
+                  expansion.steps < 0 ? -1 : 1, shortest_delay);
   const bool written = expansion.format == BUSHD_FORMAT_COARSE
                            ? print_ticks<std::uint8_t>(run, expansion, bushd_run_expand_coarse)
                            : print_ticks<std::int16_t>(run, expansion, bushd_run_expand_fine);

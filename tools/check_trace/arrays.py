@@ -91,7 +91,7 @@ class ArrayMove(Move):
         super().look_until(tick)
         self._known = None
 
-    def change(self, tick, target_steps=None, floor=0):
+    def change(self, tick, target_steps=None, shortest_delay=0):
         if self._stop is None:
             self._stop = tick
         self._known = None

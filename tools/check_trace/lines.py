@@ -27,11 +27,11 @@ def up(numerator, denominator):
 class Part:
     """One motor of a line. Its delays as those of the run are fractions over `longest`, in ns."""
 
-    def __init__(self, table, increment, longest, floor):
+    def __init__(self, table, increment, longest, shortest_delay):
         self.table = table
         self.increment = increment
         self.longest = longest
-        self.floor = floor
+        self.shortest_delay = shortest_delay
 
     def _scaled(self, code):
         return self.increment * max(code, self.table.cruise) * self.table.unit_ns
@@ -47,7 +47,7 @@ class Part:
         return self._scaled(0)
 
     def least(self):
-        return self._scaled(self.floor)
+        return self._scaled(self.shortest_delay)
 
 
 class Envelope(Table):
@@ -78,16 +78,16 @@ class Envelope(Table):
 
 class Run(Plan):
     """Delays of the line's run, and what each is part of: "down" to the end; the index of the decelerating side, in a ramp to a
-    floor; "lead", which ran when a change came; or else None."""
+    shortest_delay; "lead", which ran when a change came; or else None."""
 
-    def __init__(self, first_ns, table, steps, floor):
+    def __init__(self, first_ns, table, steps, shortest_delay):
         super().__init__(first_ns, table.unit_ns)
         self._table = table
         self.kinds = []
-        self.restart(steps, floor)
+        self.restart(steps, shortest_delay)
 
-    def restart(self, steps, floor):
-        self._lead_to(0, self._onward(steps, floor, 0, []), steps)
+    def restart(self, steps, shortest_delay):
+        self._lead_to(0, self._onward(steps, shortest_delay, 0, []), steps)
 
     def _lead_to(self, done, rest, count):
         """`rest`: delays with their kinds."""
@@ -102,12 +102,12 @@ class Run(Plan):
 
         self.go_on(done, delays(), count)
 
-    def _onward(self, steps, floor, first, ramp):
-        """`steps` more, from the index `first` of the accelerating side, the first ones along `ramp` down to the floor."""
-        floor = max(floor, self._table.cruise)
+    def _onward(self, steps, shortest_delay, first, ramp):
+        """`steps` more, from the index `first` of the accelerating side, the first ones along `ramp` down to the shortest delay."""
+        shortest_delay = max(shortest_delay, self._table.cruise)
         for j in range(1, steps + 1):
-            along = j <= len(ramp) and ramp[j - 1] <= floor
-            ahead = max(self._table.delay_from_start(first + j - 1), ramp[j - 1] if along else floor)
+            along = j <= len(ramp) and ramp[j - 1] <= shortest_delay
+            ahead = max(self._table.delay_from_start(first + j - 1), ramp[j - 1] if along else shortest_delay)
             back = self._table.delay_before_end(steps - j)
             yield max(ahead, back), "down" if back > ahead else len(ramp) - j if along else None
 
@@ -136,7 +136,7 @@ class Run(Plan):
         self._lead_to(running + 1, ramp, len(ramp))
         self.kinds[running] = lead
 
-    def retarget(self, running, steps, floor):
+    def retarget(self, running, steps, shortest_delay):
         """To `steps` in all. Returns False if its ramp-down takes more, or would be shortened."""
         delay = self.delays[running]
         ramp = self._table.way_down(delay)
@@ -146,7 +146,7 @@ class Run(Plan):
         first = next(i for i in range(len(self._table.accel) + 1) if self._table.delay_from_start(i) <= delay)
         if self._table.delay_from_start(first) == delay:
             first += 1
-        self._lead_to(running + 1, self._onward(after, floor, first, ramp), after)
+        self._lead_to(running + 1, self._onward(after, shortest_delay, first, ramp), after)
         return True
 
 
@@ -165,7 +165,7 @@ class LineMove(Move):
         self._rests = [(-1, self._rest())]  # from which tick of the move on, where it will rest, in steps of the line
 
     def _planned(self, event):
-        return Run(self.late_ns, self._envelope, event["line"]["to"] - self._from, event.get("floor", 0))
+        return Run(self.late_ns, self._envelope, event["line"]["to"] - self._from, event.get("shortest_delay", 0))
 
     def _made(self, s):
         """Of the motor, from the line's beginning, when the run has made `s` steps of it."""
@@ -177,19 +177,19 @@ class LineMove(Move):
     def _count(self):
         return self._rest() - self._first
 
-    def change(self, tick, target_steps=None, floor=0, run_steps=None):
+    def change(self, tick, target_steps=None, shortest_delay=0, run_steps=None):
         self.ticks_from = min(self.ticks_from, tick)
         if target_steps is not None:
             self.goal_steps = target_steps
         run = self._plan
         if tick <= self.start_tick:
-            run.restart(run_steps if target_steps is not None else 0, floor)
+            run.restart(run_steps if target_steps is not None else 0, shortest_delay)
             self._rests = [(-1, self._rest())]
             return
         running = run.made_by((tick - self.start_tick) * self.tick_ns)
         if running == run.count:
             return
-        if target_steps is None or not run.retarget(running, run_steps, floor):
+        if target_steps is None or not run.retarget(running, run_steps, shortest_delay):
             run.ramp_down(running)
         self._rests.append((tick - self.start_tick, self._rest()))
 

@@ -1,9 +1,9 @@
 """The motion, computed anew from the table: every step's time, and the slot that an MCU makes it in.
 
-What a move is.  Delay before step j of N:  max(A(j-1), D(N-j), c, floor), times the table's unit; the sum of the
+What a move is.  Delay before step j of N:  max(A(j-1), D(N-j), c, shortest_delay), times the table's unit; the sum of the
 first j delays is the table's time of step j, counted from the beginning of the move's start tick, or from
-"late_ns" after it (a move that a trigger has started). A stop at tick k lets the step that runs then go on and adds the fewest steps m with D(m) <= its delay: D(m-1) .. D(0). A new target there goes on along A, or down to a floor along
-D: of the j-th of the first m steps the floor is min(floor, D(m-j)).
+"late_ns" after it (a move that a trigger has started). A stop at tick k lets the step that runs then go on and adds the fewest steps m with D(m) <= its delay: D(m-1) .. D(0). A new target there goes on along A, or down to a shortest_delay along
+D: of the j-th of the first m steps the shortest_delay is min(shortest_delay, D(m-j)).
 
 What an MCU makes of it.  A step belongs to tick i if its time lies in (begin of i, end of i]. Position is
 linear between steps; q is the position at a tick's end, rounded down to 1/256 step (fine) or to a whole step
@@ -65,10 +65,10 @@ class Table:
     def delay_before_end(self, i):
         return self.decel[i] if i < len(self.decel) else self.cruise
 
-    def delays(self, steps, floor):
+    def delays(self, steps, shortest_delay):
         """Of a whole move, in time units, one after the other."""
         return (
-            max(self.delay_from_start(j - 1), self.delay_before_end(steps - j), self.cruise, floor)
+            max(self.delay_from_start(j - 1), self.delay_before_end(steps - j), self.cruise, shortest_delay)
             for j in range(1, steps + 1)
         )
 
@@ -81,15 +81,15 @@ class Table:
         fewest = next(k for k in range(len(self.decel) + 1) if self.delay_before_end(k) <= delay)
         return [self.delay_before_end(k) for k in range(fewest - 1, -1, -1)]
 
-    def onward(self, delay, steps, floor):
+    def onward(self, delay, steps, shortest_delay):
         """The delays of `steps` more after one made at `delay`, to rest, one after the other."""
         a = next(i for i in range(len(self.accel) + 1) if self.delay_from_start(i) <= delay)
         if self.delay_from_start(a) == delay:
             a += 1
-        floors = chain((min(floor, down) for down in self.way_down(delay)), repeat(floor))
+        shortest_delays = chain((min(shortest_delay, down) for down in self.way_down(delay)), repeat(shortest_delay))
         return (
             max(self.delay_from_start(a + j - 1), self.delay_before_end(steps - j), self.cruise, least)
-            for j, least in zip(range(1, steps + 1), floors)
+            for j, least in zip(range(1, steps + 1), shortest_delays)
         )
 
 
@@ -179,22 +179,22 @@ class Move:
 
     def _planned(self, event):
         plan = Plan(self.late_ns, self.table.unit_ns)
-        self._go_to(plan, self.goal_steps, event.get("floor", 0))
+        self._go_to(plan, self.goal_steps, event.get("shortest_delay", 0))
         return plan
 
-    def _go_to(self, plan, goal_steps, floor):
+    def _go_to(self, plan, goal_steps, shortest_delay):
         steps = goal_steps - self.from_steps
         self.direction = 1 if steps >= 0 else -1
-        plan.go_on(0, self.table.delays(abs(steps), floor), abs(steps))
+        plan.go_on(0, self.table.delays(abs(steps), shortest_delay), abs(steps))
 
-    def change(self, tick, target_steps=None, floor=0):
+    def change(self, tick, target_steps=None, shortest_delay=0):
         """What a stop, or a new target, at `tick` makes of the rest; changes follow each other."""
         self.ticks_from = min(self.ticks_from, tick)
         if target_steps is not None:
             self.goal_steps = target_steps
         plan = self._plan
         if tick <= self.start_tick:
-            self._go_to(plan, self.from_steps if target_steps is None else target_steps, floor)
+            self._go_to(plan, self.from_steps if target_steps is None else target_steps, shortest_delay)
             return
         until_ns = (tick - self.start_tick) * self.tick_ns
         done = plan.made_by(until_ns)
@@ -204,7 +204,7 @@ class Move:
         if target_steps is not None:
             after = (target_steps - self.from_steps) * self.direction - (done + 1)
             if after >= len(self.table.way_down(running)):
-                plan.go_on(done + 1, self.table.onward(running, after, floor), after)
+                plan.go_on(done + 1, self.table.onward(running, after, shortest_delay), after)
                 return
         if plan.times_ns[done] - until_ns > MOST_WAIT_NS:
             plan.begun = (running, until_ns)

@@ -68,7 +68,7 @@ class PathMove(Move):
         """Where its path has led is judged by that."""
         return self.result_steps
 
-    def change(self, tick, target_steps=None, floor=0, run_steps=None):
+    def change(self, tick, target_steps=None, shortest_delay=0, run_steps=None):
         pass
 
 
@@ -83,7 +83,7 @@ class MoveLog:
         self._ways = {}  # by number: the tables of lines
         self._arrays = {}  # by number
         self._ticks = set()  # (bus, tick_ns)
-        self.paths = {}  # by number of the way: floors by motor's name
+        self.paths = {}  # by number of the way: shortest delays by motor's name
         self.levels = {}  # by address: which outputs are active low
 
     def _levels_told(self, event):
@@ -171,11 +171,11 @@ class MoveLog:
     def _line(self, event):
         """A way of a line: the table of its runs."""
         longest = event["longest"]
-        parts = [Part(self._tables.of(motor), motor["increment"], longest, motor["floor"]) for motor in event["motors"]]
+        parts = [Part(self._tables.of(motor), motor["increment"], longest, motor["shortest_delay"]) for motor in event["motors"]]
         self._ways[event["way"]] = Envelope(parts)
 
     def _path(self, event):
-        self.paths[event["way"]] = {motor["motor"]: motor["floor"] for motor in event["motors"]}
+        self.paths[event["way"]] = {motor["motor"]: motor["shortest_delay"] for motor in event["motors"]}
 
     def _array(self, event):
         """The first rows of an array, or further ones."""
@@ -190,7 +190,7 @@ class MoveLog:
         if move is None:
             return
         run_steps = {"run_steps": event["run_steps"]} if "run_steps" in event else {}
-        move.change(event["tick"], event.get("target_steps"), event.get("floor", 0), **run_steps)
+        move.change(event["tick"], event.get("target_steps"), event.get("shortest_delay", 0), **run_steps)
 
     def _result(self, event):
         move = self._moves.get((event["motor"], event["id"]))

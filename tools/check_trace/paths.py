@@ -9,7 +9,7 @@ of it. So every edge says where the run is. It is asked
 - that the edges of all motors, put in the order of their s, are in the order of time, to two ticks: one for each of two edges.
   Positions are then within half a step of one point of the path, and what a tick is off its run;
 - that a motor takes no less time for 1, 4, 16 and 64 steps than its table has for them, to two ticks: of the interval before a
-  step that follows i others since the motor stood or turned round, and that k follow until it does, max(A(i), D(k), c, floor).
+  step that follows i others since the motor stood or turned round, and that k follow until it does, max(A(i), D(k), c, shortest_delay).
 
 A run may be paused and go on anywhere, and end anywhere.
 """
@@ -95,10 +95,10 @@ def of_path(motors, way):
 
 
 class PathCheck:
-    def __init__(self, names, rows, floors, problems):
+    def __init__(self, names, rows, shortest_delays, problems):
         self._names = names
         self._rows = rows
-        self._floors = floors  # by name
+        self._shortest_delays = shortest_delays  # by name
         self._problems = problems
 
     def run(self, motors, tick_ns):
@@ -137,10 +137,10 @@ class PathCheck:
 
     def _check_intervals(self, motor, made):
         table = motor.moves[0].table
-        floor = max(table.cruise, self._floors.get(motor.name, 0))
+        shortest_delay = max(table.cruise, self._shortest_delays.get(motor.name, 0))
         least = []
         for step, _ in made[1:]:
-            own = floor
+            own = shortest_delay
             if step.before > 0:
                 own = max(own, table.delay_from_start(step.before), table.delay_before_end(step.to_go))
             least.append(own * table.unit_ns)

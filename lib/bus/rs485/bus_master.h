@@ -135,20 +135,20 @@ class BusMaster {
   // Instead of begin() the MCU gets the whole move at once and runs it by the motor's table. `run`
   // is the source's from `start` on.
   bool can_run_tables(McuIndex mcu) const { return can(mcu, BUSHD_CAN_TABLE_RUN); }
-  // With floors, and slow delays of homing, that are no codes (engine/table.h).
+  // With shortest delays, and slow delays of homing, that are no codes (engine/table.h).
   bool can_run_slowly(McuIndex mcu) const { return can(mcu, BUSHD_CAN_SLOW_RUNS); }
   virtual void begin_table_run(McuIndex, std::uint8_t, Tick, TableRun) {}
 
-  // The same for a motor's part of a run of a line, by this table and floor. `alone`: all motors of
-  // the MCU are on it. Precondition also: the MCU has no other line.
-  virtual bool can_run_line(McuIndex, const bushd_table&, bushd_delay /*floor*/,
+  // The same for a motor's part of a run of a line, by this table and shortest delay. `alone`: all
+  // motors of the MCU are on it. Precondition also: the MCU has no other line.
+  virtual bool can_run_line(McuIndex, const bushd_table&, bushd_delay /*shortest_delay*/,
                             bool /*alone*/) const {
     return false;
   }
   // It can make runs of lines, and may: ticks need not be told one by one.
   virtual bool makes_lines(McuIndex) const { return false; }
   // Of any MCU that makes lines: whether it is fast enough for that.
-  virtual bool keeps_up_with(McuIndex, const bushd_table&, bushd_delay /*floor*/,
+  virtual bool keeps_up_with(McuIndex, const bushd_table&, bushd_delay /*shortest_delay*/,
                              bool /*alone*/) const {
     return false;
   }

@@ -208,16 +208,17 @@ void Rs485Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, c
   synchroniser_.lines_run(true);
 }
 
-bool Rs485Master::can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+bool Rs485Master::can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                                bool alone) const {
-  return makes_lines(mcu) && slot_of(mcu, table) && keeps_up_with(mcu, table, floor, alone);
+  return makes_lines(mcu) && slot_of(mcu, table) &&
+         keeps_up_with(mcu, table, shortest_delay, alone);
 }
 
-bool Rs485Master::keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+bool Rs485Master::keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                                 bool alone) const {
-  if (!bushd_delay_is_code(floor)) return false;  // LINE_RUN cannot tell it
+  if (!bushd_delay_is_code(shortest_delay)) return false;  // LINE_RUN cannot tell it
   if (can(mcu, BUSHD_CAN_TABLE_TICKS)) return true;
-  return bushd_run_is_slow(&table, floor, setup_.tick_ns,
+  return bushd_run_is_slow(&table, shortest_delay, setup_.tick_ns,
                            alone ? BUSHD_SLOW_LINE_DELAY_NS : BUSHD_SHARED_LINE_DELAY_NS);
 }
 

@@ -96,12 +96,12 @@ class Rs485Master final : public BusMaster,
     connector_.queue(mcu).home(message);
   }
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
-  bool can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+  bool can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                     bool alone) const override;
   bool makes_lines(McuIndex mcu) const override {
     return setup_.table_ticks && can(mcu, BUSHD_CAN_LINE_RUN);
   }
-  bool keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay floor,
+  bool keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                      bool alone) const override;
   void begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) override;
   std::optional<std::uint8_t> slot_of(McuIndex mcu, const bushd_table& table) const override;

@@ -10,16 +10,16 @@
 namespace bushd::link {
 
 struct TableRun {
-  std::int32_t steps;     // either sign, not 0
-  bushd_delay floor = 0;  // of bushd_run_start
+  std::int32_t steps;              // either sign, not 0
+  bushd_delay shortest_delay = 0;  // of bushd_run_start
 };
 
 // A motor's part of a run that all motors of its line follow, on whatever MCU. All but the last two
 // are the same for all that begin at one tick on an MCU, the numbers of slots aside for all of the
 // line (engine/message_line.h).
 struct LineRun {
-  std::uint8_t slot;  // of the run's table
-  bushd_delay floor;  // a code (engine/table.h)
+  std::uint8_t slot;           // of the run's table
+  bushd_delay shortest_delay;  // a code (engine/table.h)
   std::uint32_t longest;
   std::uint32_t from;
   std::uint32_t steps;
@@ -33,7 +33,7 @@ using McuRun = std::variant<TableRun, LineRun>;
 // What the motors of an MCU have in common of a line's run.
 inline bushd_line_part line_part_of(const LineRun& run) {
   return {.slot = run.slot,
-          .floor = static_cast<std::uint16_t>(run.floor),
+          .shortest_delay = static_cast<std::uint16_t>(run.shortest_delay),
           .longest = run.longest,
           .from = run.from,
           .steps = run.steps,
@@ -47,7 +47,7 @@ inline bushd_table_run_entry entry_of(std::uint8_t motor, std::uint8_t slot, Tab
           .slot = slot,
           .direction = static_cast<std::int8_t>(run.steps < 0 ? -1 : 1),
           .steps = static_cast<std::uint32_t>(std::abs(std::int64_t{run.steps})),
-          .floor = run.floor};
+          .shortest_delay = run.shortest_delay};
 }
 
 }  // namespace bushd::link

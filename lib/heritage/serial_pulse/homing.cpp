@@ -50,7 +50,8 @@ void SerialPulseMaster::begin_fast(std::int64_t now_us, int direction) {
   homing_->stage = BUSHD_HOMING_FAST;
   homing_->meets_limit = false;
   bushd_run run;
-  bushd_run_start(&run, &table(), homing_->message.most_steps, direction, homing_->message.floor);
+  bushd_run_start(&run, &table(), homing_->message.most_steps, direction,
+                  homing_->message.shortest_delay);
   begin_run(now_us, {.run = run, .line = {}}, 0, false);
 }
 

@@ -307,9 +307,9 @@ void SerialPulseMaster::plan_rates(const link::MotorPlan& plan) {
   // On a line slower steps wait for their time one by one, where that does not take longer.
   if (plan.line && status_->empty) driver.lowest = kLowestOnLine;
   std::vector<Rate> rates = rates_for(driver, ns_of(run.table->cruise), longest);
-  // The floor of the run may be another speed than one of the table.
-  const std::vector<Rate> of_floor = rates_for(driver, ns_of(run.cruise), longest);
-  rates.insert(rates.end(), of_floor.begin(), of_floor.end());
+  // The shortest delay of the run may be another speed than one of the table.
+  const std::vector<Rate> of_shortest_delay = rates_for(driver, ns_of(run.cruise), longest);
+  rates.insert(rates.end(), of_shortest_delay.begin(), of_shortest_delay.end());
   std::ranges::sort(rates, std::greater<>(), &Rate::ask);
   const auto same = [](const Rate& one, const Rate& other) { return one.ask == other.ask; };
   rates.erase(std::unique(rates.begin(), rates.end(), same), rates.end());

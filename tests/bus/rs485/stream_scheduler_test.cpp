@@ -331,7 +331,7 @@ class LineRuns : public Scheduling {
  protected:
   static link::LineRun part(std::uint32_t increment, int direction) {
     return {.slot = 3,
-            .floor = 9,
+            .shortest_delay = 9,
             .longest = 700,
             .from = 100,
             .steps = 500,
@@ -358,7 +358,7 @@ TEST_F(LineRuns, AreOneFrameForAllMotors) {
             BUSHD_OK);
   EXPECT_EQ(message.first_tick, 1040u);
   EXPECT_EQ(message.line.slot, 3);
-  EXPECT_EQ(message.line.floor, 9);
+  EXPECT_EQ(message.line.shortest_delay, 9);
   EXPECT_EQ(message.line.longest, 700u);
   EXPECT_EQ(message.line.from, 100u);
   EXPECT_EQ(message.line.steps, 500u);

@@ -166,15 +166,16 @@ TEST(StepsOnALine, TwoChangesBetweenTwoStepsOfAMotor) {
   Steps steps(plan);
   std::vector<std::int64_t> made_ns;
   made_ns.push_back(static_cast<std::int64_t>(steps.take_ns()));
-  // The run by itself, with its floor changed where it has made so many steps.
+  // The run by itself, with its shortest delay changed where it has made so many steps.
   std::vector<std::int64_t> ends_ns = {0};
   bushd_run run = plan.run;
-  for (const auto& [at, floor] : {std::pair<std::uint32_t, std::uint16_t>{604, 100}, {1400, 50}}) {
+  for (const auto& [at, shortest_delay] :
+       {std::pair<std::uint32_t, std::uint16_t>{604, 100}, {1400, 50}}) {
     while (run.steps_done < at) {
       ends_ns.push_back(ends_ns.back() +
                         static_cast<std::int64_t>(bushd_run_take_step(&run)) * table.time_unit_ns);
     }
-    ASSERT_TRUE(bushd_run_retarget(&run, bushd_run_steps_left(&run) - 1, floor));
+    ASSERT_TRUE(bushd_run_retarget(&run, bushd_run_steps_left(&run) - 1, shortest_delay));
     steps.become(run);
   }
   while (bushd_run_steps_left(&run) > 0) {

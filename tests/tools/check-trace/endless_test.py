@@ -99,7 +99,7 @@ class WithoutEnd(CheckTraceTest):
 
     def test_a_line_goes_on_when_the_trace_ends(self):
         scene = self.one(400, "table", line={"way": 1, "increment": self.FAR, "longest": self.FAR, "direction": 1, "from": 0, "to": self.FAR})
-        motor = {"motor": "theta", "increment": self.FAR, "table_file": self.table_file, "table_sha256": synthetic.sha256_of(TABLE), "floor": 0}
+        motor = {"motor": "theta", "increment": self.FAR, "table_file": self.table_file, "table_sha256": synthetic.sha256_of(TABLE), "shortest_delay": 0}
         scene.events[:] = [{"event": "line", "way": 1, "longest": self.FAR, "motors": [motor]}, scene.events[0]]
         code, said = self.work_of(scene)
         self.assertEqual((code, said[0]), (1, "problem: theta (hall:1, output 0): move 1 has no result"))
