@@ -41,7 +41,7 @@ LcmFront::LcmFront(Setup setup, Reception& reception, Publishing& publishing,
       without_session_(setup_.seed, kWithoutSession) {}
 
 Result<void> LcmFront::subscribe() {
-  const auto listening = setup_.transport.subscribe_bytes(
+  const auto listening = setup_.transport.subscribe(
       setup_.prefix + "_DESCRIPTION", [this](lcm::Payload payload) { on_description(payload); });
   if (!listening) return listening;
   if (!setup_.commands) return {};
@@ -59,7 +59,7 @@ Result<void> LcmFront::subscribe() {
 }
 
 Result<void> LcmFront::listen(lcm::Transport& transport, std::string_view channel, Takes takes) {
-  return transport.subscribe_bytes(setup_.prefix + "_" + std::string(channel),
+  return transport.subscribe(setup_.prefix + "_" + std::string(channel),
                                    [this, channel, takes, &transport](lcm::Payload payload) {
                                      on_message(channel, payload, transport.received_utime_us(),
                                                 takes);
@@ -153,7 +153,7 @@ void LcmFront::answer(const lcm::RequestId& id, const Book& book, const api::Rep
 
 void LcmFront::publish(const lcm::Packet& packet) {
   const auto published =
-      setup_.transport.publish_bytes(setup_.prefix + "_" + packet.channel, packet.payload);
+      setup_.transport.publish(setup_.prefix + "_" + packet.channel, packet.payload);
   trouble_ = published ? std::string() : published.error().text();
 }
 

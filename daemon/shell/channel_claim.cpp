@@ -62,7 +62,7 @@ Result<void> listen(const config::Lcm& lcm) {
     const auto message = lcm::decode_daemon_message("STATE", payload);
     if (message) bus = std::get<lcm::StateMessage>(*message).snapshot.bus;
   };
-  const auto listening = (*transport)->subscribe_bytes(lcm.prefix + "_STATE", heard);
+  const auto listening = (*transport)->subscribe(lcm.prefix + "_STATE", heard);
   if (!listening) return listening;
   const Clock::time_point until = Clock::now() + kListen;
   while (!bus && Clock::now() < until) {

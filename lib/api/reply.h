@@ -3,6 +3,7 @@
 // carried out, and a stop that could not stop all).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,6 +11,8 @@
 #include <vector>
 
 #include "api/words.h"
+#include "base/fields.h"
+#include "base/units/coordinates.h"
 #include "heritage/camac/naf.h"
 #include "tables/table.h"
 
@@ -20,9 +23,23 @@ struct TableRef {
   std::string name{};
   std::uint32_t revision = 0;  // counted by bushtab from 1; 0: the table's file tells none
   std::string hash{};          // first 8 digits of the SHA-256 of what moves a motor
+  static void fields(auto& self, auto& visit) {
+    visit("name", self.name);
+    visit("revision", self.revision, fields::OrZero<std::int32_t>{INT32_MAX});
+    visit("hash", self.hash);
+  }
   friend bool operator==(const TableRef&, const TableRef&) = default;
 };
 TableRef ref_to(const tables::Table& table);
+
+// A number of decimals.
+struct Decimals {
+  static std::int8_t told(int decimals) { return static_cast<std::int8_t>(decimals); }
+  static bool taken(std::int8_t told, int& decimals) {
+    decimals = std::clamp<int>(told, 0, units::Coordinates::kMostDecimals);
+    return true;
+  }
+};
 
 // What became of one motor of a move.
 struct MotorResult {
@@ -37,6 +54,39 @@ struct MotorResult {
   std::string who{};            // asked for it
   int legs = 1;                 // how many its motion had, as planned
   double most_steps_per_s = 0;  // not exceeded by any of them; 0 of what the MCU makes by itself
+
+  // All motors of a result. Each table is told once, and each motor has its place among them.
+  static void fields_of_all(auto& motors, auto& visit) {
+    std::vector<TableRef> tables;
+    std::vector<std::int16_t> places(motors.size());
+    for (std::size_t i = 0; i < motors.size(); ++i) {
+      const auto known = std::find(tables.begin(), tables.end(), motors[i].table);
+      places[i] = static_cast<std::int16_t>(known - tables.begin());
+      if (known == tables.end()) tables.push_back(motors[i].table);
+    }
+    const auto place_of = [&](auto& motor) -> std::int16_t& {
+      places.resize(motors.size());  // known by now, in a visitor that reads
+      return places[static_cast<std::size_t>(&motor - motors.data())];
+    };
+    visit.columns(
+        "motor_count", motors, fields::Column{"motors", &MotorResult::motor},
+        fields::Column{"outcomes", &MotorResult::outcome, fields::Word{outcome_of}},
+        fields::Column{"position_steps", &MotorResult::position_steps},
+        fields::Column{"user_positions", &MotorResult::user},
+        fields::Column{"dial_positions", &MotorResult::dial},
+        fields::Column{"units", &MotorResult::unit},
+        fields::Column{"precisions", &MotorResult::precision, Decimals{}},
+        fields::Column{"table_of_motor", place_of}, fields::Column{"asked_by", &MotorResult::who},
+        fields::Column{"legs", &MotorResult::legs, fields::As<std::int8_t>{}},
+        fields::Column{"most_steps_per_s", &MotorResult::most_steps_per_s});
+    visit.list("table_count", "tables", tables);
+    places.resize(motors.size());  // of a payload that ended before
+    for (std::size_t i = 0; i < motors.size(); ++i) {
+      const auto place = static_cast<std::size_t>(places[i]);
+      visit.require(place < tables.size());
+      if (place < tables.size()) visit.set(motors[i].table, tables[place]);
+    }
+  }
 };
 
 // What a move would be.
@@ -60,6 +110,20 @@ struct MovePlan {
   // Of a path of at most kMostPoints: when each of its points is reached, from the first tick on.
   std::vector<std::int64_t> points_us{};
   static constexpr std::size_t kMostPoints = 2048;
+  static void fields(auto& self, auto& visit) {
+    Traffic traffic = self.traffic.value_or(Traffic{.frames = -1, .bytes = -1});
+    visit("duration_us", self.duration_us);
+    visit("ticks", self.ticks);
+    visit("frames", traffic.frames);
+    visit("bytes", traffic.bytes);
+    visit("limited_by", self.limited_by);
+    visit.columns("motor_count", self.motors, fields::Column{"motors", &Motor::motor},
+                  fields::Column{"steps", &Motor::steps},
+                  fields::Column{"motor_duration_us", &Motor::duration_us},
+                  fields::Column{"peak_steps_per_s", &Motor::peak_steps_per_s});
+    visit.list("point_count", "points_us", self.points_us);
+    visit.set(self.traffic, traffic.frames < 0 ? std::optional<Traffic>{} : traffic);
+  }
 };
 
 // One of the tables that the daemon finds.
@@ -70,6 +134,14 @@ struct TableEntry {
   std::int32_t codes = 0;  // of both sides, of one if they mirror each other
   double start_steps_per_s = 0;
   double max_steps_per_s = 0;
+  static void fields(auto& self, auto& visit) {
+    visit("name", self.name);
+    visit("table", self.table);
+    visit("fault", self.fault);
+    visit("codes", self.codes);
+    visit("start_steps_per_s", self.start_steps_per_s);
+    visit("max_steps_per_s", self.max_steps_per_s);
+  }
 };
 struct TableList {
   std::vector<TableEntry> entries{};
@@ -87,10 +159,24 @@ struct PastMotion {
   // As they were shown to people then.
   std::string from_text{};
   std::string to_text{};
+  static void fields(auto& self, auto& visit) {
+    visit("utime_us", self.utime_us);
+    visit("what", self.what);
+    visit("who", self.who);
+    visit("from_steps", self.from_steps);
+    visit("to_steps", self.to_steps);
+    visit("outcome", self.outcome);
+    visit("reason", self.reason);
+    visit("from_text", self.from_text);
+    visit("to_text", self.to_text);
+  }
   friend bool operator==(const PastMotion&, const PastMotion&) = default;
 };
 struct MotionHistory {
   std::vector<PastMotion> motions{};
+  static void fields(auto& self, auto& visit) {
+    visit.list("motion_count", "motions", self.motions);
+  }
 };
 
 // What may be changed in operation, and what bushd.toml says of it.
@@ -105,12 +191,28 @@ struct Configuration {
   std::string path{};    // of bushd.toml, absolute, on the daemon's PC
   std::string sha256{};  // of its text as the daemon knows it
   std::vector<MotorSetting> settings{};
+  static void fields(auto& self, auto& visit) {
+    visit("path", self.path);
+    visit("sha256", self.sha256);
+    visit.columns("setting_count", self.settings,
+                  fields::Column{"setting_motors", &MotorSetting::motor},
+                  fields::Column{"keys", &MotorSetting::key},
+                  fields::Column{"values", &MotorSetting::value},
+                  fields::Column{"values_in_file", &MotorSetting::in_file});
+  }
 };
 
 // What a crate has answered.
 struct CamacResult {
   camac::BlockResult block{};
   std::uint32_t requests = 0;  // L lines of its stations afterwards; bit n - 1 is station n
+  static void fields(auto& self, auto& visit) {
+    visit("tally", self.block.tally);
+    visit("requests", self.requests);
+    visit.columns("response_count", self.block.responses,
+                  fields::Column{"x", &camac::Response::x}, fields::Column{"q", &camac::Response::q},
+                  fields::Column{"data", &camac::Response::data});
+  }
   friend bool operator==(const CamacResult&, const CamacResult&) = default;
 };
 

@@ -1,44 +1,6 @@
 #include "api/request.h"
 
-#include <array>
-
 namespace bushd::api {
-namespace {
-
-// In the order of the variant.
-constexpr std::array<std::string_view, std::variant_size_v<Request::variant>> kNames = {
-    "move",
-    "stop",
-    "emergency stop",
-    "enable",
-    "disable",
-    "set position",
-    "clear faults",
-    "use table",
-    "reload tables",
-    "home",
-    "arm",
-    "disarm",
-    "position compare",
-    "list tables",
-    "get table",
-    "set table",
-    "confirm",
-    "get history",
-    "configure",
-    "jog",
-    "pause",
-    "resume",
-    "hold",
-    "release",
-    "move line",
-    "camac",
-    "move path",
-    "follow",
-    "arm line"};
-
-}  // namespace
-
 Request::Request() = default;
 Request::Request(const Request&) = default;
 Request::Request(Request&&) noexcept = default;
@@ -47,7 +9,8 @@ Request& Request::operator=(Request&&) noexcept = default;
 Request::~Request() = default;
 
 std::string_view name_of(const Request& request) {
-  return kNames[request.index()];
+  return std::visit([](const auto& content) { return std::decay_t<decltype(content)>::kName; },
+                    request);
 }
 
 bool ends_motion(const Request& request) {

@@ -14,124 +14,43 @@
 #include <variant>
 #include <vector>
 
+#include "api/move_requests.h"
 #include "api/words.h"
+#include "base/fields.h"
 #include "heritage/camac/naf.h"
 #include "tables/table.h"
 
 namespace bushd::api {
 
-struct MotorAmount {
-  std::string motor{};
-  Amount amount{};
-  friend bool operator==(const MotorAmount&, const MotorAmount&) = default;
-};
-
-using MotorNames = std::vector<std::string>;
-
-// One group move: the motors of one bus start in the same tick. A motor that moves is given a new
-// target; its part in the move before ends with kStopped.
-// Result: the worst outcome of its motors, and one MotorResult each. Refused as a whole if one
-// motor cannot move.
-struct Move {
-  enum class Kind {
-    kRelative,  // by so much, of a motor that moves from the target that it was given
-    kAbsolute   // to this position
-  };
-  Kind kind = Kind::kRelative;
-  std::vector<MotorAmount> motors{};  // at least one, none twice
-  bool dry_run = false;          // from rest only: result kDone with a MovePlan, and nothing moves
-  std::optional<Speed> speed{};  // none: as fast as the motors' tables and max_speed allow
-};
-
-// Motors of one bus move along a straight line: at any moment each has made the same share of its
-// way, as nearly as steps allow, and no motor steps faster than its table allows. A motor with
-// backlash that comes from the wrong side makes its last approach, on a line too, when all have
-// arrived. The same motors, while they move, may be given an end of the same line that is nearer,
-// or another speed. Stops, pauses and limits of one of them ramp all down along the line.
-// Result: as of Move; the reason names the motor that limits the line, and how far motors are off
-// it.
-struct MoveLine {
-  Move::Kind kind = Move::Kind::kRelative;
-  std::vector<MotorAmount> motors{};   // at least one, at most kMostMotors, none twice
-  bool dry_run = false;                // from rest only: result kDone with a MovePlan
-  std::optional<Speed> speed{};        // no motor exceeds it; none: as fast as tables allow
-  std::optional<double> duration_s{};  // not shorter than this; refused if it cannot be so slow
-  // Of CAMAC modules, no front end tells it: what a motor that is alone moves by, in place of its
-  // own table. Its MCU need not have it, and ramps the motor down by the own one when the link is
-  // lost; so no delay of this move may be shorter than any of that.
-  tables::TablePtr by = {};
-
-  static constexpr std::size_t kMostMotors = 127;
-};
-
-// Motors of one bus move from where they stand to the first of these points and on from point to
-// point, along straight lines and by one run. Points may come in several requests of a client, one
-// after the other: each but the last has kDone as its result as soon as it is taken, and the last
-// one begins the motion. The first one drops what the client has not finished. Motors make no last
-// approach for backlash. Stops, pauses and limits of one of them ramp all down along the path.
-// Result: as of MoveLine.
-struct MovePath {
-  enum class Corners {
-    kContinuous,  // passed at speeds at which no motor jumps by more than it starts with from rest
-    kExact        // rest at each point
-  };
-  MotorNames motors{};         // at least one, at most MoveLine::kMostMotors, none twice
-  std::int32_t rows = 0;       // points of the whole path, 1..kMostRows
-  std::int32_t first_row = 0;  // of this request; as many as have been taken before
-  std::vector<double>
-      positions{};  // of all motors, row by row, in their units; not above kMostValues
-  // Of a single motor only: its speed is not exceeded on the way to that row; 0: as below. None, or
-  // as many as rows.
-  std::vector<double> speeds{};
-  Corners corners = Corners::kContinuous;
-  bool dry_run = false;          // result kDone with a MovePlan
-  std::optional<Speed> speed{};  // no motor exceeds it; none: as fast as tables allow
-
-  static constexpr std::int32_t kMostRows = 100'000;
-  static constexpr std::size_t kMostValues = 4096;
-};
-
-// Motors of one bus, at rest, follow positions in time. The rows of an array come in parts, each
-// a request of its own, which is answered when the array has been checked as far as it is known:
-// kDone if all of its motors can follow it, with a MovePlan after the last row, otherwise kFault,
-// and the array is dropped. The first row is where the motors stand. kRun begins the motion.
-// Further rows may be told while it runs; an array that comes to its end in motion, or without its
-// last row, ramps its motors down by their tables.
-// Result of kRun: as of Move.
-struct Follow {
-  enum class Part { kRows, kLastRows, kRun };
-  static constexpr std::size_t kMostMotors = 127;
-  static constexpr std::size_t kMostRows = 100'000;       // of an array
-  static constexpr std::size_t kMostNumbers = 1'000'000;  // positions of an array
-
-  Part part = Part::kRows;
-  std::int64_t array = 0;  // its number, the client's own
-  // Of all parts alike:
-  MotorNames motors{};  // at least one, none twice
-  bool cubic = false;   // between rows; else linear
-  double stretch = 1;   // all times are so many times as long, 0.001..1000
-  // Of kRows and kLastRows:
-  std::vector<double> time_s{};     // each later than the one before, below 10^8
-  std::vector<double> positions{};  // user units, row by row: one for each motor
-};
-
 // Ramps these motors down; none named: all. Result kDone once they stand. Also disarms, and ends
 // homing. Never refused, but for an unknown motor.
 struct Stop {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "stop";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 
 // Stops all motors of all buses as the configuration says (StopMode), and latches the stop in every
 // MCU until ClearFaults. Never refused. Result kDone once all MCUs that are online stand.
-struct EmergencyStop {};
+struct EmergencyStop {
+  static constexpr std::string_view kName = "emergency stop";
+  static void fields(auto& /*self*/, auto& /*visit*/) {}
+};
 
 // Drivers of the MCUs of these motors on or off; none named: of all. Disable is refused while one
 // of them moves.
 struct Enable {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "enable";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 struct Disable {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "disable";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 
 // Says where these motors, at rest, stand. In user units, of a motor that has a unit: changes the
@@ -140,11 +59,20 @@ struct Disable {
 struct SetPosition {
   std::vector<MotorAmount> motors{};  // at least one
   bool dial = false;                  // user units are those of the dial
+
+  static constexpr std::string_view kName = "set position";
+  static void fields(auto& self, auto& visit) {
+    visit("dial", self.dial);
+    names_fields(self, visit);
+  }
 };
 
 // Clears latched faults of the MCUs of these motors, none named: of all. Refused while one moves.
 struct ClearFaults {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "clear faults";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 
 // Gives the group another table from its next move on, as soon as its MCUs stand. A later request
@@ -152,17 +80,33 @@ struct ClearFaults {
 struct UseTable {
   std::string group{};
   std::string table{};  // NAME, NAME@REVISION or NAME@TAG
+
+  static constexpr std::string_view kName = "use table";
+  static void fields(auto& self, auto& visit) {
+    visit("group", self.group);
+    visit("table", self.table);
+  }
 };
 
 // Reads all groups' tables again. Result kFault if the table of a group was bad and the old one
 // stays.
-struct ReloadTables {};
+struct ReloadTables {
+  static constexpr std::string_view kName = "reload tables";
+  static void fields(auto& /*self*/, auto& /*visit*/) {}
+};
 
 // Motors, at rest, look for their switches, those of one MCU one after the other.
 struct Home {
   MotorNames motors{};           // at least one, each with `home` in the configuration
   std::optional<Speed> speed{};  // of the fast approach
   bool all = false;              // all motors with `home`, by its order; none is named then
+
+  static constexpr std::string_view kName = "home";
+  static void fields(auto& self, auto& visit) {
+    speed_fields(self.speed, visit);
+    names_fields(self, visit);
+    visit("all", self.all);
+  }
 };
 
 // Motors, at rest, wait for an edge at the trigger input of their MCU and begin together after it.
@@ -173,6 +117,15 @@ struct Arm {
   std::optional<Speed> speed{};
   // They wait no more as soon as the client has gone; its transport has to tell that.
   bool while_connected = false;
+
+  static constexpr std::string_view kName = "arm";
+  static void fields(auto& self, auto& visit) {
+    visit("edge", self.edge, kEdge);
+    visit("delay_us", self.delay_us);
+    speed_fields(self.speed, visit);
+    visit("while_connected", self.while_connected);
+    names_fields(self, visit);
+  }
 };
 
 // Motors of one bus, at rest, wait for an edge at the trigger inputs of their MCUs and begin a line
@@ -187,11 +140,36 @@ struct ArmLine {
   std::optional<Speed> speed{};        // as of MoveLine
   std::optional<double> duration_s{};  // as of MoveLine
   bool while_connected = false;        // as of Arm
+
+  static constexpr std::string_view kName = "arm line";
+  static void fields(auto& self, auto& visit) {
+    visit("edge", self.edge, kEdge);
+    visit("delay_us", self.delay_us);
+    visit("kind", self.kind, Move::kKind);
+    speed_fields(self.speed, visit);
+    visit("duration_s", self.duration_s, kNoDuration);
+    visit("while_connected", self.while_connected);
+    names_fields(self, visit);
+  }
 };
 
 // Motors that wait for the trigger do so no more, nor do those armed with them; none named: all.
 struct Disarm {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "disarm";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
+};
+
+// Directions as a sum of bits.
+struct AsBits {
+  static std::int8_t told(Directions directions) {
+    return static_cast<std::int8_t>((directions.positive ? 1 : 0) | (directions.negative ? 2 : 0));
+  }
+  static bool taken(std::int8_t told, Directions& directions) {
+    directions = {.positive = (told & 1) != 0, .negative = (told & 2) != 0};
+    return (told & ~3) == 0;
+  }
 };
 
 // The position compare output of the motor's MCU pulses when the motor arrives at the position.
@@ -201,14 +179,31 @@ struct PositionCompare {
   Directions arrivals{};      // on the dial, by steps in these directions; none: no pulses any more
   std::int64_t delay_us = 0;  // from the step to the pulse, 0..1500000
   std::int64_t width_us = 0;  // of the pulse, 1..1000000; of no meaning without arrivals
+
+  static constexpr std::string_view kName = "position compare";
+  static void fields(auto& self, auto& visit) {
+    MotorAmount position{self.motor, self.position};
+    visit("position", position);
+    visit.set(self.motor, position.motor);
+    visit.set(self.position, position.amount);
+    visit("arrivals", self.arrivals, AsBits{});
+    visit("delay_us", self.delay_us);
+    visit("width_us", self.width_us);
+  }
 };
 
 // Result: TableList.
-struct ListTables {};
+struct ListTables {
+  static constexpr std::string_view kName = "list tables";
+  static void fields(auto& /*self*/, auto& /*visit*/) {}
+};
 
 // Result: tables::TableContent as its file says.
 struct GetTable {
   std::string table{};  // NAME, NAME@REVISION or NAME@TAG
+
+  static constexpr std::string_view kName = "get table";
+  static void fields(auto& self, auto& visit) { visit("table", self.table); }
 };
 
 // A new revision of a table file, or a new one; puts nothing in service. A file that has the
@@ -219,17 +214,33 @@ struct SetTable {
   // Of the table that this one was made from, as GetTable told it (its revision is in the content);
   // if the table is another by now it is left alone. "": the table is new.
   std::string expected_hash{};
+
+  static constexpr std::string_view kName = "set table";
+  static void fields(auto& self, auto& visit) {
+    visit("table", self.table);
+    visit("expected_hash", self.expected_hash);
+    visit("content", self.content);
+  }
 };
 
 // The positions of these motors, at rest, are right as their MCUs count them: they are known.
 struct Confirm {
   MotorNames motors{};  // at least one
+
+  static constexpr std::string_view kName = "confirm";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 
 // What has moved a motor, the newest first. Refused without a state store. Result: MotionHistory.
 struct GetHistory {
   std::string motor{};
   std::int32_t most = 20;  // 1..1000
+
+  static constexpr std::string_view kName = "get history";
+  static void fields(auto& self, auto& visit) {
+    visit("motor", self.motor);
+    visit("most", self.most);
+  }
 };
 
 // Keys of motors that may be changed in operation (config/setting.h). Their values are
@@ -251,6 +262,16 @@ struct Configure {
   MotorNames motors{};            // of kShow; none named: all
   std::vector<Change> changes{};  // of the others
   std::string file_sha256{};
+
+  static constexpr std::string_view kName = "configure";
+  static void fields(auto& self, auto& visit) {
+    visit("kind", self.kind, fields::OneOf<3>{});
+    names_fields(self, visit);
+    visit.columns("change_count", self.changes, fields::Column{"change_motors", &Change::motor},
+                  fields::Column{"change_keys", &Change::key},
+                  fields::Column{"change_values", &Change::value});
+    visit("file_sha256", self.file_sha256);
+  }
 };
 
 // A motor moves on at a speed, up to its soft limit, for as long as its client keeps it going. The
@@ -272,6 +293,16 @@ struct Jog {
   // With speed 0: not as soon as possible, but so many steps after where the motor is now.
   // 0..2^31-1
   std::optional<std::int64_t> steps_after{};
+
+  static constexpr std::string_view kName = "jog";
+  static void fields(auto& self, auto& visit) {
+    visit("motor", self.motor);
+    visit("speed", self.per_s);
+    visit("speed_in_steps", self.in_steps);
+    visit("keepalive_ms", self.keepalive_ms);
+    visit("renew", self.renew);
+    visit("steps_after", self.steps_after, fields::NoneIs<std::int64_t>{-1});
+  }
 };
 
 // These motors, or those of these groups, which move ramp down and keep their targets: their moves
@@ -279,18 +310,30 @@ struct Jog {
 // and what waits for the trigger are left alone.
 struct Pause {
   MotorNames motors{};  // and groups, as of the three below
+
+  static constexpr std::string_view kName = "pause";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 // Those that are paused go on to their targets. Refused as a whole if one of them may not move.
 struct Resume {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "resume";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 // No motion of these motors begins, and none goes on that is paused, until they are released. What
 // is under way goes on.
 struct Hold {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "hold";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 struct Release {
   MotorNames motors{};
+
+  static constexpr std::string_view kName = "release";
+  static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 
 // Cycles of a CAMAC crate of the configuration, at once. Result: CamacResult.
@@ -299,6 +342,12 @@ struct Camac {
 
   std::int32_t crate = 1;
   camac::Block block{};  // stations 1..31, subaddresses 0..15, functions 0..31, 24 bits of data
+
+  static constexpr std::string_view kName = "camac";
+  static void fields(auto& self, auto& visit) {
+    visit("crate", self.crate);
+    camac::Block::fields(self.block, visit);
+  }
 };
 
 struct Request

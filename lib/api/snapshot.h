@@ -3,6 +3,8 @@
 // packet.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,6 +16,16 @@
 #include "base/units/coordinates.h"
 
 namespace bushd::api {
+
+// Microseconds as seconds.
+struct InSeconds {
+  static double told(std::int64_t us) { return static_cast<double>(us) * 1e-6; }
+  // What hostile numbers make of it need only be some number.
+  static bool taken(double told, std::int64_t& us) {
+    us = std::isnan(told) ? 0 : std::llround(std::clamp(told, 0.0, 1e9) * 1e6);
+    return true;
+  }
+};
 
 struct MotorState {
   std::string name{};
@@ -42,9 +54,39 @@ struct MotorState {
   struct Line {
     double fraction = 0;
     std::int64_t left_us = 0;
+    static void fields(auto& self, auto& visit) {
+      visit("line_fraction", self.fraction);
+      visit("line_left_s", self.left_us, InSeconds{});
+    }
     friend bool operator==(const Line&, const Line&) = default;
   };
   std::optional<Line> line{};
+  static void fields(auto& self, auto& visit) {
+    bool on_line = self.line.has_value();
+    Line line_now = self.line.value_or(Line{});
+    visit("name", self.name);
+    visit("position_steps", self.position_steps);
+    visit("user_position", self.user);
+    visit("dial_position", self.dial);
+    visit("target_steps", self.target_steps);
+    visit("user_target", self.user_target);
+    visit("velocity_steps_per_s", self.velocity_steps_per_s);
+    visit("moving", self.moving);
+    visit("activity", self.activity, fields::Word{activity_of});
+    visit("enabled", self.enabled);
+    visit("input", self.input);
+    visit("inputs", self.inputs);
+    visit("inhibited", self.inhibited, fields::Word{directions_of});
+    visit("trust", self.trust, fields::Word{trust_of});
+    visit("uncertain_reason", self.uncertain_reason);
+    visit("heard_utime_us", self.heard_utime_us, fields::NoneIs<std::int64_t>{0});
+    visit("paused", self.paused);
+    visit("held", self.held);
+    visit("armed_by", self.armed_by);
+    visit("on_line", on_line);
+    Line::fields(line_now, visit);
+    visit.set(self.line, on_line ? std::optional(line_now) : std::nullopt);
+  }
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 
@@ -58,9 +100,48 @@ struct StateSnapshot {
   std::string inputs{};   // active ones: of emergency, forward, reverse, trigger, blanks between
   std::int32_t boot = 0;  // its boot number; 0 until it was heard
   std::int64_t tick = 0;  // bus tick of the report behind this
-  std::vector<MotorState> motors{};  // by output
+  std::vector<MotorState> motors{};   // by output
+  static void fields(auto& self, auto& visit) {
+    visit("bus", self.bus);
+    visit("mcu", self.mcu);
+    visit("state", self.state, fields::Word{mcu_state_of});
+    visit("detail", self.detail);
+    visit("inputs", self.inputs);
+    visit("boot_number", self.boot);
+    visit("tick", self.tick);
+    visit.list("motor_count", "motors", self.motors);
+  }
   friend bool operator==(const StateSnapshot&, const StateSnapshot&) = default;
 };
+
+// A scale and soft limits as they are told: the limits on both scales, for clients that only show
+// them.
+struct ToldScale {
+  std::string unit{};
+  std::string steps_per_unit{};  // exact: "320" or "1/3"
+  bool negative = false;
+  double offset = 0;
+  std::int8_t precision = 0;
+  bool soft_limits = false;
+  units::SoftLimits dial{};
+  units::SoftLimits user{};
+  static void fields(auto& self, auto& visit) {
+    visit("unit", self.unit);
+    visit("steps_per_unit", self.steps_per_unit);
+    visit("negative", self.negative);
+    visit("offset", self.offset);
+    visit("precision", self.precision);
+    visit("soft_limits", self.soft_limits);
+    visit("dial_low", self.dial.low);
+    visit("dial_high", self.dial.high);
+    visit("user_low", self.user.low);
+    visit("user_high", self.user.high);
+  }
+  bool is_good() const;
+  units::Scale scale() const;  // of one that is not good: any
+  std::optional<units::SoftLimits> limits() const;
+};
+ToldScale told_scale(const units::Scale& scale, const std::optional<units::SoftLimits>& limits);
 
 struct MotorDescription {
   std::string name{};
@@ -70,6 +151,18 @@ struct MotorDescription {
   std::string text{};    // what people call it; may be empty
   units::Scale scale{};  // with the number of decimals
   std::optional<units::SoftLimits> soft_limits{};
+  static void fields(auto& self, auto& visit) {
+    ToldScale scale = told_scale(self.scale, self.soft_limits);
+    visit("name", self.name);
+    visit("output", self.output, fields::As<std::int16_t>{});
+    visit("group", self.group);
+    visit("table", self.table);
+    visit("description", self.text);
+    ToldScale::fields(scale, visit);
+    visit.require(scale.is_good());
+    visit.set(self.scale, scale.scale());
+    visit.set(self.soft_limits, scale.limits());
+  }
   friend bool operator==(const MotorDescription&, const MotorDescription&) = default;
 };
 
@@ -83,6 +176,15 @@ struct Description {
   std::vector<MotorDescription> motors{};  // by output
   // Else axes that are computed from motors.
   bool is_mcu() const { return address != 0; }
+  static void fields(auto& self, auto& visit) {
+    visit("bus", self.bus);
+    visit("mcu", self.mcu);
+    visit("address", self.address);
+    visit("tick_ns", self.tick_ns);
+    visit("emergency_stop", self.emergency_stop, fields::Word{stop_mode_of});
+    visit("port", self.port);
+    visit.list("motor_count", "motors", self.motors);
+  }
   friend bool operator==(const Description&, const Description&) = default;
 };
 
@@ -106,6 +208,26 @@ struct McuHealth {
   double rate_ppm = 0;
   double clock_offset_us = 0;
   bool two_masters = false;
+  static void fields(auto& self, auto& visit) {
+    visit("mcu", self.mcu);
+    visit("address", self.address);
+    visit("unique_id", self.unique_id);
+    visit("firmware_version", self.firmware_version);
+    visit("boot_number", self.boot);
+    visit("reset_cause", self.reset_cause);
+    visit("current", self.current);
+    visit("crc_errors", self.crc_errors);
+    visit("rejected_frames", self.rejected_frames);
+    visit("ramp_downs", self.ramp_downs);
+    visit("timeouts", self.timeouts);
+    visit("repeats", self.repeats);
+    visit("missed_ticks", self.missed_ticks);
+    visit("restarts", self.restarts);
+    visit("low_water_ticks", self.low_water_ticks, fields::NoneIs<std::int32_t>{-1});
+    visit("rate_ppm", self.rate_ppm);
+    visit("clock_offset_us", self.clock_offset_us);
+    visit("two_masters", self.two_masters);
+  }
 };
 
 // One bus and its MCUs.
@@ -122,6 +244,18 @@ struct HealthSnapshot {
   std::int64_t recent_latency_us = 0;
   std::vector<Latency> latency{};
   std::vector<McuHealth> mcus{};
+  static void fields(auto& self, auto& visit) {
+    visit("bus", self.bus);
+    visit("port_state", self.port_state);
+    visit("two_masters", self.two_masters);
+    visit("crc_errors", self.crc_errors);
+    visit("stray_frames", self.stray_frames);
+    visit("recent_latency_us", self.recent_latency_us);
+    visit.columns("latency_count", self.latency,
+                  fields::Column{"latency_below_us", &Latency::below_us},
+                  fields::Column{"latency_answers", &Latency::answers});
+    visit.list("mcu_count", "mcus", self.mcus);
+  }
 };
 
 // Stations of a CAMAC crate have raised L.
@@ -130,6 +264,12 @@ struct CamacLam {
   std::uint32_t raised = 0;    // bit n - 1: station n, just now
   std::uint32_t requests = 0;  // all that raise it
   bool demand = false;         // somebody has enabled the crate's demand
+  static void fields(auto& self, auto& visit) {
+    visit("crate", self.crate);
+    visit("raised", self.raised);
+    visit("requests", self.requests);
+    visit("demand", self.demand);
+  }
   friend bool operator==(const CamacLam&, const CamacLam&) = default;
 };
 

@@ -21,6 +21,7 @@ using words::activity_of;
 using words::directions_of;
 using words::mcu_state_of;
 using words::outcome_of;
+using words::stop_mode_of;
 using words::trust_of;
 using words::word;
 

@@ -16,7 +16,7 @@ class LcmLink : public Link {
 
   Result<void> listen() {
     for (const std::string_view channel : lcm::daemon_channels()) {
-      const auto listening = transport_->subscribe_bytes(
+      const auto listening = transport_->subscribe(
           prefix_ + "_" + std::string(channel),
           [this, channel](lcm::Payload payload) {
             // Anybody may send anything.
@@ -31,7 +31,7 @@ class LcmLink : public Link {
 
   int fd() const override { return transport_->fd(); }
   Result<void> send(const lcm::Packet& packet) override {
-    return transport_->publish_bytes(prefix_ + "_" + packet.channel, packet.payload);
+    return transport_->publish(prefix_ + "_" + packet.channel, packet.payload);
   }
   Result<void> handle(const Handler& handler) override {
     handler_ = &handler;

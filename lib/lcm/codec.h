@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "api/reply.h"
@@ -31,32 +32,53 @@ struct RequestId {
   std::int64_t session = 0;
   std::string client_id{};
   std::int64_t number = 0;
+  static void fields(auto& self, auto& visit) {
+    visit("session", self.session);
+    visit("client_id", self.client_id);
+    visit("number", self.number);
+  }
   friend bool operator==(const RequestId&, const RequestId&) = default;
 };
 
 struct Hello {
   std::string client_id{};
   std::int64_t nonce = 0;
+  static void fields(auto& self, auto& visit) {
+    visit("client_id", self.client_id);
+    visit("nonce", self.nonce);
+  }
 };
 struct Welcome {
   Hello hello;
   std::int64_t run = 0;
   std::int64_t session = 0;
+  static void fields(auto& self, auto& visit) {
+    visit("run", self.run);
+    Hello::fields(self.hello, visit);
+    visit("session", self.session);
+  }
 };
 // What a connection of the control socket hears without asking.
 struct Subscription {
   bool state = false;
   bool description = false;
   bool health = false;
+  static void fields(auto& self, auto& visit) {
+    visit("state", self.state);
+    visit("description", self.description);
+    visit("health", self.health);
+  }
 };
 // Description, state and health of everything, at once.
-struct GetStatus {};
+struct GetStatus {
+  static void fields(auto& /*self*/, auto& /*visit*/) {}
+};
 
-// All that a client may say, in the order of `kClientChannels`.
+// All that a client may say.
 struct ClientMessage {
   RequestId id;               // of a request, or of GetStatus
   std::int64_t utime_us = 0;  // of a request: the client's clock, the same in each repetition
-  std::variant<Hello, Subscription, GetStatus, api::Request> content;
+  std::variant<Hello, Subscription, GetStatus, api::Request> content{};
 };
 
 // Channels that clients speak on, and those of them on which comes what ends motion
@@ -84,10 +106,17 @@ bushd::Result<Packet> encode(std::int64_t utime_us, const Welcome& welcome);
 // Which one of the snapshots that together are the whole.
 struct Part {
   std::int64_t utime_us = 0;  // of the daemon's clock
-  std::int64_t run = 0;       // of the daemon; 0 with health
+  std::int64_t run = 0;       // of the daemon
   std::int64_t sequence = 0;  // of the message
   std::int32_t part = 0;
   std::int32_t parts = 1;
+  static void fields(auto& self, auto& visit) {
+    visit("utime_us", self.utime_us);
+    visit("run", self.run);
+    visit("sequence", self.sequence);
+    visit("part", self.part);
+    visit("parts", self.parts);
+  }
 };
 bushd::Result<Packet> encode(const Part& part, std::int64_t dropped_messages,
                              const api::StateSnapshot& state);
@@ -112,20 +141,39 @@ class ReplyParts {
  private:
   std::map<std::int32_t, api::Reply> parts_;
 };
-template <class Snapshot>
+template <class Snapshot>  // or a reference to one
 struct SnapshotMessage {
+  using Value = SnapshotMessage<std::remove_cvref_t<Snapshot>>;
   Part part;
   Snapshot snapshot;
+  static void fields(auto& self, auto& visit) {
+    Part::fields(self.part, visit);
+    std::remove_cvref_t<Snapshot>::fields(self.snapshot, visit);
+  }
 };
-struct StateMessage : SnapshotMessage<api::StateSnapshot> {
+template <class Snapshot>
+struct StateMessageOf {
+  using Value = StateMessageOf<std::remove_cvref_t<Snapshot>>;
+  Part part;
   std::int64_t dropped_messages = 0;
+  Snapshot snapshot;
+  static void fields(auto& self, auto& visit) {
+    Part::fields(self.part, visit);
+    visit("dropped_messages", self.dropped_messages);
+    std::remove_cvref_t<Snapshot>::fields(self.snapshot, visit);
+  }
 };
+using StateMessage = StateMessageOf<api::StateSnapshot>;
 using DescriptionMessage = SnapshotMessage<api::Description>;
 using HealthMessage = SnapshotMessage<api::HealthSnapshot>;
 
 struct CamacLamMessage {
   std::int64_t utime_us = 0;
   api::CamacLam lam;
+  static void fields(auto& self, auto& visit) {
+    visit("utime_us", self.utime_us);
+    api::CamacLam::fields(self.lam, visit);
+  }
 };
 
 // All that the daemon may say.

@@ -141,7 +141,7 @@ void Transport::on_message(const lcm_recv_buf_t* buffer, const char*, void* subs
   }
 }
 
-Result<void> Transport::subscribe_bytes(const std::string& channel, BytesHandler handler,
+Result<void> Transport::subscribe(const std::string& channel, BytesHandler handler,
                                         int queue_capacity) {
   if (auto checked = check_channel(channel); !checked) return checked;
   auto subscription = std::make_unique<Subscription>(Subscription{this, std::move(handler)});
@@ -154,7 +154,7 @@ Result<void> Transport::subscribe_bytes(const std::string& channel, BytesHandler
   return {};
 }
 
-Result<void> Transport::publish_bytes(const std::string& channel,
+Result<void> Transport::publish(const std::string& channel,
                                       std::span<const std::uint8_t> bytes) {
   if (auto checked = check_channel(channel); !checked) return checked;
   if (lcm_publish(lcm_, channel.c_str(), bytes.data(), static_cast<unsigned>(bytes.size())) != 0) {

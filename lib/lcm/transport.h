@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "base/result.h"
-#include "lcm/wire.h"
 
 // LCM's own handle, so that its headers stay out of here.
 typedef struct _lcm_t lcm_t;
@@ -51,39 +50,18 @@ class Transport {
   // library was left in order. Not to be called from a handler.
   void handle(std::size_t max_bytes = SIZE_MAX);
 
-  // `handler` is called from handle() for every valid message on exactly this channel, for as long
-  // as this object lives: there is no unsubscribing, which within a handler would corrupt LCM's
-  // memory.
-  template <class T>
-  Result<void> subscribe(const std::string& channel, std::function<void(const T&)> handler) {
-    return subscribe_bytes(channel, [this, handler = std::move(handler)](auto payload) {
-      if (const auto message = decode<T>(payload)) {
-        handler(*message);
-      } else {
-        ++rejected_;
-      }
-    });
-  }
-
-  // Fails as encode() does, when the channel's name is too long, or when the network is gone.
-  template <class T>
-  Result<void> publish(const std::string& channel, const T& message) {
-    const auto bytes = encode(message);
-    if (!bytes) return fail(bytes.error());
-    return publish_bytes(channel, *bytes);
-  }
-
-  // The same with payloads as they are. `handler` has to survive any of them.
+  // `handler` is called from handle() for every payload on exactly this channel, whatever it is, for
+  // as long as this object lives: there is no unsubscribing, which within a handler would corrupt
+  // LCM's memory.
   using BytesHandler = std::function<void(std::span<const std::uint8_t>)>;
-  Result<void> subscribe_bytes(const std::string& channel, BytesHandler handler,
-                               int queue_capacity = kQueueCapacity);
-  Result<void> publish_bytes(const std::string& channel, std::span<const std::uint8_t> bytes);
+  Result<void> subscribe(const std::string& channel, BytesHandler handler,
+                         int queue_capacity = kQueueCapacity);
+
+  // Fails when the channel's name is too long, or when the network is gone.
+  Result<void> publish(const std::string& channel, std::span<const std::uint8_t> bytes);
 
   // When the message that a handler is called for came to this machine, in microseconds since 1970.
   std::int64_t received_utime_us() const { return received_utime_us_; }
-
-  // Payloads on subscribed channels that were no message of the channel's type.
-  std::uint64_t rejected() const { return rejected_; }
 
  private:
   struct Subscription {
@@ -97,7 +75,6 @@ class Transport {
   lcm_t* lcm_;
   int fd_;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;  // LCM holds pointers to them
-  std::uint64_t rejected_ = 0;
   std::exception_ptr thrown_;
   std::size_t handled_bytes_ = 0;  // by this call of handle()
   std::int64_t received_utime_us_ = 0;

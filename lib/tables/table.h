@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/fields.h"
 #include "base/result.h"
 #include "engine/table.h"
 
@@ -30,6 +31,27 @@ struct TableContent {
   std::optional<std::uint16_t> cruise{};              // none: the last of accel
   std::string description{};
   std::uint32_t revision = 0;  // counted by bushtab from 1; 0: none
+  // What no file can say becomes 0, which check() names. (How fields are declared: base/fields.h.)
+  static void fields(auto& self, auto& visit) {
+    constexpr fields::OrZero<std::int32_t> kCode{65535};
+    std::uint16_t cruise_code = self.cruise.value_or(0);
+    std::int32_t cruise_told = cruise_code;
+    std::vector<std::uint16_t> decel_codes = self.decel.value_or(std::vector<std::uint16_t>{});
+    std::string hash = hash_told(self);
+    visit("name", self.name);
+    visit("description", self.description);
+    visit("revision", self.revision, fields::OrZero<std::int32_t>{INT32_MAX});
+    visit("hash", hash);
+    visit("time_unit_ns", self.time_unit_ns, fields::OrZero<std::int64_t>{kMaxTimeUnitNs});
+    visit("cruise", cruise_told);
+    visit.list("accel_count", "accel", self.accel, kCode);
+    visit.list("decel_count", "decel", decel_codes, kCode);
+    kCode.taken(cruise_told, cruise_code);
+    visit.set(self.cruise, cruise_told == 0 ? std::optional<std::uint16_t>{} : cruise_code);
+    visit.set(self.decel, decel_codes.empty() ? std::optional<std::vector<std::uint16_t>>{}
+                                              : std::optional(std::move(decel_codes)));
+  }
+  static std::string hash_told(const TableContent& content);  // "" where it is no table
   friend bool operator==(const TableContent&, const TableContent&) = default;
 };
 

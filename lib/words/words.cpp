@@ -105,6 +105,9 @@ std::optional<Trust> trust_of(std::string_view word) {
 std::optional<McuState> mcu_state_of(std::string_view word) {
   return find_value(kMcuStates, word);
 }
+std::optional<StopMode> stop_mode_of(std::string_view word) {
+  return find_value(kStopModes, word);
+}
 std::optional<Directions> directions_of(std::string_view word) {
   return find_value(kDirections, word);
 }

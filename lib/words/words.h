@@ -71,6 +71,7 @@ std::optional<Outcome> outcome_of(std::string_view word);
 std::optional<Activity> activity_of(std::string_view word);
 std::optional<Trust> trust_of(std::string_view word);
 std::optional<McuState> mcu_state_of(std::string_view word);
+std::optional<StopMode> stop_mode_of(std::string_view word);
 std::optional<Directions> directions_of(std::string_view word);
 
 }  // namespace bushd::words

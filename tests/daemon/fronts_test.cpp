@@ -74,7 +74,7 @@ class LcmFrontTest : public FrontsTest {
     transport_ = std::move(*lcm::Transport::open("memq://"));
     open(true);
     for (const std::string_view channel : lcm::daemon_channels()) {
-      EXPECT_TRUE(transport_->subscribe_bytes(
+      EXPECT_TRUE(transport_->subscribe(
           "LAB_" + std::string(channel), [this, channel](lcm::Payload payload) {
             heard_.push_back(*lcm::decode_daemon_message(channel, payload));
           }));
@@ -96,7 +96,7 @@ class LcmFrontTest : public FrontsTest {
     }
   }
   void say(const Result<lcm::Packet>& packet) {
-    EXPECT_TRUE(transport_->publish_bytes("LAB_" + packet->channel, packet->payload));
+    EXPECT_TRUE(transport_->publish("LAB_" + packet->channel, packet->payload));
     settle();
   }
   std::int64_t session(const std::string& client_id, std::int64_t nonce = 1) {
@@ -196,7 +196,7 @@ TEST_F(LcmFrontTest, AMoveThatCameBeforeAStopIsAfterNoneThoughItIsReadLater) {
   const auto say_on = [](lcm::Transport& transport, const lcm::RequestId& id,
                          const api::Request& request) {
     const auto packet = lcm::encode(1, id, request);
-    EXPECT_TRUE(transport.publish_bytes("OTHER_" + packet->channel, packet->payload));
+    EXPECT_TRUE(transport.publish("OTHER_" + packet->channel, packet->payload));
   };
   say_on(*transport_, {.client_id = "a", .number = 2}, api::Request(api::ListTables{}));
   say_on(*stops, {.client_id = "b", .number = 1}, jog(0));
@@ -224,7 +224,7 @@ TEST_F(LcmFrontTest, AJogDoesNotOvertakeWhatItsSessionAskedForBefore) {
   const auto say_other = [&](const lcm::Packet& packet, bool on_both = false) {
     for (lcm::Transport* to : {transport_.get(), stops.get()}) {
       if (to == stops.get() && !on_both) continue;
-      EXPECT_TRUE(to->publish_bytes("OTHER_" + packet.channel, packet.payload));
+      EXPECT_TRUE(to->publish("OTHER_" + packet.channel, packet.payload));
     }
   };
   const auto carry_out = [&] {
@@ -256,7 +256,7 @@ TEST_F(LcmFrontTest, AJogDoesNotOvertakeWhatItsSessionAskedForBefore) {
 }
 
 TEST_F(LcmFrontTest, WhatIsNoMessageIsCounted) {
-  EXPECT_TRUE(transport_->publish_bytes("LAB_MOVE", std::vector<std::uint8_t>(20, 0xFF)));
+  EXPECT_TRUE(transport_->publish("LAB_MOVE", std::vector<std::uint8_t>(20, 0xFF)));
   settle();
   say(lcm::encode(0, {.client_id = "two words"}, api::Request(api::Stop{})));
   say(lcm::encode(0, lcm::Hello{.client_id = "", .nonce = 1}));

@@ -22,7 +22,7 @@ class LcmWatchTest : public testing::Test {
   // One who has this run describes itself at this time.
   void describe(std::int64_t run, std::int64_t now_us) {
     const auto packet = lcm::encode({.run = run}, api::Description{.bus = "ha\x1bll"});
-    EXPECT_TRUE(transport_->publish_bytes("LAB_" + packet->channel, packet->payload));
+    EXPECT_TRUE(transport_->publish("LAB_" + packet->channel, packet->payload));
     front_.handle();
     watch_.step(now_us);
   }

@@ -7,8 +7,10 @@
 #include <filesystem>
 #include <functional>
 
+#include "bushd/set_table_t.hpp"
+#include "bushd/table_answer_t.hpp"
 #include "lcm/codec.h"
-#include "lcm/table_codec.h"
+#include "lcm/oracle.h"
 #include "tables/store/store.h"
 #include "tables/temp_directory.h"
 
@@ -36,8 +38,13 @@ class TableService : public testing::Test {
   }
   // By way of the message, as clients send it.
   static api::Request set(const std::string& name, const table_t& table) {
-    return api::SetTable{
-        .table = name, .content = lcm::content_of(table), .expected_hash = table.hash};
+    set_table_t message{};
+    message.table = name;
+    message.expected_hash = table.hash;
+    message.content = table;
+    message.content.accel_count = static_cast<std::int32_t>(table.accel.size());
+    const auto heard = lcm::decode_client_message("SET_TABLE", bytes_of(message));
+    return std::get<api::Request>(heard.value().content);
   }
   api::Reply ask(const api::Request& request) const { return answer(library_, request, "test"); }
   api::TableEntry entry(const api::Request& request) const {
@@ -49,8 +56,8 @@ class TableService : public testing::Test {
     return std::holds_alternative<api::Completed>(ask(request));
   }
   table_t get(const std::string& table) const {
-    const api::Reply reply = ask(api::GetTable{table});
-    return lcm::message_of(std::get<tables::TableContent>(std::get<api::Completed>(reply).detail));
+    const auto packets = lcm::encode(0, {}, ask(api::GetTable{table}));
+    return as<table_answer_t>(packets.value().front().payload).tables.at(0);
   }
   std::string refused(const api::Request& request) const {
     return std::get<api::Refused>(ask(request)).reason;

@@ -41,7 +41,7 @@ DaemonRun::DaemonRun(const bushd::config::Config& config, daemon::Outputs& outpu
   publishing_.set_refresh([this] { core_.publish_state(ears_.now_us()); });
   publishing_.add(front_);
   for (const std::string_view name : lcm::daemon_channels()) {
-    expect(transport_->subscribe_bytes(prefix_ + std::string(name), [this, name](auto payload) {
+    expect(transport_->subscribe(prefix_ + std::string(name), [this, name](auto payload) {
       ears_.said(lcm::decode_daemon_message(name, payload));
     }));
   }
@@ -49,7 +49,7 @@ DaemonRun::DaemonRun(const bushd::config::Config& config, daemon::Outputs& outpu
 }
 
 void DaemonRun::give(const lcm::Packet& packet) {
-  expect(transport_->publish_bytes(prefix_ + packet.channel, packet.payload));
+  expect(transport_->publish(prefix_ + packet.channel, packet.payload));
   hear();
 }
 

@@ -7,7 +7,9 @@
 #include <random>
 #include <string>
 
-#include "lcm/payloads.h"
+#include "lcm/all_messages.h"
+#include "lcm/oracle.h"
+#include "lcm/random_message.h"
 #include "lcm/wire.h"
 
 namespace bushd::lcm {
@@ -226,26 +228,26 @@ TEST(Codec, WhatNoMessageMeansIsRefused) {
   EXPECT_FALSE(decode_daemon_message("MOVE", {}));
   move_t move{};
   move.kind = 3;
-  EXPECT_FALSE(decode_client_message("MOVE", *encode(move)));
+  EXPECT_FALSE(decode_client_message("MOVE", test::bytes_of(move)));
   arm_t arm{};
   arm.edge = 0;
-  EXPECT_FALSE(decode_client_message("ARM", *encode(arm)));
+  EXPECT_FALSE(decode_client_message("ARM", test::bytes_of(arm)));
   arm_line_t line{};
   line.edge = arm_line_t::RISING;
-  EXPECT_FALSE(decode_client_message("ARM_LINE", *encode(line)));
+  EXPECT_FALSE(decode_client_message("ARM_LINE", test::bytes_of(line)));
   line.kind = arm_line_t::ABSOLUTE;
-  EXPECT_TRUE(decode_client_message("ARM_LINE", *encode(line)));
+  EXPECT_TRUE(decode_client_message("ARM_LINE", test::bytes_of(line)));
   line.edge = 3;
-  EXPECT_FALSE(decode_client_message("ARM_LINE", *encode(line)));
+  EXPECT_FALSE(decode_client_message("ARM_LINE", test::bytes_of(line)));
   configure_t configure{};
   configure.kind = 4;
-  EXPECT_FALSE(decode_client_message("CONFIGURE", *encode(configure)));
+  EXPECT_FALSE(decode_client_message("CONFIGURE", test::bytes_of(configure)));
   camac_request_t cycles{};
   cycles.mode = 5;
-  EXPECT_FALSE(decode_client_message("CAMAC", *encode(cycles)));
+  EXPECT_FALSE(decode_client_message("CAMAC", test::bytes_of(cycles)));
   position_compare_t compare{};
   compare.arrivals = 4;
-  EXPECT_FALSE(decode_client_message("POSITION_COMPARE", *encode(compare)));
+  EXPECT_FALSE(decode_client_message("POSITION_COMPARE", test::bytes_of(compare)));
 }
 
 TEST(Codec, RepliesArriveAsTheyWereMeant) {
@@ -502,15 +504,17 @@ TEST(Codec, TheStateOfSixteenMotorsFitsAnEthernetFrameTwice) {
 }
 
 // Whatever decodes can be encoded.
+template <class... Pair>
+std::vector<std::vector<std::uint8_t>> one_of_each(test::Random& random,
+                                                   const std::tuple<Pair...>* /*all*/) {
+  return {encode("TEST", test::random_message<typename Pair::Message>(random)).value()...};
+}
+
 TEST(Codec, RandomMessagesOfEveryChannelDoNoHarm) {
   test::Random random(20040518);
-  test::PayloadMaker maker(random);
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 100; ++i) {
     for (const auto& payload :
-         {maker.make<move_t>(), maker.make<arm_t>(), maker.make<stop_t>(),
-          maker.make<set_table_t>(), maker.make<answer_t>(), maker.make<table_answer_t>(),
-          maker.make<mcu_state_t>(), maker.make<mcu_description_t>(), maker.make<health_t>(),
-          maker.make<position_compare_t>()}) {
+         one_of_each(random, static_cast<test::AllMessages*>(nullptr))) {
       for (const std::string_view channel : client_channels()) {
         const auto message = decode_client_message(channel, payload);
         if (!message) continue;

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/fields.h"
+
 namespace bushd::camac {
 
 inline constexpr int kStations = 23;  // for modules, 1 .. 23
@@ -50,6 +52,18 @@ struct Block {
   // Of kScan: the last address, inclusive.
   int last_station = kStations;
   int last_subaddress = kLastSubaddress;
+  static void fields(auto& self, auto& visit) {
+    constexpr bushd::fields::As<std::int8_t> kByte{};
+    visit("mode", self.mode, bushd::fields::OneOf<4>{});
+    visit("count", self.count);
+    visit("last_station", self.last_station);
+    visit("last_subaddress", self.last_subaddress);
+    visit.columns("cycle_count", self.cycles,
+                  bushd::fields::Column{"stations", &Naf::station, kByte},
+                  bushd::fields::Column{"subaddresses", &Naf::subaddress, kByte},
+                  bushd::fields::Column{"functions", &Naf::function, kByte},
+                  bushd::fields::Column{"data", &Naf::data});
+  }
   friend bool operator==(const Block&, const Block&) = default;
 };
 

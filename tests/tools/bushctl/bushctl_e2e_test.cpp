@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "lcm/codec.h"
 #include "lcm/wire.h"
 #include "source_path.h"
 #include "tools/bushctl/run_bushctl.h"
@@ -120,10 +121,10 @@ TEST(Bushctl, WatchTellsOfLosses) {
 
 TEST(Bushctl, StatusSurvivesHostileStates) {
   FakeDaemon daemon;
-  auto cut = bushd::lcm::encode(bushd::mcu_state_t{}).value();
+  auto cut = bushd::lcm::encode("STATE", bushd::lcm::StateMessage{}).value();
   auto huge = cut;
   cut.resize(20);
-  huge[40] = 0x80;  // the length of `bus` becomes INT32_MIN + 1
+  huge[56] = 0x80;  // the length of `bus` becomes INT32_MIN + 1
   daemon.set_hostile_states({{}, cut, huge, std::vector<std::uint8_t>(65000, 0xFF)});
   daemon.start();
   EXPECT_EQ(bushctl({"status"}).code, 0);

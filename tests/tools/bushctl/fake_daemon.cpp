@@ -25,7 +25,7 @@ FakeDaemon::~FakeDaemon() {
 void FakeDaemon::start(Answer answer) {
   answer_ = std::move(answer);
   for (const std::string_view channel : lcm::client_channels()) {
-    transport_->subscribe_bytes(
+    transport_->subscribe(
         "BUSHD_" + std::string(channel),
         [this, channel](lcm::Payload payload) { on_message(channel, payload); });
   }
@@ -61,7 +61,7 @@ lcm::Part FakeDaemon::part(std::int32_t index, std::int32_t parts) {
 }
 
 void FakeDaemon::publish(const bushd::Result<lcm::Packet>& packet) {
-  (void)transport_->publish_bytes("BUSHD_" + packet->channel, packet->payload);
+  (void)transport_->publish("BUSHD_" + packet->channel, packet->payload);
 }
 
 void FakeDaemon::publish_state() {
@@ -78,7 +78,7 @@ void FakeDaemon::publish_state() {
                     .activity = api::Activity::kMoving,
                     .moving = true},
                    {.name = mcu == 0 ? "chi" : "stop", .trust = api::Trust::kUncertain}}};
-    for (const auto& payload : hostile_) (void)transport_->publish_bytes("BUSHD_STATE", payload);
+    for (const auto& payload : hostile_) (void)transport_->publish("BUSHD_STATE", payload);
     if (loses_ && mcu == 1) continue;
     publish(lcm::encode(part(mcu, 2), 0, state));
   }

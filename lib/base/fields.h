@@ -1,0 +1,123 @@
+// A type of requests, replies and snapshots declares its fields once, in its header:
+//
+//   static void fields(auto& jog, auto& visit) {
+//     visit("motor", jog.motor);
+//     visit("keepalive_ms", jog.keepalive_ms);
+//     visit("steps_after", jog.steps_after, fields::NoneIs<std::int64_t>{-1});
+//   }
+//
+// Names and order are those of its .lcm file. Whoever does something with all fields of a type
+// writes a visitor: lib/lcm/wire.h has those that write, read and fingerprint LCM's bytes. A visitor
+// has
+//
+//   visit(name, member), visit(name, member, form)    a bool, a number, a text, or a type with fields
+//   visit.list(count, name, vector), ... form         a vector, one element after the other
+//   visit.columns(count, vector, Column{name, &Element::member}, ...)
+//                                                     a vector of structs, one member after the other
+//   visit.set(member, value)      does nothing but in a visitor that reads: for a member that is made
+//                                 of several fields, which are visited as local variables before
+//   visit.require(condition)      false: what is read is no message of this type
+//
+// A form says how a member is told where that is not its own type: `told` makes what is told of a
+// value, `taken` puts back what was told and returns false if it means nothing. An unsigned number
+// of 32 or 64 bits without a form is told by the signed one of the same bits.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+namespace bushd::fields {
+
+// As it is.
+struct Same {
+  static const auto& told(const auto& value) { return value; }
+  template <class T>
+  static bool taken(T&& told, std::decay_t<T>& value) {
+    value = std::forward<T>(told);
+    return true;
+  }
+};
+
+// An integer as one of another type; what does not fit means nothing.
+template <class Told>
+struct As {
+  static Told told(auto value) { return static_cast<Told>(value); }
+  template <class T>
+  static bool taken(Told told, T& value) {
+    value = static_cast<T>(told);
+    return std::in_range<T>(told);
+  }
+};
+
+// An integer as one of another type; 0 for what is not in 0..most.
+template <class Told>
+struct OrZero {
+  Told most;
+  static Told told(auto value) { return static_cast<Told>(value); }
+  template <class T>
+  bool taken(Told told, T& value) const {
+    value = told < 0 || told > most ? T{0} : static_cast<T>(told);
+    return true;
+  }
+};
+
+// An optional number; none is told as this one.
+template <class Told>
+struct NoneIs {
+  Told none;
+  template <class T>
+  Told told(const std::optional<T>& value) const {
+    return value ? static_cast<Told>(*value) : none;
+  }
+  template <class T>
+  bool taken(Told told, std::optional<T>& value) const {
+    value = told == none ? std::optional<T>{} : std::optional<T>{static_cast<T>(told)};
+    return true;
+  }
+};
+
+// One of the first `kCount` of an enumeration, counted from 1.
+template <int kCount>
+struct OneOf {
+  static std::int8_t told(auto value) {
+    return static_cast<std::int8_t>(static_cast<int>(value) + 1);
+  }
+  template <class T>
+  static bool taken(std::int8_t told, T& value) {
+    value = static_cast<T>(told - 1);
+    return told >= 1 && told <= kCount;
+  }
+};
+
+// By its word: word(value), and back by `parse`.
+template <class Parse>
+struct Word {
+  Parse parse;
+  static std::string told(const auto& value) { return std::string(word(value)); }
+  template <class T>
+  bool taken(std::string_view told, T& value) const {
+    const std::optional<T> known = parse(told);
+    if (known) value = *known;
+    return known.has_value();
+  }
+};
+template <class Parse>
+Word(Parse) -> Word<Parse>;
+
+// A member of the elements of a vector, or what `get` makes of an element.
+template <class Get, class Form = Same>
+struct Column {
+  const char* name;
+  Get get;
+  Form form{};
+};
+template <class Get>
+Column(const char*, Get) -> Column<Get>;
+template <class Get, class Form>
+Column(const char*, Get, Form) -> Column<Get, Form>;
+
+}  // namespace bushd::fields
