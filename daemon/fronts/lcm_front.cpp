@@ -60,10 +60,9 @@ Result<void> LcmFront::subscribe() {
 
 Result<void> LcmFront::listen(lcm::Transport& transport, std::string_view channel, Takes takes) {
   return transport.subscribe(setup_.prefix + "_" + std::string(channel),
-                                   [this, channel, takes, &transport](lcm::Payload payload) {
-                                     on_message(channel, payload, transport.received_utime_us(),
-                                                takes);
-                                   });
+                             [this, channel, takes, &transport](lcm::Payload payload) {
+                               on_message(channel, payload, transport.received_utime_us(), takes);
+                             });
 }
 
 void LcmFront::handle() {

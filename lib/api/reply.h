@@ -68,17 +68,17 @@ struct MotorResult {
       places.resize(motors.size());  // known by now, in a visitor that reads
       return places[static_cast<std::size_t>(&motor - motors.data())];
     };
-    visit.columns(
-        "motor_count", motors, fields::Column{"motors", &MotorResult::motor},
-        fields::Column{"outcomes", &MotorResult::outcome, fields::Word{outcome_of}},
-        fields::Column{"position_steps", &MotorResult::position_steps},
-        fields::Column{"user_positions", &MotorResult::user},
-        fields::Column{"dial_positions", &MotorResult::dial},
-        fields::Column{"units", &MotorResult::unit},
-        fields::Column{"precisions", &MotorResult::precision, Decimals{}},
-        fields::Column{"table_of_motor", place_of}, fields::Column{"asked_by", &MotorResult::who},
-        fields::Column{"legs", &MotorResult::legs, fields::As<std::int8_t>{}},
-        fields::Column{"most_steps_per_s", &MotorResult::most_steps_per_s});
+    visit.columns("motor_count", motors, fields::Column{"motors", &MotorResult::motor},
+                  fields::Column{"outcomes", &MotorResult::outcome, fields::Word{outcome_of}},
+                  fields::Column{"position_steps", &MotorResult::position_steps},
+                  fields::Column{"user_positions", &MotorResult::user},
+                  fields::Column{"dial_positions", &MotorResult::dial},
+                  fields::Column{"units", &MotorResult::unit},
+                  fields::Column{"precisions", &MotorResult::precision, Decimals{}},
+                  fields::Column{"table_of_motor", place_of},
+                  fields::Column{"asked_by", &MotorResult::who},
+                  fields::Column{"legs", &MotorResult::legs, fields::As<std::int8_t>{}},
+                  fields::Column{"most_steps_per_s", &MotorResult::most_steps_per_s});
     visit.list("table_count", "tables", tables);
     places.resize(motors.size());  // of a payload that ended before
     for (std::size_t i = 0; i < motors.size(); ++i) {
@@ -194,11 +194,10 @@ struct Configuration {
   static void fields(auto& self, auto& visit) {
     visit("path", self.path);
     visit("sha256", self.sha256);
-    visit.columns("setting_count", self.settings,
-                  fields::Column{"setting_motors", &MotorSetting::motor},
-                  fields::Column{"keys", &MotorSetting::key},
-                  fields::Column{"values", &MotorSetting::value},
-                  fields::Column{"values_in_file", &MotorSetting::in_file});
+    visit.columns(
+        "setting_count", self.settings, fields::Column{"setting_motors", &MotorSetting::motor},
+        fields::Column{"keys", &MotorSetting::key}, fields::Column{"values", &MotorSetting::value},
+        fields::Column{"values_in_file", &MotorSetting::in_file});
   }
 };
 
@@ -209,8 +208,8 @@ struct CamacResult {
   static void fields(auto& self, auto& visit) {
     visit("tally", self.block.tally);
     visit("requests", self.requests);
-    visit.columns("response_count", self.block.responses,
-                  fields::Column{"x", &camac::Response::x}, fields::Column{"q", &camac::Response::q},
+    visit.columns("response_count", self.block.responses, fields::Column{"x", &camac::Response::x},
+                  fields::Column{"q", &camac::Response::q},
                   fields::Column{"data", &camac::Response::data});
   }
   friend bool operator==(const CamacResult&, const CamacResult&) = default;

@@ -100,7 +100,7 @@ struct StateSnapshot {
   std::string inputs{};   // active ones: of emergency, forward, reverse, trigger, blanks between
   std::int32_t boot = 0;  // its boot number; 0 until it was heard
   std::int64_t tick = 0;  // bus tick of the report behind this
-  std::vector<MotorState> motors{};   // by output
+  std::vector<MotorState> motors{};  // by output
   static void fields(auto& self, auto& visit) {
     visit("bus", self.bus);
     visit("mcu", self.mcu);

@@ -7,14 +7,16 @@
 //   }
 //
 // Names and order are those of its .lcm file. Whoever does something with all fields of a type
-// writes a visitor: lib/lcm/wire.h has those that write, read and fingerprint LCM's bytes. A visitor
-// has
+// writes a visitor: lib/lcm/wire.h has those that write, read and fingerprint LCM's bytes. A
+// visitor has
 //
-//   visit(name, member), visit(name, member, form)    a bool, a number, a text, or a type with fields
-//   visit.list(count, name, vector), ... form         a vector, one element after the other
+//   visit(name, member), visit(name, member, form)    a bool, a number, a text, or a type with
+//   fields visit.list(count, name, vector), ... form         a vector, one element after the other
 //   visit.columns(count, vector, Column{name, &Element::member}, ...)
-//                                                     a vector of structs, one member after the other
-//   visit.set(member, value)      does nothing but in a visitor that reads: for a member that is made
+//                                                     a vector of structs, one member after the
+//                                                     other
+//   visit.set(member, value)      does nothing but in a visitor that reads: for a member that is
+//   made
 //                                 of several fields, which are visited as local variables before
 //   visit.require(condition)      false: what is read is no message of this type
 //

@@ -142,7 +142,7 @@ void Transport::on_message(const lcm_recv_buf_t* buffer, const char*, void* subs
 }
 
 Result<void> Transport::subscribe(const std::string& channel, BytesHandler handler,
-                                        int queue_capacity) {
+                                  int queue_capacity) {
   if (auto checked = check_channel(channel); !checked) return checked;
   auto subscription = std::make_unique<Subscription>(Subscription{this, std::move(handler)});
   lcm_subscription_t* added =
@@ -154,8 +154,7 @@ Result<void> Transport::subscribe(const std::string& channel, BytesHandler handl
   return {};
 }
 
-Result<void> Transport::publish(const std::string& channel,
-                                      std::span<const std::uint8_t> bytes) {
+Result<void> Transport::publish(const std::string& channel, std::span<const std::uint8_t> bytes) {
   if (auto checked = check_channel(channel); !checked) return checked;
   if (lcm_publish(lcm_, channel.c_str(), bytes.data(), static_cast<unsigned>(bytes.size())) != 0) {
     return fail(fmt::format("LCM cannot send on channel \"{}\": is the network up?", channel));

@@ -50,9 +50,9 @@ class Transport {
   // library was left in order. Not to be called from a handler.
   void handle(std::size_t max_bytes = SIZE_MAX);
 
-  // `handler` is called from handle() for every payload on exactly this channel, whatever it is, for
-  // as long as this object lives: there is no unsubscribing, which within a handler would corrupt
-  // LCM's memory.
+  // `handler` is called from handle() for every payload on exactly this channel, whatever it is,
+  // for as long as this object lives: there is no unsubscribing, which within a handler would
+  // corrupt LCM's memory.
   using BytesHandler = std::function<void(std::span<const std::uint8_t>)>;
   Result<void> subscribe(const std::string& channel, BytesHandler handler,
                          int queue_capacity = kQueueCapacity);

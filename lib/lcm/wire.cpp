@@ -4,8 +4,8 @@
 
 namespace bushd::lcm {
 
-Result<std::vector<std::uint8_t>> checked(std::string_view channel,
-                                          std::vector<std::uint8_t> bytes, bool good) {
+Result<std::vector<std::uint8_t>> checked(std::string_view channel, std::vector<std::uint8_t> bytes,
+                                          bool good) {
   if (bytes.size() > kMaxMessageBytes) {
     return fail(
         fmt::format("{} of {} bytes does not fit one datagram ({} bytes); name fewer motors, or "

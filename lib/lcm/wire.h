@@ -76,8 +76,8 @@ using Told = std::decay_t<decltype(std::declval<const Form&>().told(std::declval
 
 template <class Column, class Element>
 using ToldInColumn =
-    Told<decltype(Column::form), std::decay_t<std::invoke_result_t<const decltype(Column::get)&,
-                                                                   const Element&>>>;
+    Told<decltype(Column::form),
+         std::decay_t<std::invoke_result_t<const decltype(Column::get)&, const Element&>>>;
 
 class Writer {
  public:
@@ -308,8 +308,8 @@ std::uint64_t fingerprint() {
 
 // The bytes to publish. Fails when the message is longer than kMaxMessageBytes, and when a text
 // contains a NUL; `channel` names it in the error.
-Result<std::vector<std::uint8_t>> checked(std::string_view channel,
-                                          std::vector<std::uint8_t> bytes, bool good);
+Result<std::vector<std::uint8_t>> checked(std::string_view channel, std::vector<std::uint8_t> bytes,
+                                          bool good);
 template <class T>
 std::vector<std::uint8_t> bytes_of(const T& message, bool& good) {
   std::vector<std::uint8_t> bytes;

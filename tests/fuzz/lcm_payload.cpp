@@ -1,4 +1,5 @@
-// What anybody may send as a message: it is refused, or what the encoder makes of it means the same.
+// What anybody may send as a message: it is refused, or what the encoder makes of it means the
+// same.
 //
 // Input: a type, then a payload behind that type's fingerprint; with any other type byte the
 // payload has to bring its own.

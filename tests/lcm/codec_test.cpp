@@ -513,8 +513,7 @@ std::vector<std::vector<std::uint8_t>> one_of_each(test::Random& random,
 TEST(Codec, RandomMessagesOfEveryChannelDoNoHarm) {
   test::Random random(20040518);
   for (int i = 0; i < 100; ++i) {
-    for (const auto& payload :
-         one_of_each(random, static_cast<test::AllMessages*>(nullptr))) {
+    for (const auto& payload : one_of_each(random, static_cast<test::AllMessages*>(nullptr))) {
       for (const std::string_view channel : client_channels()) {
         const auto message = decode_client_message(channel, payload);
         if (!message) continue;

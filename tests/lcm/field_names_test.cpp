@@ -62,8 +62,7 @@ TEST(FieldNames, HeadersOfRequestsAndAnswers) {
   EXPECT_EQ(welcomed.nonce, 2);
   EXPECT_EQ(welcomed.session, 4);
   for (int which = 0; which < 3; ++which) {
-    const Subscription wanted{
-        .state = which == 0, .description = which == 1, .health = which == 2};
+    const Subscription wanted{.state = which == 0, .description = which == 1, .health = which == 2};
     const auto told = test::as<subscribe_t>(encode(wanted)->payload);
     EXPECT_EQ(told.state, which == 0);
     EXPECT_EQ(told.description, which == 1);
@@ -249,19 +248,19 @@ TEST(FieldNames, Tables) {
 }
 
 TEST(FieldNames, ResultsAndPlans) {
-  const auto answer = heard<answer_t>(std::vector<api::MotorResult>{
-      {.motor = "a", .table = {.name = "own"}},
-      {.motor = "b",
-       .outcome = api::Outcome::kReached,
-       .position_steps = 3,
-       .user = 4,
-       .dial = 5,
-       .unit = "mm",
-       .precision = 6,
-       .table = {.name = "other"},
-       .who = "w",
-       .legs = 2,
-       .most_steps_per_s = 7}});
+  const auto answer =
+      heard<answer_t>(std::vector<api::MotorResult>{{.motor = "a", .table = {.name = "own"}},
+                                                    {.motor = "b",
+                                                     .outcome = api::Outcome::kReached,
+                                                     .position_steps = 3,
+                                                     .user = 4,
+                                                     .dial = 5,
+                                                     .unit = "mm",
+                                                     .precision = 6,
+                                                     .table = {.name = "other"},
+                                                     .who = "w",
+                                                     .legs = 2,
+                                                     .most_steps_per_s = 7}});
   EXPECT_EQ(answer.motors, (Strings{"a", "b"}));
   EXPECT_EQ(answer.outcomes.at(1), "reached");
   EXPECT_EQ(answer.position_steps.at(1), 3);
@@ -323,9 +322,8 @@ TEST(FieldNames, OtherAnswers) {
   EXPECT_EQ(configuration.keys, Strings{"offset"});
   EXPECT_EQ(configuration.values, Strings{"1"});
   EXPECT_EQ(configuration.values_in_file, Strings{"2"});
-  const auto crate = heard<camac_reply_t>(
-      api::CamacResult{.block = {.responses = {{.x = true, .q = false, .data = 6}}, .tally = 4},
-                       .requests = 5});
+  const auto crate = heard<camac_reply_t>(api::CamacResult{
+      .block = {.responses = {{.x = true, .q = false, .data = 6}}, .tally = 4}, .requests = 5});
   EXPECT_EQ(crate.tally, 4);
   EXPECT_EQ(crate.requests, 5);
   EXPECT_EQ(crate.x.at(0), 1);

@@ -22,10 +22,9 @@ inline std::size_t below(Random& random, std::size_t limit) {
 
 // Words that some field knows, ratios, and texts of anything but NUL.
 inline std::string text(Random& random) {
-  static const std::array<std::string, 16> kKnown = {"",        "done", "reached", "link",  "rest",
-                                                     "arming",  "home", "known",   "stale", "READY",
-                                                     "OFFLINE", "ramp", "both",    "320",   "1/3",
-                                                     "positive"};
+  static const std::array<std::string, 16> kKnown = {
+      "",      "done",  "reached", "link", "rest", "arming", "home", "known",
+      "stale", "READY", "OFFLINE", "ramp", "both", "320",    "1/3",  "positive"};
   if (below(random, 2) == 0) return kKnown.at(below(random, kKnown.size()));
   std::string out(below(random, 24), ' ');
   for (char& c : out) c = static_cast<char>(1 + below(random, 255));

@@ -34,8 +34,8 @@ std::int64_t number_of(std::span<const std::uint8_t> payload) {
 TEST(Transport, DeliversWhatWasPublishedInItsOrder) {
   const auto transport = in_process();
   std::vector<std::int64_t> heard;
-  ASSERT_TRUE(transport->subscribe(
-      "BUSHD_STOP", [&](auto payload) { heard.push_back(number_of(payload)); }));
+  ASSERT_TRUE(transport->subscribe("BUSHD_STOP",
+                                   [&](auto payload) { heard.push_back(number_of(payload)); }));
   for (int i = 1; i <= 100; ++i) ASSERT_TRUE(transport->publish("BUSHD_STOP", numbered(i)));
   EXPECT_TRUE(readable(*transport));
   transport->handle();
@@ -102,8 +102,8 @@ void expect_survives_hostile_payloads() {
   const auto transport = in_process();
   std::uint64_t heard = 0;
   std::uint64_t rejected = 0;
-  ASSERT_TRUE(transport->subscribe(
-      "C", [&](auto payload) { ++(decode<T>(payload) ? heard : rejected); }));
+  ASSERT_TRUE(
+      transport->subscribe("C", [&](auto payload) { ++(decode<T>(payload) ? heard : rejected); }));
   std::uint64_t valid = 0;
   std::uint64_t hostile = 0;
   for (int round = 0; round < 2000; ++round) {

@@ -25,9 +25,8 @@ FakeDaemon::~FakeDaemon() {
 void FakeDaemon::start(Answer answer) {
   answer_ = std::move(answer);
   for (const std::string_view channel : lcm::client_channels()) {
-    transport_->subscribe(
-        "BUSHD_" + std::string(channel),
-        [this, channel](lcm::Payload payload) { on_message(channel, payload); });
+    transport_->subscribe("BUSHD_" + std::string(channel),
+                          [this, channel](lcm::Payload payload) { on_message(channel, payload); });
   }
   thread_ = std::thread([this] { run(); });
 }
