@@ -94,35 +94,37 @@ class MotorCheck:
 
     def _without_paths(self, edges):
         """Sets the edges of each path apart: from its first run to the next motion that is none of its runs."""
-        times_ns = [self._clock.bus_ns(edge.time_ns) for edge in edges]
         groups = [(way, next(moves)) for way, moves in itertools.groupby(self._motor.moves, lambda move: move.way)]
-        begins = [bisect.bisect_left(times_ns, first.start_tick * first.tick_ns - self._slot_ns) for _, first in groups]
-        rest = edges[: begins[0]] if begins else edges
-        for (way, _), begin, end in zip(groups, begins, [*begins[1:], len(edges)]):
+        before, of_groups = self._split(edges, [first for _, first in groups])
+        rest = before
+        for (way, _), own in zip(groups, of_groups):
             if way is None:
-                rest = rest + edges[begin:end]
+                rest = rest + own
             else:
-                self._motor.path_edges[way] += edges[begin:end]
+                self._motor.path_edges[way] += own
         return rest
 
     def _without_limits(self, edges):
         """Moves that a limit switch has ended: by the table as far as they go by it, then to rest by the MCU's own ramp.
         Returns the steps and edges of the others."""
+        moves = self._motor.moves
+        own_steps = self._motor.steps_by_move()
+        rest, of_moves = self._split(edges, moves)
         steps = []
-        for number, move in enumerate(self._motor.moves):
-            own = [step for step in self._motor.steps if step.move is move]
-            if move.result != "limit" or move.way is not None:
-                steps += own
-                continue
-            begin_ns = move.start_tick * move.tick_ns - self._slot_ns
-            later = self._motor.moves[number + 1 :]
-            end_ns = later[0].start_tick * move.tick_ns - self._slot_ns if later else math.inf
-            times_ns = [self._clock.bus_ns(edge.time_ns) for edge in edges]
-            first = bisect.bisect_left(times_ns, begin_ns)
-            last = bisect.bisect_left(times_ns, end_ns)
-            self._check_limited(move, own, edges[first:last])
-            edges = edges[:first] + edges[last:]
-        return steps, edges
+        for move, own in zip(moves, of_moves):
+            if move.result == "limit" and move.way is None:
+                self._check_limited(move, own_steps[id(move)], own)
+            else:
+                steps += own_steps[id(move)]
+                rest += own
+        return steps, rest
+
+    def _split(self, edges, moves):
+        """Edges before the first of these moves, and those from the beginning of each to that of the next one."""
+        times_ns = [self._clock.bus_ns(edge.time_ns) for edge in edges]
+        begins = [bisect.bisect_left(times_ns, move.start_tick * move.tick_ns - self._slot_ns) for move in moves]
+        ends = [*begins[1:], len(edges)]
+        return edges[: begins[0]] if moves else edges, [edges[begin:end] for begin, end in zip(begins, ends)]
 
     def _check_limited(self, move, steps, edges):
         made = move.direction * (move.result_steps - move.from_steps)

@@ -74,8 +74,9 @@ def pairs_by_move(motor, slot_ns):
     """Of a motor that has edges of which nobody knows how many: where in its edges each move may lie."""
     seen = [edge.time_ns for edge in motor.edges]
     pairs = []
+    by_move = motor.steps_by_move()
     for move in motor.moves:
-        own = [step for step in motor.steps if step.move is move]
+        own = by_move[id(move)]
         if move.result == "limit":
             own = own[: abs(move.result_steps - move.from_steps) // 2]  # what lies after the switch is another way
         if not own:
@@ -87,7 +88,7 @@ def pairs_by_move(motor, slot_ns):
         for first in range(len(seen) - last):
             away_ns = seen[first] - due[0]
             if all(abs(seen[first + i] - due[i] - away_ns) <= slack_ns for i in (middle, last)):
-                pairs += pairs_of(own, seen[first:])
+                pairs += pairs_of(own, seen[first : first + len(own)])
     return pairs
 
 

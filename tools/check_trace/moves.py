@@ -55,6 +55,13 @@ class Motor:
     def travelled(self):
         return sum(1 if edge.direction else -1 for edge in self.edges)
 
+    def steps_by_move(self):
+        """By id() of each."""
+        by_move = defaultdict(list)
+        for step in self.steps:
+            by_move[id(step.move)].append(step)
+        return by_move
+
 
 class PathMove(Move):
     """A motor's part of a run along a path, whose steps are judged by the path (paths.py)."""

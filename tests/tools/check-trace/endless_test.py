@@ -14,7 +14,7 @@ from check_trace_test import TABLE, TOP, CheckTraceTest
 from synthetic import TICK_NS
 
 sys.path.insert(0, str(TOP / "tools"))
-from check_trace import arrays, motion
+from check_trace import arrays, clock, motion
 
 LOADER = importlib.machinery.SourceFileLoader("check_trace_program", str(TOP / "tools" / "check-trace"))
 CHECK_TRACE = importlib.util.module_from_spec(importlib.util.spec_from_loader(LOADER.name, LOADER))
@@ -96,6 +96,24 @@ class WithoutEnd(CheckTraceTest):
         code, said = self.work_of(scene)
         self.assertIn(f"move 1 ended at 400 steps, by the table it ends at {self.FAR}", said[0])
         self.assertNotIn("problem", said[1])
+
+    def test_many_moves_that_meet_their_limit(self):
+        """Work grows with the edges, not with edges times moves."""
+        scene = synthetic.Scene(TABLE, self.table_file)
+        for number in range(100):
+            scene.move("theta", 1, 0, 100 + 100 * number + number**2 % 53, 40 if number % 2 else -40, move_id=number)
+            scene.meets_limit("theta", 20)
+        edges = len(scene.edges[1, 0])
+        looked = itertools.count()
+        bus_ns = clock.Clock.bus_ns
+
+        def counted(*arguments):
+            self.assertLess(next(looked), 8 * edges, "it looks at each edge again for each move")
+            return bus_ns(*arguments)
+
+        with mock.patch.object(clock.Clock, "bus_ns", counted):
+            code, said = self.work_of(scene)
+        self.assertEqual(code, 0, said[:4])
 
     def test_a_line_goes_on_when_the_trace_ends(self):
         scene = self.one(400, "table", line={"way": 1, "increment": self.FAR, "longest": self.FAR, "direction": 1, "from": 0, "to": self.FAR})
