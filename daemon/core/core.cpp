@@ -210,7 +210,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::Release& r) { pauses_.request(now, asker, r); },
                  [&](const api::Configure& r) { settings_.request(asker, r); },
                  [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
-                 [&](const api::MovePath& r) { lines_.request(now, asker, r); },
+                 [&](const api::MovePath& r) { lines_.request(asker, r); },
                  [&](const api::Camac& r) { camac_.request(now, asker, r); },
                  [&](const api::Follow& r) { arrays_.request(now, asker, r); },
                  [&](const api::ArmLine& r) {

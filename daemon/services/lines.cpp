@@ -8,6 +8,8 @@
 #include <iterator>
 #include <utility>
 
+#include "base/overloaded.h"
+#include "daemon/services/line_motors.h"
 #include "words/remedy.h"
 
 namespace bushd::daemon {
@@ -26,7 +28,7 @@ void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
   if (moves) return redirect(now_us, asker, *motors, request);
   auto line = line_of(request);
   if (!line) return asker.answer(api::Refused{line.error().text()});
-  if (request.dry_run) return plan_only(now_us, asker, *line);
+  if (request.dry_run) return plan_only(now_us, asker, *line, *line->straight());
   start(now_us, asker, std::move(*line));
 }
 
@@ -36,33 +38,34 @@ bool Lines::would_take(const api::MoveLine& request) const {
   if (std::ranges::any_of(*motors, [this](MotorId id) { return installation_[id].has_plan(); })) {
     return true;
   }
-  const Line line{.motors = *motors, .points = {}, .way = {}, .by = request.by};
-  return may_be_one_line(*motors) && points_of(line, request);
+  return may_be_one_line(installation_, *motors) && points_of(*motors, request);
 }
 
-const std::string& Lines::limiting(const Line& line) const {
-  return installation_[line.motors[line.way.limiting()]].name();
+const std::string& Lines::limiting(const Line& line, const motion::Way& way) const {
+  return installation_[line.motors[way.limiting()]].name();
 }
 
-void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& line) {
+void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& line,
+                      const Straight& straight) {
   std::vector<DryRun::Part> parts;
-  std::vector<motion::Way> ways{line.way};
-  for (std::size_t p = 1; p < line.points.size(); ++p) {
-    ways.push_back(lay(line, line.points[p - 1].steps, line.points[p]));
+  std::vector<motion::Way> ways{straight.way};
+  for (std::size_t p = 1; p < straight.points.size(); ++p) {
+    ways.push_back(lay(line.motors, straight.by, straight.points[p - 1].steps, straight.points[p]));
   }
   const bool by_mcus =
-      line.way.longest() != 0 && (in_mcus(0, line) || table_to_upload(line, false));
+      straight.way.longest() != 0 && (in_mcus(0, line) || table_to_upload(line, false));
   // The ways of one motor stand together.
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    for (const motion::Way& way : ways) {
-      const auto& [table, from, to, shortest_delay] = way.motors()[i];
-      DryRun::Part part{line.motors[i], to - from, way.shortest_delay(), from};
-      if (way.longest() != 0) part.line = way.share(i, 0, way.longest());
+    for (const motion::Way& one : ways) {
+      const auto& [table, from, to, shortest_delay] = one.motors()[i];
+      DryRun::Part part{line.motors[i], to - from, one.shortest_delay(), from};
+      if (one.longest() != 0) part.line = one.share(i, 0, one.longest());
       if (part.line) part.line->in_mcus = by_mcus;
       parts.push_back(std::move(part));
     }
   }
-  dry_runs_.request(now_us, asker, parts, line.way.longest() != 0 ? limiting(line) : "");
+  dry_runs_.request(now_us, asker, parts,
+                    straight.way.longest() != 0 ? limiting(line, straight.way) : "");
 }
 
 void Lines::start(std::int64_t now_us, const api::Asker& asker, Line line) {
@@ -85,48 +88,55 @@ void Lines::start(std::int64_t now_us, const api::Asker& asker, Line line) {
 }
 
 void Lines::log(Line& line) {
-  if (line.path) {
-    line.path->set_number(journal_.path_laid(line.motors, *line.path));
-    return;
-  }
-  std::vector<Journal::OnWay> motors;
-  for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    motors.push_back({.motor = line.motors[i],
-                      .increment = line.way.increment(i),
-                      .shortest_delay = line.way.motors()[i].shortest_delay,
-                      .table = table_of(line, i)});
-  }
-  line.way.set_number(journal_.line_laid(line.way.longest(), motors));
+  const auto path_laid = [&](AlongPath& along) {
+    along.path->set_number(journal_.path_laid(line.motors, *along.path));
+  };
+  const auto way_laid = [&](Straight& straight) {
+    motion::Way& way = straight.way;
+    std::vector<Journal::OnWay> motors;
+    for (std::size_t i = 0; i < line.motors.size(); ++i) {
+      motors.push_back({.motor = line.motors[i],
+                        .increment = way.increment(i),
+                        .shortest_delay = way.motors()[i].shortest_delay,
+                        .table = table_of(line.motors[i], straight.by)});
+    }
+    way.set_number(journal_.line_laid(way.longest(), motors));
+  };
+  std::visit(Overloaded{path_laid, way_laid}, line.course);
 }
 
 void Lines::open(const api::Asker& asker, std::uint64_t number, const Line& line) {
   // By a table of its own a motor makes what is a move for everybody.
-  const auto purpose = line.by ? OpenMoves::Purpose::kMove : OpenMoves::Purpose::kLine;
-  open_.open(asker, line.motors, purpose, line.by);
+  const tables::TablePtr by = line.straight() != nullptr ? line.straight()->by : nullptr;
+  const auto purpose = by ? OpenMoves::Purpose::kMove : OpenMoves::Purpose::kLine;
+  open_.open(asker, line.motors, purpose, by);
   ask_for_end(line);
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    open_.planned(line.motors[i], static_cast<int>(line.points.size()), line.most_steps_per_s(i));
+    open_.planned(line.motors[i], static_cast<int>(line.legs()), line.most_steps_per_s(i));
   }
-  if (line.longest() == 0 || line.by) return;
+  if (line.longest() == 0 || by) return;
   open_.conclude(line.motors.front(), [this, number] { return conclusion(number); });
 }
 
 // A path leads through many points, which are rounded each.
 void Lines::ask_for_end(const Line& line) {
-  const std::vector<units::Steps>& ends = line.points.back().asked_for;
+  const Straight* straight = line.straight();
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    installation_[line.motors[i]].ask_for(ends.empty() ? std::nullopt : std::optional(ends[i]));
+    installation_[line.motors[i]].ask_for(
+        straight == nullptr ? std::nullopt : std::optional(straight->points.back().asked_for[i]));
   }
 }
 
 // The MCUs make the run themselves if all of them can: it is slow enough, they have its table, and
 // no other line.
 bool Lines::in_mcus(std::uint64_t number, const Line& line) const {
-  if (line.path) return false;
-  const bushd_table& table = line.way.table()->view();
+  const Straight* straight = line.straight();
+  if (straight == nullptr) return false;
+  const motion::Way& way = straight->way;
+  const bushd_table& table = way.table()->view();
   return std::ranges::all_of(installation_.mcus_of(line.motors), [&](McuId id) {
     const Mcu& mcu = installation_[id];
-    return mcu.can_run_line(table, line.way.shortest_delay(), has_all_of(line, mcu)) &&
+    return mcu.can_run_line(table, way.shortest_delay(), has_all_of(line, mcu)) &&
            !makes_another(mcu, number);
   });
 }
@@ -150,30 +160,33 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
   std::vector<MotorId> motors;
   for (const std::size_t i : indices) motors.push_back(line.motors[i]);
   const std::map<BusId, motion::Tick> start = starts_of(now_us, motors);
-  const bool by_ports = installation_.mcu_of(motors.front()).keeps_pace();
-  const auto ports = static_cast<unsigned>(motors.size());
-  const std::int64_t ahead_ns = line.pace ? line.pace->most_ahead_ns() : 0;
-  line.pace = by_ports ? std::make_shared<link::LinePace>(ports, ahead_ns) : nullptr;
-  const bool by_mcus = by_ports || in_mcus(number, line);
+  Straight* straight = line.straight();
+  std::shared_ptr<link::LinePace> pace;  // paths are not of ports
+  if (straight != nullptr && installation_.mcu_of(motors.front()).keeps_pace()) {
+    const std::int64_t ahead_ns = straight->pace ? straight->pace->most_ahead_ns() : 0;
+    pace = std::make_shared<link::LinePace>(static_cast<unsigned>(motors.size()), ahead_ns);
+    straight->pace = pace;
+  }
+  const bool by_mcus = pace || in_mcus(number, line);
   for (const std::size_t i : indices) {
     motion::Motor& motor = installation_[line.motors[i]];
     const auto* before = motor.as<motion::OnLine>();
-    const bool same_way = before != nullptr && before->line == number &&
-                          (line.path || motor.axis().line()->table == line.way.table());
+    const bool same_way =
+        before != nullptr && before->line == number && line.is_of(*motor.axis().line());
     motion::OnLine on_line;
     on_line.line = number;
-    on_line.target_steps = line.points.back().steps[i];
+    on_line.target_steps = line.end_of(i);
     on_line.to_point = to == line.target;
-    on_line.last_run = line.points.size() == 1 && to == line.target;
+    on_line.last_run = line.legs() == 1 && to == line.target;
     const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
     motion::LineShare share = line.share(i, from, to);
     share.line = number;
     share.in_mcus = by_mcus;
     const BusId bus = installation_.mcu_of(line.motors[i]).config.bus;
     motor.start_line(on_line, std::move(share), start.at(bus),
-                     line.path ? 0 : line.way.shortest_delay());
+                     straight == nullptr ? 0 : straight->way.shortest_delay());
   }
-  moves_.begin_on_line(motors, line.pace);
+  moves_.begin_on_line(motors, pace);
 }
 
 // One tick of each bus: there is one, or one a motor.
@@ -193,126 +206,14 @@ const motion::OnLine* Lines::on_line(MotorId motor, std::uint64_t number) const 
   return on_line != nullptr && on_line->line == number ? on_line : nullptr;
 }
 
-Result<std::uint64_t> Lines::number_of(const std::vector<MotorId>& motors) const {
-  const motion::OnLine* first = installation_[motors.front()].as<motion::OnLine>();
-  const auto whole = first == nullptr ? lines_.end() : lines_.find(first->line);
-  for (const MotorId motor : motors) {
-    if (whole != lines_.end() && on_line(motor, whole->first) != nullptr) continue;
-    return fail(fmt::format(
-        "{} is not on one line with the others: motors of a line begin it at rest; stop "
-        "those that move first",
-        installation_[motor].name()));
-  }
-  if (motors.size() != whole->second.motors.size()) {
-    return fail(
-        fmt::format("{} motors move on this line and {} are named; name all of them, or "
-                    "run {} first",
-                    whole->second.motors.size(), motors.size(),
-                    words::remedy("stop", installation_[motors.front()].name())));
-  }
-  return whole->first;
-}
-
-// The step of the line at which all motors are where they are asked to be.
-Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId>& motors,
-                                     const api::MoveLine& request,
-                                     std::vector<units::Steps>& targets) const {
-  const std::vector<motion::Way::Motor>& ways = line.way.motors();
-  targets.resize(motors.size());
-  std::optional<std::int64_t> step;
-  for (std::size_t i = 0; i < motors.size(); ++i) {
-    const motion::Motor& motor = installation_[motors[i]];
-    const bool absolute = request.kind == api::Move::Kind::kAbsolute;
-    const api::Amount& amount = request.motors[i].amount;
-    const auto steps = absolute ? motor.position_of(amount) : motor.distance_of(amount);
-    if (!steps) return fail(motor.name() + ": " + steps.error().message);
-    const auto at =
-        static_cast<std::size_t>(std::ranges::find(line.motors, motors[i]) - line.motors.begin());
-    // Compared before any arithmetic: the sum of two values from outside could overflow.
-    if (std::abs(steps->whole / 2) > motion::Motor::kMaxPosition) {
-      return fail(fmt::format("{}: {} steps is out of range; allowed: +-{}", motor.name(),
-                              steps->whole, motion::Motor::kMaxPosition));
-    }
-    const auto from = absolute ? Result<units::Steps>() : motor.distance_from();
-    if (!from) return fail(motor.name() + ": " + from.error().message);
-    targets[at] = *steps + *from;
-    if (line.way.increment(at) != line.way.longest()) continue;
-    step = (targets[at].whole - ways[at].from) * (ways[at].to < ways[at].from ? -1 : 1);
-  }
-  const std::uint32_t end = line.target;
-  for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    const motion::Motor& motor = installation_[line.motors[i]];
-    if (*step < 0 || *step > end) {
-      return fail(
-          fmt::format("{}: {} is beyond the ends of the line that is under way; run {} first, "
-                      "or wait for its result",
-                      motor.name(), motor.coordinates().text(targets[i].whole),
-                      words::remedy("stop", motor.name())));
-    }
-    const auto s = static_cast<std::uint32_t>(*step);
-    const std::int64_t on_way = line.way.position_at(i, s);
-    if (targets[i].whole == on_way) continue;
-    return fail(
-        fmt::format("{}: {} is not on the line that is under way, which leads through {} "
-                    "there; run {} first, or wait for its result",
-                    motor.name(), motor.coordinates().text(targets[i].whole),
-                    motor.coordinates().text(on_way), words::remedy("stop", motor.name())));
-  }
-  return static_cast<std::uint32_t>(*step);
-}
-
-void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
-                     const std::vector<MotorId>& motors, const api::MoveLine& request) {
-  const auto refuse = [&asker](const std::string& why) { asker.answer(api::Refused{why}); };
-  const std::string& name = installation_[motors.front()].name();
-  if (request.dry_run) return refuse(name + " moves; a dry run is of lines from rest");
-  if (request.duration_s) {
-    return refuse("the line is under way: a duration is of a line from rest; give a speed");
-  }
-  const auto number = number_of(motors);
-  if (!number) return refuse(number.error().text());
-  Line& line = lines_.at(*number);
-  const std::string stop = "run " + words::remedy("stop", name) + " first";
-  if (line.path) return refuse(name + " moves on a path; " + stop + ", or wait for its result");
-  if (line.points.size() > 1) {
-    return refuse("the line ends in a last approach for backlash; " + stop);
-  }
-  std::vector<bushd_delay> shortest_delays;
-  for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    const motion::Motor& motor = installation_[line.motors[i]];
-    if (motor.axis().stopping() || motor.is_paused() || motor.as<motion::OnLine>()->stands) {
-      return refuse(motor.name() + " is being stopped or paused; wait for that, or resume it");
-    }
-    const auto shortest_delay = moves_.shortest_delay_of(line.motors[i], request.speed);
-    if (!shortest_delay) return refuse(shortest_delay.error().text());
-    shortest_delays.push_back(shortest_delay_on(line, i, *shortest_delay));
-  }
-  std::vector<units::Steps> targets;
-  const auto step = step_of(line, motors, request, targets);
-  if (!step) return refuse(step.error().text());
-  line.way.set_shortest_delays(shortest_delays);
-  asker.answer(api::Accepted{});
-  moves_.take_over(line.motors, asker);
-  line.target = *step;
-  Point& to = line.points.front();
-  to.shortest_delays = shortest_delays;
-  to.asked_for = std::move(targets);
-  for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    to.steps[i] = line.way.position_at(i, *step);
-    motion::OnLine now = *installation_[line.motors[i]].as<motion::OnLine>();
-    now.target_steps = to.steps[i];
-    now.last_run = true;
-    installation_[line.motors[i]].aim_on_line(now, *step, line.way.shortest_delay());
-  }
-  open(asker, *number, line);
-  moves_.redirect_on_line(now_us, line.motors);
-}
-
 void Lines::step(std::int64_t now_us) {
-  if (!coming_.empty() && coming_.front().path.line.path->is_planned()) {
-    Coming planned = std::move(coming_.front());
-    coming_.pop_front();
-    begin_path(now_us, std::move(planned));
+  if (auto planned = paths_.take_planned()) {
+    Line& line = planned->line;
+    if (planned->dry_run) {
+      plan_only(now_us, planned->asker, line, *line.path());
+    } else {
+      start(now_us, planned->asker, std::move(line));
+    }
   }
   for (auto it = lines_.begin(); it != lines_.end();) {
     it = follow(now_us, it->first, it->second) ? std::next(it) : lines_.erase(it);
@@ -320,7 +221,9 @@ void Lines::step(std::int64_t now_us) {
 }
 
 bool Lines::follow(std::int64_t now_us, std::uint64_t number, Line& line) {
-  if (line.waits && !follow_trigger(now_us, number, line)) return true;
+  if (line.waits() && !follow_trigger(now_us, number, line, *line.straight()->trigger)) {
+    return true;
+  }
   const auto cause = cause_to_end(now_us, number, line);
   if (cause) end(now_us, number, line, *cause);
   bool any = false;
@@ -393,18 +296,23 @@ void Lines::go_on(std::int64_t now_us, std::uint64_t number, Line& line) {
     if (installation_[line.motors[i]].axis().line_planned_end() < farthest) behind.push_back(i);
   }
   if (!behind.empty()) return begin_run(now_us, number, line, behind, farthest);
-  if (farthest < line.target && line.path && line.rest->first_step() != farthest) {
-    line.rest = line.path->rest(farthest);
-    line.track.reset();
+  if (AlongPath* along = line.path()) {
+    if (farthest < line.target && along->rest->first_step() != farthest) {
+      along->rest = along->path->rest(farthest);
+      along->track.reset();
+    }
+    if (!along->rest->is_planned()) return;  // as soon as it is
   }
-  if (line.path && !line.rest->is_planned()) return;  // as soon as it is
   if (farthest < line.target) return begin_run(now_us, number, line, all, line.target);
+  Straight* straight = line.straight();
+  if (straight == nullptr) return;  // the last run of a path leads to its end
   // At a point that is not the last, or beyond one that came too late.
-  if (farthest == line.target) line.points.erase(line.points.begin());
+  std::vector<Straight::Point>& points = straight->points;
+  if (farthest == line.target) points.erase(points.begin());
   std::vector<std::int64_t> from;
   for (const MotorId id : line.motors) from.push_back(installation_[id].position_steps());
-  line.way = lay(line, from, line.points.front());
-  line.target = line.way.longest();
+  straight->way = lay(line.motors, straight->by, from, points.front());
+  line.target = line.longest();
   log(line);
   begin_run(now_us, number, line, all, line.target);
 }
@@ -413,16 +321,17 @@ std::string Lines::conclusion(std::uint64_t number) const {
   const auto found = lines_.find(number);
   if (found == lines_.end()) return {};
   const Line& line = found->second;
-  if (!line.begun) return {};
+  if (!line.has_begun()) return {};
   const bool moves_on = std::ranges::any_of(
       line.motors, [&](MotorId motor) { return on_line(motor, number) != nullptr; });
   if (moves_on) return {};
-  if (line.path) return deviation(line).insert(0, "; the path has ended");
-  return fmt::format("; the line was limited by {}{}{}", limiting(line), deviation(line),
-                     apart(line));
+  const Straight* straight = line.straight();
+  if (straight == nullptr) return deviation(line).insert(0, "; the path has ended");
+  return fmt::format("; the line was limited by {}{}{}", limiting(line, straight->way),
+                     deviation(line), apart(*straight));
 }
 
-std::string Lines::apart(const Line& line) {
+std::string Lines::apart(const Straight& line) {
   if (!line.pace) return {};
   return fmt::format("; the ports were at most {:.1f} ms apart",
                      1e-6 * static_cast<double>(line.pace->most_ahead_ns()));
@@ -430,25 +339,24 @@ std::string Lines::apart(const Line& line) {
 
 // At the point of the line that is nearest to where the motors stand.
 std::string Lines::deviation(const Line& line) const {
+  const Straight* straight = line.straight();
   std::uint32_t at = 0;
   std::size_t farthest_off = 0;
   std::int64_t least = INT64_MAX;
   // One that has ended earlier may have begun to move again.
   const auto followed = [&](std::size_t i) {
     const auto& share = installation_[line.motors[i]].axis().line();
-    return share && (line.path ? share->way == line.path->number() && share->track
-                               : share->table == line.way.table());
+    return share && line.is_of(*share);
   };
   std::vector<std::uint32_t> candidates;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     if (!followed(i)) continue;
     candidates.push_back(installation_[line.motors[i]].axis().line_planned_end());
     // Where MCUs have ramped the run down by themselves nobody has planned it.
-    if (line.path || line.way.increment(i) != line.way.longest()) continue;
+    if (straight == nullptr || straight->way.increment(i) != line.longest()) continue;
     const std::int64_t made =
-        std::abs(installation_[line.motors[i]].position_steps() - line.way.position_at(i, 0));
-    candidates.push_back(
-        static_cast<std::uint32_t>(std::min<std::int64_t>(made, line.way.longest())));
+        std::abs(installation_[line.motors[i]].position_steps() - line.position_at(i, 0));
+    candidates.push_back(static_cast<std::uint32_t>(std::min<std::int64_t>(made, line.longest())));
   }
   for (const std::uint32_t step : candidates) {
     std::int64_t most = 0;

@@ -1,327 +1,43 @@
-// Lines that are paths: from points to a plan, and what differs then.
-#include <fmt/format.h>
-
+// Lines that are paths: what differs then.
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <utility>
 
 #include "daemon/services/lines.h"
 
 namespace bushd::daemon {
 namespace {
 
-// Segments that are planned in one slice; each takes some microseconds at each of three passes.
-constexpr std::size_t kSegmentsPerSlice = 100;
-constexpr std::size_t kMostComing = 4;
+// A part of a path that is yet to be planned, after a stop on the way; null: none.
+motion::Path* unplanned(const Line& line) {
+  const AlongPath* along = line.path();
+  return along == nullptr || along->rest->is_planned() ? nullptr : along->rest.get();
+}
 
 }  // namespace
 
-std::uint32_t Lines::Line::longest() const {
-  return path ? static_cast<std::uint32_t>(path->steps()) : way.longest();
-}
-
-std::int64_t Lines::Line::position_at(std::size_t motor, std::uint32_t step) const {
-  return path ? path->position_at(motor, step) : way.position_at(motor, step);
-}
-
-double Lines::Line::most_steps_per_s(std::size_t motor) const {
-  return path ? path->most_steps_per_s(motor) : way.most_steps_per_s(motor);
-}
-
-motion::LineShare Lines::Line::share(std::size_t motor, std::uint32_t from, std::uint32_t to) {
-  if (!path) {
-    motion::LineShare share = way.share(motor, from, to);
-    share.by = by;
-    return share;
-  }
-  motion::LineShare share{.way = path->number(),
-                          .track = {},
-                          .motor = motor,
-                          .longest = longest(),
-                          .from = from,
-                          .to = to};
-  // One that makes no step of it only waits.
-  const auto moves = [motor](const motion::Path& of) { return of.most_steps_per_s(motor) > 0; };
-  if (rest->first_step() == from && to == rest->steps()) {
-    share.increment = moves(*rest) ? 1 : 0;
-    if (!track) track = std::make_shared<const motion::PathTrack>(rest, to);
-    share.track = track;
-    return share;
-  }
-  // One that has stopped earlier than others goes after them: some segments.
-  std::shared_ptr<motion::Path> part = path->rest(from, path->segment_at(to - 1));
-  part->plan(SIZE_MAX);
-  share.increment = moves(*part) ? 1 : 0;
-  share.track = std::make_shared<const motion::PathTrack>(part, to);
-  return share;
-}
-
-// Points are looked at as they come: a million of them at once would keep others waiting.
-void Lines::request(std::int64_t, const api::Asker& asker, const api::MovePath& request) {
-  const auto refuse = [&](const Error& why) { asker.answer(api::Refused{why.text()}); };
-  const std::string client = asker.session ? asker.session->client_id() : std::string();
-  const auto motors = installation_.find(request.motors);
-  if (!motors) return refuse(motors.error());
-  const auto last = path_points_.take(client, request);
-  if (request.first_row == 0) {
-    incoming_.erase(client);
-    ended_.erase(client);
-  }
-  if (!last) return refuse(last.error());
-  const auto is_dropped = [&](const auto& one) {
-    return one.first != client && !path_points_.has(one.first);
-  };
-  std::erase_if(incoming_, is_dropped);
-  std::erase_if(ended_, is_dropped);
-  auto incoming = incoming_.find(client);
-  if (incoming != incoming_.end()) {
-    Incoming& path = incoming->second;
-    path.after_stops = std::min(path.after_stops, asker.after_stops);
-  }
-  if (const auto by = overtaken(client, asker, request)) {
-    incoming_.erase(client);
-    ended_.erase(client);
-    if (!*last) ended_.emplace(client, *by);
-    return open_.not_begun(asker, *by);
-  }
-  Result<void> good;
-  if (incoming == incoming_.end()) {
-    auto begun = begin_points(asker, request);
-    if (begun) {
-      incoming = incoming_.emplace(client, std::move(*begun)).first;
-    } else {
-      good = fail(begun.error());
-    }
-  }
-  if (good) good = same_scales(incoming->second);
-  if (good) good = add_points(incoming->second, request);
-  if (good && *last) good = may_follow(incoming->second);
-  if (good && *last && coming_.size() >= kMostComing) {
-    good = fail(fmt::format("{} paths are being planned; try again in a moment", coming_.size()));
-  }
-  if (!good) {
-    path_points_.drop(client);
-    incoming_.erase(client);
-    return refuse(good.error());
-  }
-  if (!*last) {
-    asker.answer(api::Accepted{});
-    return asker.answer(api::Completed{.outcome = api::Outcome::kDone,
-                                       .reason = "these points are taken; more are to come",
-                                       .detail = {}});
-  }
-  Line& line = incoming->second.line;
-  line.rest = line.path;
-  line.target = line.longest();
-  for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    line.points.front().steps.push_back(line.path->point(line.path->segments(), i));
-  }
-  coming_.push_back({asker, request.dry_run, std::move(incoming->second)});
-  incoming_.erase(incoming);
-}
-
-std::optional<Precedence::Overtaken> Lines::overtaken(const Incoming& path) const {
-  return open_.precedence().overtaken(path.after_stops, path.line.motors);
-}
-
-// A stop since its first points has ended all of it: those that come still, too.
-std::optional<Precedence::Overtaken> Lines::overtaken(const std::string& client,
-                                                      const api::Asker& asker,
-                                                      const api::MovePath& part) const {
-  if (part.dry_run) return std::nullopt;
-  if (const auto ended = ended_.find(client); ended != ended_.end()) return ended->second;
-  if (const auto path = incoming_.find(client); path != incoming_.end()) {
-    return overtaken(path->second);
-  }
-  return open_.precedence().overtaken(asker.after_stops, *installation_.find(part.motors));
-}
-
-void Lines::end_overtaken(std::int64_t) {
-  std::erase_if(coming_, [this](const Coming& coming) {
-    const auto by = coming.dry_run ? std::nullopt : overtaken(coming.path);
-    if (by) open_.not_begun(coming.asker, *by);
-    return by.has_value();
-  });
-}
-
-Result<Lines::Incoming> Lines::begin_points(const api::Asker& asker,
-                                            const api::MovePath& request) const {
-  Incoming incoming;
-  incoming.after_stops = asker.after_stops;
-  Line& line = incoming.line;
-  line.motors = *installation_.find(request.motors);
-  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
-  if (const auto one = on_one_bus(line.motors); !one) return fail(one.error());
-  std::vector<motion::Path::Motor> motors;
-  std::vector<std::int64_t> begin;
-  Point& to = line.points.emplace_back();
-  for (const MotorId id : line.motors) {
-    const auto shortest_delay = moves_.shortest_delay_of(id, request.speed);
-    if (!shortest_delay) return fail(shortest_delay.error());
-    line.tables.push_back(installation_.table_of(id));
-    motors.push_back({&line.tables.back()->view(), *shortest_delay});
-    to.shortest_delays.push_back(*shortest_delay);
-    begin.push_back(installation_[id].position_steps());
-    incoming.scales.push_back(installation_[id].coordinates().scale());
-    incoming.low.push_back({0, begin.back()});
-    incoming.high.push_back({0, begin.back()});
-  }
-  const auto corners = request.corners == api::MovePath::Corners::kExact
-                           ? motion::Path::Corners::kExact
-                           : motion::Path::Corners::kContinuous;
-  line.path = std::make_shared<motion::Path>(std::move(motors), begin, corners,
-                                             static_cast<std::size_t>(request.rows));
-  if (auto may = may_begin(line); !may) return fail(may.error());
-  return incoming;
-}
-
-// Points become steps as they are taken: by another offset or direction later ones would lie
-// elsewhere.
-Result<void> Lines::same_scales(const Incoming& incoming) const {
-  for (std::size_t m = 0; m < incoming.scales.size(); ++m) {
-    const motion::Motor& motor = installation_[incoming.line.motors[m]];
-    if (motor.coordinates().scale() == incoming.scales[m]) continue;
-    return fail(
-        motor.name() +
-        ": its offset or direction has changed since the path's first points were received; send "
-        "the path again from its beginning");
-  }
-  return {};
-}
-
-Result<void> Lines::add_points(Incoming& incoming, const api::MovePath& request) const {
-  const Line& line = incoming.line;
-  const std::size_t width = line.motors.size();
-  std::vector<std::int64_t> point(width);
-  std::vector<bushd_delay> shortest_delays;
-  for (std::size_t at = 0; at < request.positions.size(); at += width) {
-    const std::int32_t row = ++incoming.rows;
-    for (std::size_t m = 0; m < width; ++m) {
-      const motion::Motor& motor = installation_[line.motors[m]];
-      const auto wrong = [&](const std::string& why) {
-        return fail(fmt::format("point {}, {}: {}", row, motor.name(), why));
-      };
-      const auto steps = motor.steps_of_position(api::UserUnits{request.positions[at + m]});
-      if (!steps) return wrong(steps.error().message);
-      if (std::abs(*steps) > motion::Motor::kMaxPosition)
-        return wrong(fmt::format("it is beyond +-{} steps", motion::Motor::kMaxPosition));
-      point[m] = *steps;
-      if (*steps < incoming.low[m].steps) incoming.low[m] = {row, *steps};
-      if (*steps > incoming.high[m].steps) incoming.high[m] = {row, *steps};
-    }
-    if (!request.speeds.empty()) {
-      auto shortest_delay = shortest_delay_to(incoming, point.front(), request.speeds[at]);
-      if (!shortest_delay)
-        return fail(fmt::format("point {}, {}", row, shortest_delay.error().text()));
-      shortest_delays.assign(1, *shortest_delay);
-    }
-    line.path->add(point, shortest_delays);
-  }
-  if (line.path->steps() <= static_cast<std::uint64_t>(motion::Motor::kMaxPosition)) return {};
-  return fail(fmt::format("the path has more than {} steps; make several paths of it",
-                          motion::Motor::kMaxPosition));
-}
-
-// Of the way to a point of a motor with speeds.
-Result<bushd_delay> Lines::shortest_delay_to(Incoming& incoming, std::int64_t point,
-                                             double speed) const {
-  const Line& line = incoming.line;
-  const MotorId id = line.motors.front();
-  const std::int64_t way = point - line.path->point(line.path->segments(), 0);
-  const int direction = way > 0 ? 1 : way < 0 ? -1 : 0;
-  // It would go to the beginning of a speed first, and back.
-  if (direction * incoming.direction < 0) {
-    return fail(installation_[id].name() +
-                ": it lies behind the point before it, or the motor; "
-                "give speeds in the order of their positions");
-  }
-  if (direction != 0) incoming.direction = direction;
-  if (speed == 0) return line.points.front().shortest_delays.front();
-  const auto shortest_delay = moves_.shortest_delay_of(id, api::Speed{.per_s = speed});
-  if (!shortest_delay) return fail(shortest_delay.error());
-  return std::max(*shortest_delay, line.points.front().shortest_delays.front());
-}
-
-// All stand at its beginning, points are still the steps that they were, and each motor may go to
-// the ends of its way.
-Result<void> Lines::may_follow(const Incoming& incoming) const {
-  const Line& line = incoming.line;
-  if (auto may = may_begin(line); !may) return may;
-  if (auto same = same_scales(incoming); !same) return same;
-  for (std::size_t m = 0; m < line.motors.size(); ++m) {
-    const motion::Motor& motor = installation_[line.motors[m]];
-    for (const auto& [row, steps] : {incoming.low[m], incoming.high[m]}) {
-      const auto may = motor.may_move_to(steps, line.points.front().shortest_delays[m]);
-      if (may) continue;
-      const std::string where = row == 0 ? "" : fmt::format("point {}, ", row);
-      return fail(fmt::format("{}{}: {}", where, motor.name(), may.error().text()));
-    }
-  }
-  return {};
-}
-
-// All stand where the path begins, and nothing keeps them there.
-Result<void> Lines::may_begin(const Line& line) const {
-  if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
-  for (std::size_t i = 0; i < line.motors.size(); ++i) {
-    const motion::Motor& motor = installation_[line.motors[i]];
-    const std::string name = motor.name() + ": ";
-    if (auto may = interlocks_.may_move(line.motors[i]); !may) {
-      return fail(name + may.error().text());
-    }
-    if (motor.has_plan()) {
-      return fail(name + "it moves; a path begins at rest, so stop it or wait for its result");
-    }
-    if (motor.position_steps() != line.path->point(0, i) ||
-        &installation_.table_of(line.motors[i])->view() != line.path->motors()[i].table) {
-      return fail(name +
-                  "it was moved, or its table changed, while the path was planned; send it "
-                  "again");
-    }
-  }
-  return {};
-}
-
 bool Lines::plans() const {
-  return !coming_.empty() || std::ranges::any_of(lines_, [](const auto& line) {
-    return line.second.path && !line.second.rest->is_planned();
+  return !paths_.idle() || std::ranges::any_of(lines_, [](const auto& line) {
+    return unplanned(line.second) != nullptr;
   });
 }
 
 // What is under way comes first.
 void Lines::work() {
-  for (auto& [number, line] : lines_) {
-    if (line.path && !line.rest->is_planned()) {
-      line.rest->plan(kSegmentsPerSlice);
+  for (const auto& [number, line] : lines_) {
+    if (motion::Path* rest = unplanned(line)) {
+      rest->plan(AlongPath::kSegmentsPerSlice);
       return;
     }
   }
-  if (!coming_.empty()) coming_.front().path.line.path->plan(kSegmentsPerSlice);
+  paths_.work();
 }
 
-void Lines::begin_path(std::int64_t now_us, Coming coming) {
-  const api::Asker& asker = coming.asker;
-  Line& line = coming.path.line;
-  const auto refuse = [&](const Error& why) { asker.answer(api::Refused{why.text()}); };
-  // This comes first: the path points to tables, which may have been replaced while it was planned.
-  if (const auto may = may_follow(coming.path); !may) return refuse(may.error());
-  const motion::Path& path = *line.path;
-  const double tick_ns = installation_[line.motors.front()].axis().tick_ns();
-  const double longest_ns = tick_ns * motion::Axis::kMaxDurationTicks;
-  const double duration_ns = static_cast<double>(path.units()) * path.unit_ns();
-  if (duration_ns > longest_ns) {
-    return refuse(
-        Error{fmt::format("the path would take {:.1f} days; the longest move is {:.1f} "
-                          "days: make several paths of it",
-                          duration_ns / 86400e9, longest_ns / 86400e9)});
-  }
-  if (!coming.dry_run) return start(now_us, asker, std::move(line));
+void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, Line& line, AlongPath& along) {
+  const motion::Path& path = *along.path;
   std::vector<DryRun::Part> parts;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     const std::int64_t from = path.point(0, i);
-    DryRun::Part part{line.motors[i], path.point(path.segments(), i) - from, 0, from};
-    if (line.longest() != 0) part.line = line.share(i, 0, line.longest());
+    DryRun::Part part{line.motors[i], line.end_of(i) - from, 0, from};
+    if (line.longest() != 0) part.line = along.share(i, 0, line.longest());
     parts.push_back(std::move(part));
   }
   dry_runs_.request(now_us, asker, parts);

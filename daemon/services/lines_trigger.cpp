@@ -18,8 +18,7 @@ void Lines::request(const api::Asker& asker, const api::ArmLine& request) {
   if (!line) return asker.answer(api::Refused{line.error().text()});
   asker.answer(api::Accepted{});
   const std::uint64_t number = ++last_number_;
-  line->waits = true;
-  line->begun = false;
+  line->straight()->trigger.emplace();
   open(asker, number, *line);
   Line& kept = lines_.emplace(number, std::move(*line)).first->second;
   log(kept);
@@ -33,7 +32,7 @@ api::MoveLine Lines::as_move(const api::ArmLine& request) {
           .duration_s = request.duration_s};
 }
 
-Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
+Result<Line> Lines::line_to_arm(const api::ArmLine& request) const {
   const auto motors = installation_.find(request.motors);
   if (!motors) return fail(motors.error());
   for (const MotorId id : *motors) {
@@ -46,7 +45,7 @@ Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
   auto line = line_of(as_move(request));
   if (!line) return line;
   for (std::size_t i = 0; i < line->motors.size(); ++i) {
-    if (line->way.increment(i) != 0) continue;
+    if (line->straight()->way.increment(i) != 0) continue;
     return fail(installation_[line->motors[i]].name() +
                 ": a move of no steps; leave it out, as a trigger cannot begin that");
   }
@@ -55,6 +54,7 @@ Result<Lines::Line> Lines::line_to_arm(const api::ArmLine& request) const {
 }
 
 Result<void> Lines::may_wait(const Line& line) const {
+  const motion::Way& way = line.straight()->way;
   for (const McuId id : installation_.mcus_of(line.motors)) {
     const Mcu& mcu = installation_[id];
     if (!mcu.can_arm_lines()) {
@@ -76,9 +76,8 @@ Result<void> Lines::may_wait(const Line& line) const {
             motor.name(), mcu.name()));
       }
     }
-    if (auto has_table = check_table(line, mcu); !has_table) return has_table;
-    if (!mcu.keeps_up_with(line.way.table()->view(), line.way.shortest_delay(),
-                           has_all_of(line, mcu))) {
+    if (auto has_table = check_table(way, mcu); !has_table) return has_table;
+    if (!mcu.keeps_up_with(way.table()->view(), way.shortest_delay(), has_all_of(line, mcu))) {
       return fail(fmt::format(
           "MCU {} makes no line as fast as this one by itself; give a lower --speed, or move them "
           "without a trigger",
@@ -89,8 +88,8 @@ Result<void> Lines::may_wait(const Line& line) const {
 }
 
 // It has been uploaded if that was possible.
-Result<void> Lines::check_table(const Line& line, const Mcu& mcu) const {
-  const bushd_table& table = line.way.table()->view();
+Result<void> Lines::check_table(const motion::Way& way, const Mcu& mcu) const {
+  const bushd_table& table = way.table()->view();
   if (mcu.has_table(table)) return {};
   const std::string what =
       fmt::format("the line goes by a table of its own, which MCU {} does not have", mcu.name());
@@ -116,7 +115,7 @@ Result<void> Lines::check_table(const Line& line, const Mcu& mcu) const {
 
 void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
-  const bushd_delay shortest_delay = line.way.shortest_delay();
+  const bushd_delay shortest_delay = line.straight()->way.shortest_delay();
   std::map<McuId, std::vector<link::BusMaster::ArmedOnLine>> parts;
   std::vector<motion::LineShare> shares;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
@@ -136,8 +135,8 @@ void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     motion::OnLine on_line;
     on_line.line = number;
-    on_line.target_steps = line.points.back().steps[i];
-    on_line.last_run = line.points.size() == 1;
+    on_line.target_steps = line.end_of(i);
+    on_line.last_run = line.legs() == 1;
     const McuId mcu = installation_.config()[line.motors[i]].mcu;
     installation_[line.motors[i]].arm_line(numbers[mcu], on_line, std::move(shares[i]),
                                            shortest_delay);
@@ -151,18 +150,20 @@ bool Lines::waits(MotorId motor, std::uint64_t number) const {
 }
 
 // Of its MCUs: in the first reports after the edge some have begun and others are yet to tell.
-bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line) {
+bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, const Line& line,
+                           Triggered& trigger) {
   std::vector<MotorId> begun;  // and not over
   std::vector<MotorId> waiting;
   for (const MotorId id : line.motors) {
-    note_begin(id, number, line);
+    note_begin(id, number, trigger);
     if (on_line(id, number) != nullptr) begun.push_back(id);
     if (waits(id, number)) waiting.push_back(id);
   }
-  line.waits = !waiting.empty();
-  if (line.begins.empty()) return !line.waits;  // an end of one that waits ends the others (Moves)
-  line.begun = true;
-  if (const auto cause = cause_to_wait_no_more(line, waiting)) {
+  trigger.waits = !waiting.empty();
+  if (trigger.begins.empty())
+    return !trigger.waits;  // an end of one that waits ends the others (Moves)
+  trigger.begun = true;
+  if (const auto cause = cause_to_wait_no_more(line, trigger, waiting)) {
     std::erase_if(waiting,
                   [&](MotorId id) { return installation_[id].as<motion::Armed>()->stops; });
     for (const MotorId id : waiting) {
@@ -178,24 +179,29 @@ bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, Line& line
   } else {
     keep_together(now_us, begun);
   }
-  return !line.waits;
+  return !trigger.waits;
 }
 
 // A short line may be over by the report that tells of its beginning.
-void Lines::note_begin(MotorId id, std::uint64_t number, Line& line) const {
+void Lines::note_begin(MotorId id, std::uint64_t number, Triggered& trigger) const {
   const motion::Axis& axis = installation_[id].axis();
   const bool has_begun = axis.line() && axis.line()->line == number && !axis.line()->waits;
-  if (!has_begun || std::ranges::find(line.begins, id, &Begin::motor) != line.begins.end()) return;
-  line.begins.push_back({.motor = id, .start = axis.start_tick(), .late_ns = axis.late_ns()});
+  if (!has_begun ||
+      std::ranges::find(trigger.begins, id, &Triggered::Begin::motor) != trigger.begins.end())
+    return;
+  trigger.begins.push_back({.motor = id, .start = axis.start_tick(), .late_ns = axis.late_ns()});
 }
 
-std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line,
+std::optional<std::string> Lines::cause_to_wait_no_more(const Line& line, const Triggered& trigger,
                                                         const std::vector<MotorId>& waiting) const {
-  const auto time = [](const Begin& begin) { return std::pair(begin.start, begin.late_ns); };
-  const auto [first, last] = std::ranges::minmax_element(line.begins, {}, time);
+  const auto time = [](const Triggered::Begin& begin) {
+    return std::pair(begin.start, begin.late_ns);
+  };
+  const auto [first, last] = std::ranges::minmax_element(trigger.begins, {}, time);
   for (const MotorId id : line.motors) {
-    const bool is_left = std::ranges::find(line.begins, id, &Begin::motor) != line.begins.end() ||
-                         std::ranges::find(waiting, id) != waiting.end();
+    const bool is_left =
+        std::ranges::find(trigger.begins, id, &Triggered::Begin::motor) != trigger.begins.end() ||
+        std::ranges::find(waiting, id) != waiting.end();
     if (!is_left) return installation_[id].name() + " did not begin with the others";
   }
   for (const MotorId id : waiting) {

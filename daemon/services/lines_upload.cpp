@@ -49,8 +49,12 @@ bool Lines::may_get_tables(const std::vector<MotorId>& motors, bool armed) const
 
 std::optional<Lines::WantedTable> Lines::table_to_upload(const Line& line, bool armed) const {
   // By a table of its own a motor moves where its MCU does not rest.
-  if (line.by || line.longest() == 0 || !may_get_tables(line.motors, armed)) return std::nullopt;
-  WantedTable wanted{.table = line.way.table(),
+  const Straight* straight = line.straight();
+  if (straight == nullptr || straight->by || line.longest() == 0 ||
+      !may_get_tables(line.motors, armed)) {
+    return std::nullopt;
+  }
+  WantedTable wanted{.table = straight->way.table(),
                      .mcus = {},
                      .all = installation_.mcus_of(line.motors),
                      .upload_us = 0,
@@ -58,7 +62,7 @@ std::optional<Lines::WantedTable> Lines::table_to_upload(const Line& line, bool 
   const bushd_table& table = wanted.table->view();
   for (const McuId id : wanted.all) {
     const Mcu& mcu = installation_[id];
-    if (!mcu.keeps_up_with(table, line.way.shortest_delay(), has_all_of(line, mcu)))
+    if (!mcu.keeps_up_with(table, straight->way.shortest_delay(), has_all_of(line, mcu)))
       return std::nullopt;
     if (mcu.has_table(table)) continue;
     if (!mcu.can_upload(table) || mcu.uploads() || !installation_.rests(mcu)) return std::nullopt;
