@@ -46,8 +46,9 @@ static int8_t first_but(const bushd_mcu* mcu, uint16_t barred) {
 
 bool bushd_mcu_settle_pending(const bushd_mcu* mcu) {
   const bushd_mcu_emission* emission = &mcu->emission;
-  return emission->grid.mode == BUSHD_EMISSION_STAGGERED && emission->settings.settle_us == 0 &&
-         !emission->of.settle.done && first_but(mcu, 0) >= 0;
+  return emission->grid.mode == BUSHD_EMISSION_STAGGERED &&
+         emission->settings.settle_us == BUSHD_SETTLE_MEASURED && !emission->of.settle.done &&
+         first_but(mcu, 0) >= 0;
 }
 
 bool bushd_mcu_wants_samples(const bushd_mcu* mcu) {

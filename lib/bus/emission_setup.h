@@ -15,9 +15,9 @@ namespace bushd::fieldbus {
 
 struct EmissionSetup {
   bushd_emission settings{};
-  // Before work, how long the supply current needs after a step.
+  // A motor makes a step before work, which tells how long the supply current needs after one.
   bool measures() const {
-    return settings.mode == BUSHD_EMISSION_STAGGERED && settings.settle_us == 0;
+    return settings.mode == BUSHD_EMISSION_STAGGERED && settings.settle_us == BUSHD_SETTLE_MEASURED;
   }
   // Where they stand; without messages.
   Error mode_at{};

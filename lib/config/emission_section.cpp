@@ -25,6 +25,28 @@ Result<void> read_us(const TomlReader& reader, std::string_view key, std::int64_
   return {};
 }
 
+// A motor has to move for it, so it is measured only where that is asked for.
+Result<void> read_settle(const TomlReader& reader, std::uint16_t* us) {
+  constexpr std::string_view kKey = "settle_us";
+  constexpr std::string_view kMeasured = "measured";
+  *us = BUSHD_SETTLE_UNKNOWN;
+  if (!reader.has(kKey)) return {};
+  if (reader.is_string(kKey)) {
+    const std::string rule = fmt::format("a whole number 0..{} us or \"{}\"", kMaxUs, kMeasured);
+    const auto word = reader.string(kKey, rule);
+    if (!word) return fail(word.error());
+    if (*word != kMeasured) return refuse(reader, kKey, *word, rule);
+    *us = BUSHD_SETTLE_MEASURED;
+    return {};
+  }
+  if (auto read = read_us(reader, kKey, 0, us); !read) {
+    read.error().message += fmt::format(" or \"{}\"", kMeasured);
+    return read;
+  }
+  if (*us == 0) *us = BUSHD_SETTLE_UNKNOWN;
+  return {};
+}
+
 struct Key {
   std::string_view name;
   std::uint8_t first_mode;  // the modes that know it
@@ -76,8 +98,8 @@ Result<fieldbus::EmissionSetup> read_emission(const TomlReader& reader) {
                                std::uint16_t* us) -> Result<void> {
     return reader.has(key) ? read_us(reader, key, lowest, us) : Result<void>{};
   };
-  if (auto read = optional_us("settle_us", 0, &settings.settle_us); !read) {
-    return fail(read.error());
+  if (settings.mode == BUSHD_EMISSION_STAGGERED) {
+    if (auto read = read_settle(reader, &settings.settle_us); !read) return fail(read.error());
   }
   if (settings.mode == BUSHD_EMISSION_BURST || settings.mode == BUSHD_EMISSION_STAGGERED) {
     settings.dir_setup_us = kDirSetupUs;

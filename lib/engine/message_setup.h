@@ -97,12 +97,16 @@ typedef enum bushd_phase_sequence {
 
 #define BUSHD_PHASE_OUTPUTS 4u  // motor m has the outputs 4m .. 4m+3
 
+// Of bushd_emission.settle_us.
+#define BUSHD_SETTLE_MEASURED 0u  // the MCU measures it, by a step of a motor and its way back
+#define BUSHD_SETTLE_UNKNOWN UINT16_MAX  // T_step at least: pulses are spread over all of that
+
 typedef struct bushd_emission {
   uint8_t mode;           // bushd_emission_mode
   uint8_t sequence;       // bushd_phase_sequence, of phases
   bool hold_current;      // of phases: windings stay on at rest
   uint16_t step_us;       // T_step, of burst, common-dir and staggered; >= 1 there
-  uint16_t settle_us;     // dt_p, of staggered; 0: the MCU measures it
+  uint16_t settle_us;     // dt_p, of staggered; BUSHD_SETTLE_MEASURED, BUSHD_SETTLE_UNKNOWN
   uint16_t dir_setup_us;  // DIR changes as long before a step at least
   uint16_t pulse_us;      // a STEP pulse lasts as long at least
 } bushd_emission;

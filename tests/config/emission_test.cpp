@@ -48,11 +48,9 @@ TEST(EmissionKeys, EachModeHasItsKeys) {
   EXPECT_EQ(common.dir_setup_us, 5);
   const bushd_emission staggered = settings_of("emission = \"staggered\"\nstep_us = 300\n");
   EXPECT_EQ(staggered.mode, BUSHD_EMISSION_STAGGERED);
-  EXPECT_EQ(staggered.settle_us, 0) << "measured";
+  EXPECT_EQ(staggered.settle_us, BUSHD_SETTLE_UNKNOWN);
   EXPECT_EQ(settings_of("emission = \"staggered\"\nstep_us = 300\nsettle_us = 518\n").settle_us,
             518);
-  EXPECT_EQ(settings_of("emission = \"staggered\"\nstep_us = 300\nsettle_us = 0\n").settle_us, 0)
-      << "none is said: measured too";
   const bushd_emission phases = settings_of("emission = \"phases\"\n");
   EXPECT_EQ(phases.sequence, BUSHD_PHASES_FULL);
   EXPECT_TRUE(phases.hold_current);
@@ -60,6 +58,25 @@ TEST(EmissionKeys, EachModeHasItsKeys) {
       "emission = \"phases\"\nphase_sequence = \"three-phase\"\nhold_current = false\n");
   EXPECT_EQ(three.sequence, BUSHD_PHASES_THREE);
   EXPECT_FALSE(three.hold_current);
+}
+
+// A step of a motor measures it: nothing but its name asks for that.
+TEST(EmissionKeys, TheSettlingTimeIsMeasuredWhereThatIsAskedFor) {
+  const std::string staggered = "emission = \"staggered\"\nstep_us = 300\n";
+  const auto measures = [](const std::string& keys) {
+    const auto config = ConfigFile(of_mcu(keys)).load();
+    return config && config->mcus[0].emission.measures();
+  };
+  EXPECT_TRUE(measures(staggered + "settle_us = \"measured\"\n"));
+  EXPECT_FALSE(measures(staggered));
+  EXPECT_FALSE(measures(staggered + "settle_us = 65535\n"));
+  EXPECT_FALSE(measures(staggered + "settle_us = 0\n")) << "none is said";
+  EXPECT_THAT(emission_error(of_mcu(staggered + "settle_us = -1\n")),
+              HasSubstr("21:13: mcu[0].settle_us: is -1; allowed: a whole number 0..65535 us or "
+                        "\"measured\""));
+  EXPECT_THAT(emission_error(of_mcu(staggered + "settle_us = \"yes\"\n")),
+              HasSubstr("21:13: mcu[0].settle_us: is \"yes\"; allowed: a whole number 0..65535 us "
+                        "or \"measured\""));
 }
 
 TEST(EmissionKeys, WhatIsWrongIsNamedWithItsLine) {

@@ -89,7 +89,7 @@ TEST_P(EmissionModes, MovesReachTheirTargetsAndNoStepIsLost) {
 }
 
 TEST(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
-  Lab lab(with_keys("fine", "emission = \"staggered\"\nstep_us = 320\n"));
+  Lab lab(with_keys("fine", "emission = \"staggered\"\nstep_us = 320\nsettle_us = \"measured\"\n"));
   lab.connect();
   EXPECT_NEAR(lab.bus(0).mcu(0).core().emission.of.settle.of.step.back_ns, 518'000, 60'000);
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
@@ -97,6 +97,17 @@ TEST(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
   const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {300, -300}));
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 300);
+}
+
+TEST(EmissionStaggered, NothingMovesToBeMeasuredUnlessThatIsAskedFor) {
+  Lab lab(with_keys("fine", "emission = \"staggered\"\nstep_us = 320\n"));
+  lab.connect();
+  lab.run_for(0.5);
+  for (int m = 0; m < 4; ++m) EXPECT_EQ(lab.bus(0).mcu(0).shaft(m).travel_steps, 0u) << m;
+  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {300, -300}));
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 300u);
+  EXPECT_EQ(lab.bus(0).mcu(0).shaft(1).travel_steps, 300u);
 }
 
 TEST(EmissionPhases, MovesTurnTheWindings) {
