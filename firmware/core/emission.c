@@ -24,7 +24,13 @@ static bushd_status use(bushd_mcu* mcu, const bushd_emission* settings) {
   const bushd_status status = bushd_emission_fit(settings, mcu->tick_ns, mcu->config.slots, &grid);
   if (status != BUSHD_OK) return status;
   bushd_mcu_emission* emission = &mcu->emission;
-  memset(emission, 0, sizeof *emission);
+  const bool settles = settings->mode == BUSHD_EMISSION_STAGGERED;
+  const bool phases = settings->mode == BUSHD_EMISSION_PHASES;
+  if (settles || emission->settings.mode == BUSHD_EMISSION_STAGGERED ||
+      (phases && emission->of.windings.sequence != settings->sequence)) {
+    memset(&emission->of, 0, sizeof emission->of);
+  }
+  if (phases) emission->of.windings.sequence = settings->sequence;
   emission->settings = *settings;
   emission->grid = grid;
   return BUSHD_OK;

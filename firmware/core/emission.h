@@ -12,8 +12,10 @@
 
 typedef struct bushd_mcu bushd_mcu;
 
-// Of up to four motors driven by phases.
+// Of up to four motors driven by phases. Rotors stay where they are while settings change, so the
+// phases do, until another sequence or staggered emission comes.
 typedef struct bushd_mcu_windings {
+  uint8_t sequence;  // that of the phases
   uint8_t phase[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];
   uint8_t on_ticks[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];  // they stay on, after a move
 } bushd_mcu_windings;
@@ -24,7 +26,7 @@ typedef struct bushd_mcu_emission {
   bushd_emission_grid grid;
   union {
     bushd_mcu_settle settle;      // of staggered
-    bushd_mcu_windings windings;  // of phases
+    bushd_mcu_windings windings;  // of all others
   } of;
 } bushd_mcu_emission;
 

@@ -172,6 +172,34 @@ TEST(Emission, PhasesTakeFourOutputsAMotor) {
   EXPECT_EQ(rig.assign(2, 0), BUSHD_E_FORMAT);
 }
 
+// A rotor stands where the levels of its phase hold it: others would turn it, and no counter would
+// tell.
+TEST(Emission, WindingsKeepTheirLevelsThroughOtherSettings) {
+  Rig rig;
+  bushd_emission phases = of_mode(BUSHD_EMISSION_PHASES);
+  phases.hold_current = true;
+  make_ready(rig, phases, BUSHD_FORMAT_FINE);
+  rig.run_plan(plan_move(ramp_law(), 3, Rig::kTickNs, BUSHD_FORMAT_FINE), 0);
+  rig.pass(3);
+  constexpr std::uint16_t kFourthOfHalf = 0x6;
+  ASSERT_EQ(rig.slot_buffer().step[0], kFourthOfHalf);
+  const auto expect_levels = [&](std::uint16_t levels) {
+    ASSERT_EQ(rig.emission(phases), BUSHD_OK);
+    rig.pass(60);  // windings that do not hold stay on for 0.1 s
+    EXPECT_EQ(rig.slot_buffer().step[0], levels);
+  };
+  phases.hold_current = false;
+  expect_levels(0);
+  phases.hold_current = true;
+  expect_levels(kFourthOfHalf);
+  ASSERT_EQ(rig.configure(BUSHD_FORMAT_FINE, 2'000'000), BUSHD_OK);
+  rig.pass(3);
+  expect_levels(kFourthOfHalf);
+  // Its steps are others: it begins with its first one.
+  phases.sequence = BUSHD_PHASES_FULL;
+  expect_levels(0x3);
+}
+
 // Ticks of a move, whoever makes them: as many steps in each as in even emission.
 void expect_same_steps(bushd_format format, const std::function<void(Rig&)>& move) {
   std::vector<int> even;
