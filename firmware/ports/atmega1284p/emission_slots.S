@@ -2,7 +2,7 @@
 ; Timer 1 has no compare C here: compare B does its work in the last slot of a tick and in the first one of the next.
 ; None of them changes a flag of SREG.
 ;
-; Cycles with entry and vector: A 23, where a pulse begins 26, where windings change 40, and once a tick, in the first slot
+; Cycles with entry and vector: A 23, where a pulse begins 26, where windings change 51, and once a tick, in the first slot
 ; and in the last one, some 50; B 16, and once a tick 50 and 75.
 
 #include <avr/io.h>
@@ -65,6 +65,14 @@ other_windings:
     or r24, WANTED
     and r24, DATA_LOW
     out _SFR_IO_ADDR(STEP_PORT), r24
+    ; An edge that waits is that of the winding before: it must not cut one of its pair that has just come on.
+    and WANTED, DATA_LOW
+    ldi r24, 0
+    .irp winding, 0, 1, 2, 3
+    sbrc WANTED, \winding
+    ori r24, 1 << (INTF0 + (\winding & 1))
+    .endr
+    out _SFR_IO_ADDR(EIFR), r24
     mov WANTED, DATA_LOW
     pop r24
     out _SFR_IO_ADDR(SREG), r24

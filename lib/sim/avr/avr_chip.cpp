@@ -1,5 +1,15 @@
 #include "sim/avr/avr_chip.h"
 
+extern "C" {
+#include <avr_adc.h>
+#include <avr_extint.h>
+#include <avr_ioport.h>
+#include <sim_avr.h>
+#include <sim_interrupts.h>
+#include <sim_io.h>
+}
+
+#include <cstring>
 #include <stdexcept>
 
 namespace bushd::sim {
@@ -61,7 +71,47 @@ constexpr AvrChip kAtmega1284p{
     .dir_latch = {'B', 4},
     .keypad_uart = 0};
 
+// INT2 of the ATmega1284P is at PB2, and its ADC may run freely; simavr has it at PB3, and knows
+// nothing else that would start a conversion.
+void mend_atmega1284p(avr_t* avr) {
+  for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
+    if (std::strcmp(io->kind, "adc") == 0) {
+      reinterpret_cast<avr_adc_t*>(io)->adts_op[0] = avr_adts_free_running;
+    }
+    if (std::strcmp(io->kind, "extint") != 0) continue;
+    auto& int2 = reinterpret_cast<avr_extint_t*>(io)->eint[EXTINT_IRQ_OUT_INT2];
+    avr_irq_t* const interrupt = io->irq + EXTINT_IRQ_OUT_INT2;
+    avr_unconnect_irq(avr_io_getirq(avr, int2.port_ioctl, int2.port_pin), interrupt);
+    int2.port_pin = 2;
+    avr_connect_irq(avr_io_getirq(avr, int2.port_ioctl, int2.port_pin), interrupt);
+  }
+}
+
+// A flag of an external interrupt is cleared by a one that is written to it (data sheets, "External
+// Interrupt Flag Register"); to simavr that is memory, and the interrupt comes nevertheless.
+void clear_flags(avr_t* avr, avr_io_addr_t address, std::uint8_t value, void* param) {
+  for (auto& external : static_cast<avr_extint_t*>(param)->eint) {
+    const avr_regbit_t flag = external.vector.raised;
+    if (flag.reg == address && (value >> flag.bit & 1) != 0) {
+      avr_clear_interrupt(avr, &external.vector);
+    }
+  }
+}
+
+void mend_external_flags(avr_t* avr) {
+  for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
+    if (std::strcmp(io->kind, "extint") != 0) continue;
+    auto* const external = reinterpret_cast<avr_extint_t*>(io);
+    avr_register_io_write(avr, external->eint[0].vector.raised.reg, clear_flags, external);
+  }
+}
+
 }  // namespace
+
+void mend(avr_t* avr, const AvrChip& chip) {
+  mend_external_flags(avr);
+  if (&chip == &kAtmega1284p) mend_atmega1284p(avr);
+}
 
 const AvrChip& avr_chip(const std::string& name) {
   for (const AvrChip* chip : {&kAtmega2560, &kAtmega1284p}) {

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <string>
 
+struct avr_t;
+
 namespace bushd::sim {
 
 struct AvrPin {
@@ -40,5 +42,8 @@ struct AvrChip {
 
 // Throws std::runtime_error for another one than "atmega2560" and "atmega1284p".
 const AvrChip& avr_chip(const std::string& name);
+
+// What simavr has otherwise than the data sheet of this chip.
+void mend(avr_t* avr, const AvrChip& chip);
 
 }  // namespace bushd::sim

@@ -63,22 +63,6 @@ avr_uart_t* find_uart(avr_t* avr) {
   throw std::runtime_error("simavr: no UART 0");
 }
 
-// INT2 of the ATmega1284P is at PB2, and its ADC may run freely; simavr has it at PB3, and knows
-// nothing else that would start a conversion.
-void mend_atmega1284p(avr_t* avr) {
-  for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
-    if (std::strcmp(io->kind, "adc") == 0) {
-      reinterpret_cast<avr_adc_t*>(io)->adts_op[0] = avr_adts_free_running;
-    }
-    if (std::strcmp(io->kind, "extint") != 0) continue;
-    auto& int2 = reinterpret_cast<avr_extint_t*>(io)->eint[EXTINT_IRQ_OUT_INT2];
-    avr_irq_t* const interrupt = io->irq + EXTINT_IRQ_OUT_INT2;
-    avr_unconnect_irq(avr_io_getirq(avr, int2.port_ioctl, int2.port_pin), interrupt);
-    int2.port_pin = 2;
-    avr_connect_irq(avr_io_getirq(avr, int2.port_ioctl, int2.port_pin), interrupt);
-  }
-}
-
 avr_irq_t* irq_of(avr_t* avr, AvrPin pin) {
   return avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(pin.port)), pin.bit);
 }
@@ -100,7 +84,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   avr_ = avr_make_mcu_by_name(chip_.name);
   if (avr_ == nullptr) throw std::runtime_error("simavr: no " + options.chip);
   avr_init(avr_);
-  if (chip_.external_interrupts == 3) mend_atmega1284p(avr_);
+  mend(avr_, chip_);
   avr_->frequency = firmware.frequency = kFrequency;
   avr_load_firmware(avr_, &firmware);
   avr_->sleep = no_sleep;

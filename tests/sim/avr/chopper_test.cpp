@@ -2,6 +2,7 @@
 // speed, in ramps, at constant speed and at rest, with both decays.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "sim/avr/avr_mcu.h"
 #include "sim/mcu_alone.h"
@@ -62,26 +63,18 @@ class Chopper : public McuAlone {
   void forget() {
     recorder_.samples.clear();
     recorder_.edges.clear();
-    since_ns_ = bus_.now_ns();
   }
 
   PowerStageRules rules_{};
   AvrMcu* avr_ = nullptr;
-  TimeNs since_ns_ = 0;  // what is recorded
 };
-
-// Both windings of a pair have one comparator. An edge of the one that goes off, while the slot's
-// interrupt is served in which the other one goes on, cuts that for the rest of its first period.
-constexpr TimeNs kTakenOverNs = 3'000;
 
 Figures Chopper::figures() const {
   Figures found;
-  std::array<double, PowerStage::kWindings> now_a{};
-  std::array<double, PowerStage::kWindings> cut_a{};
-  // The other one of a pair may have gone off just before.
-  std::array<TimeNs, PowerStage::kWindings> cut_ns;
-  cut_ns.fill(since_ns_);
-  std::array<bool, PowerStage::kWindings> was_on{};
+  // Not known until the first sample of what is recorded.
+  std::array<std::optional<double>, PowerStage::kWindings> now_a{};
+  std::array<std::optional<double>, PowerStage::kWindings> cut_a{};
+  std::array<TimeNs, PowerStage::kWindings> cut_ns{};
   auto sample = recorder_.samples.begin();
   for (const Edge& edge : recorder_.edges) {
     if (edge.signal != Signal::kStep || edge.index >= PowerStage::kWindings) continue;
@@ -92,14 +85,12 @@ Figures Chopper::figures() const {
     if (!edge.level) {
       cut_a[w] = now_a[w];
       cut_ns[w] = edge.time_ns;
-    } else if (was_on[w] && edge.time_ns - cut_ns[w] < kPeriodNs &&
-               cut_ns[w] - cut_ns[w ^ 2u] >= kTakenOverNs) {
+    } else if (cut_a[w] && edge.time_ns - cut_ns[w] < kPeriodNs) {
       ++found.cuts;
-      found.least_a = std::min(found.least_a, cut_a[w]);
-      found.most_a = std::max(found.most_a, cut_a[w]);
-      found.ripple_a = std::max(found.ripple_a, cut_a[w] - now_a[w]);
+      found.least_a = std::min(found.least_a, *cut_a[w]);
+      found.most_a = std::max(found.most_a, *cut_a[w]);
+      found.ripple_a = std::max(found.ripple_a, *cut_a[w] - *now_a[w]);
     }
-    was_on[w] = true;
   }
   return found;
 }
@@ -159,6 +150,10 @@ INSTANTIATE_TEST_SUITE_P(Drives, ChopperAtSpeed,
                                          Drive{BUSHD_PHASES_WAVE, BUSHD_DECAY_FAST, 100},
                                          Drive{BUSHD_PHASES_FULL, BUSHD_DECAY_SLOW, 200},
                                          Drive{BUSHD_PHASES_FULL, BUSHD_DECAY_FAST, 200},
+                                         // Here comparators fall while phases change.
+                                         Drive{BUSHD_PHASES_FULL, BUSHD_DECAY_SLOW, 300},
+                                         Drive{BUSHD_PHASES_FULL, BUSHD_DECAY_FAST, 300},
+                                         Drive{BUSHD_PHASES_FULL, BUSHD_DECAY_FAST, 90},
                                          Drive{BUSHD_PHASES_HALF, BUSHD_DECAY_SLOW, 60},
                                          Drive{BUSHD_PHASES_HALF, BUSHD_DECAY_FAST, 40}));
 
