@@ -107,7 +107,8 @@ TEST_P(Conformance, ComesIntoStepInTheLongestTicks) {
   expect_the_same_reports();
 }
 
-// A shortest delay below the table's slowest one, one above it, and none; also in a run that is cut.
+// A shortest delay below the table's slowest one, one above it, and none; also in a run that is
+// cut.
 TEST_P(Conformance, TableRunsKeepToTheirSpeedLimits) {
   const Bytes motors = {2, 5, own(14)};
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors));

@@ -17,9 +17,9 @@
 #define EMISSION_SLOTS 128u
 // STEP pulses last as long at least.
 #define EMISSION_PULSE_NS 2500
-// Most that a frame asks for takes no longer than twice that: then the next tick is not begun too
-// late.
-#define EMISSION_FRAME_CYCLES 2000u
+// Half of what the report takes, the most that a frame asks for at once: the next tick is begun so
+// much late at worst. A whole report would leave no room for frames in the shortest ticks.
+#define EMISSION_FRAME_CYCLES 3800u
 
 // All of these are for the main loop only.
 

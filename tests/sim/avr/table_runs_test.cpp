@@ -135,6 +135,10 @@ std::vector<Load> loads() {
   std::vector<Load> loads;
   for (int phase = 0; phase < 4; ++phase) {
     loads.push_back({BUSHD_FORMAT_COARSE, 2'464'000, 1'000, 270, 50, phase});
+  }
+  // In some a poll comes just before the tick in which all runs begin to ramp down, the longest to
+  // prepare.
+  for (int phase = 0; phase < 10; ++phase) {
     loads.push_back({BUSHD_FORMAT_FINE, 2'464'000, 1'000, 270, 50, phase});
   }
   loads.push_back({BUSHD_FORMAT_FINE, 2'464'000, 1'000, 270, 0});
