@@ -37,6 +37,10 @@ def description(part, parts=2, sequence=1, run=1, motors=()):
     return codec.decode("DESCRIPTION", message.encode())
 
 
+def health(part=0, parts=1, sequence=1, run=1, bus="hall"):
+    return codec.decode("HEALTH", messages.health_t(bus=bus, part=part, parts=parts, sequence=sequence, run=run).encode())
+
+
 class Whole(unittest.TestCase):
     def test_is_there_once_all_parts_are(self):
         collector = StatusCollector()
@@ -58,6 +62,16 @@ class Whole(unittest.TestCase):
         self.assertEqual(list(collector.status().motors), ["new"])
         collector.add(state(0, 1, run=2, motors=["new"]))
         self.assertFalse(collector.has_motors())
+
+    def test_health_of_another_run_begins_anew(self):
+        collector = StatusCollector()
+        for part in (health(sequence=9), health(sequence=3, bus="old")):
+            collector.add(part)
+        self.assertEqual(list(collector.health()), ["hall"])
+        collector.add(health(part=0, parts=2, sequence=1, run=2, bus="attic"))
+        self.assertFalse(collector.has_health())
+        collector.add(health(part=1, parts=2, sequence=2, run=2, bus="cellar"))
+        self.assertEqual(list(collector.health()), ["attic", "cellar"])
 
     def test_an_unknown_position_is_none(self):
         collector = StatusCollector()

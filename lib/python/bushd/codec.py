@@ -90,7 +90,7 @@ class Welcome:
 class Part:
     """Which one of the snapshots that together are the whole, with what it says."""
 
-    run: int  # 0 with health
+    run: int
     sequence: int
     utime_us: int
     part: int
@@ -273,7 +273,7 @@ def _health(message: Any) -> Health:
         for below, answers in zip(message.latency_below_us, message.latency_answers)
     )
     bus = made(model.BusHealth, message, latency=latency, mcus=tuple(_mcu_health(mcu) for mcu in message.mcus))
-    return made(Health, message, run=0, content=bus)
+    return made(Health, message, content=bus)
 
 
 def _mcu_health(message: Any) -> model.McuHealth:

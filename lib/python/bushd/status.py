@@ -22,27 +22,25 @@ class StatusCollector:
         """Whether it is used: a part beyond all configurations, and one older than what is there, is not."""
         if not 0 <= part.part < part.parts <= MAX_PARTS:
             return False
-        if isinstance(part, Health):
-            return self._put(self._healths, part, renew=True)
         if part.run != self._run:  # of another daemon
             self._run = part.run
             self._states.clear()
             self._descriptions.clear()
             self._healths.clear()
+        if isinstance(part, Health):
+            return self._put(self._healths, part)
         if isinstance(part, Description):
             return self._put(self._descriptions, part)
         self.states_heard += 1
         return self._put(self._states, part)
 
-    def _put(self, parts: dict[int, Part], part: Part, renew: bool = False) -> bool:
+    def _put(self, parts: dict[int, Part], part: Part) -> bool:
         # Maybe of another configuration.
         if parts and next(iter(parts.values())).parts != part.parts:
             parts.clear()
         known = parts.get(part.part)
         if known is not None and part.sequence < known.sequence:
-            if not renew:
-                return False
-            parts.clear()  # health tells no run: a sequence that begins anew is another daemon's
+            return False
         parts[part.part] = part
         return True
 
