@@ -28,7 +28,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       jogs_(installation_, interlocks_, moves_, open_moves_),
       pauses_(installation_, interlocks_, moves_, local_inputs_, open_moves_),
       lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
-      arrays_(installation_, interlocks_, journal_, moves_, open_moves_),
+      trajectories_(installation_, interlocks_, journal_, moves_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, open_moves_, kept_, outputs),
       link_faults_(installation_, emergency_stop_, outputs),
       drivers_(installation_, interlocks_, emergency_stop_),
@@ -75,7 +75,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 &settings_,
                 &travels_,
                 &camac_,
-                &arrays_},
+                &trajectories_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener(
@@ -167,8 +167,8 @@ void Core::request(std::int64_t now, const api::Asker& who, const api::Request& 
   if (!waiting_requests_.hold(now, asker, request)) carry_out(now, asker, request);
 }
 
-// Paths, arrays and lines for the trigger are found out about when they are carried out: their
-// points are many, or their MCUs have yet to get a table.
+// Paths, trajectories and lines for the trigger are found out about when they are carried out:
+// their points are many, or their MCUs have yet to get a table.
 bool Core::would_take(const api::Request& request) const {
   return std::visit(Overloaded{[&](const api::Move& r) { return moves_.would_take(r); },
                                [&](const api::MoveLine& r) { return lines_.would_take(r); },
@@ -212,7 +212,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
                  [&](const api::MovePath& r) { lines_.request(asker, r); },
                  [&](const api::Camac& r) { camac_.request(now, asker, r); },
-                 [&](const api::Follow& r) { arrays_.request(now, asker, r); },
+                 [&](const api::Follow& r) { trajectories_.request(now, asker, r); },
                  [&](const api::ArmLine& r) {
                    if (!r.while_connected || while_connected_.take(asker)) lines_.request(asker, r);
                  },
@@ -238,13 +238,13 @@ void Core::keep_up(std::int64_t now_us) {
 void Core::work() {
   if (moves_.begins()) return moves_.work();
   if (lines_.plans()) return lines_.work();
-  arrays_in_turn_ = !arrays_in_turn_ || dry_runs_.idle();
-  if (arrays_in_turn_ && !arrays_.idle()) return arrays_.work();
+  trajectories_in_turn_ = !trajectories_in_turn_ || dry_runs_.idle();
+  if (trajectories_in_turn_ && !trajectories_.idle()) return trajectories_.work();
   dry_runs_.work();
 }
 
 std::int64_t Core::next_wake_us() const {
-  if (moves_.begins() || lines_.plans() || !dry_runs_.idle() || !arrays_.idle()) return 0;
+  if (moves_.begins() || lines_.plans() || !dry_runs_.idle() || !trajectories_.idle()) return 0;
   std::int64_t wake = std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
                                 idle_drivers_.next_wake_us(), jogs_.next_wake_us()});
   for (const BusId id : installation_.buses()) {

@@ -14,7 +14,6 @@
 #include "api/session.h"
 #include "daemon/core/supervisor.h"
 #include "daemon/model/outputs.h"
-#include "daemon/services/arrays.h"
 #include "daemon/services/camac.h"
 #include "daemon/services/drivers.h"
 #include "daemon/services/dry_run.h"
@@ -38,6 +37,7 @@
 #include "daemon/services/state_publisher.h"
 #include "daemon/services/stops.h"
 #include "daemon/services/tables_in_service.h"
+#include "daemon/services/trajectories.h"
 #include "daemon/services/travels.h"
 #include "daemon/services/trigger.h"
 #include "daemon/services/waiting_requests.h"
@@ -84,7 +84,7 @@ class Core {
   bool begins_moves() const { return moves_.begins(); }
   // Units of work done so far in slices.
   std::uint64_t units_of_work() const {
-    return dry_runs_.units() + moves_.units() + arrays_.units();
+    return dry_runs_.units() + moves_.units() + trajectories_.units();
   }
 
   // Answers to what the outputs were asked, what the daemon has kept from before, and checks.
@@ -124,7 +124,7 @@ class Core {
   Jogs jogs_;
   Pauses pauses_;
   Lines lines_;
-  Arrays arrays_;
+  Trajectories trajectories_;
   EmergencyStop emergency_stop_;
   LinkFaults link_faults_;
   Drivers drivers_;
@@ -140,7 +140,7 @@ class Core {
   Camac camac_;
   std::vector<Service*> services_;  // in the order in which they follow what MCUs tell
   Supervisor supervisor_;
-  bool arrays_in_turn_ = false;
+  bool trajectories_in_turn_ = false;
 };
 
 }  // namespace bushd::daemon

@@ -11,7 +11,7 @@ namespace bushd::daemon {
 
 // The same with motors in place of patterns, in the order of the configuration; nothing if it has
 // none. A pattern that stands for no motor stays, as the name of a motor that there is not. Of a
-// path and an array names are those of columns, and stay.
+// path and a trajectory names are those of columns, and stay.
 std::optional<api::Request> with_motors_of_patterns(const Installation& installation,
                                                     const api::Request& request);
 

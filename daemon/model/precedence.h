@@ -43,7 +43,7 @@ class Precedence {
     std::vector<MotorId> of{};
   };
   // Of a request that moves motors, or lets them move: those that it names. Of a path and of an
-  // array only who has their parts can tell.
+  // trajectory only who has their parts can tell.
   std::optional<Overtaken> overtaken(const api::Asker& asker, const api::Request& request) const;
   std::optional<Overtaken> overtaken(std::uint64_t after_stops,
                                      const std::vector<MotorId>& motors) const;

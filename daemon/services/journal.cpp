@@ -18,7 +18,7 @@ std::string_view what_moves(const motion::Motor& motor) {
   return motor.is<motion::Travelling>() ? "travel" : "local";
 }
 
-constexpr std::size_t kRowsPerLine = 500;  // of an array
+constexpr std::size_t kRowsPerLine = 500;  // of a trajectory
 
 }  // namespace
 
@@ -116,7 +116,7 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
                     {"to", share->to}};
   }
   if (const auto& followed = motor.axis().trajectory()) {
-    line["array"] = {{"array", followed->number}, {"column", followed->motor}};
+    line["trajectory"] = {{"trajectory", followed->number}, {"column", followed->motor}};
   }
   if (late_ns != 0) line["late_ns"] = late_ns;
   if (motor.axis().shortest_delay() != 0) line["shortest_delay"] = motor.axis().shortest_delay();
@@ -166,28 +166,27 @@ std::uint64_t Journal::path_laid(const std::vector<MotorId>& motors, const motio
   return last_id_;
 }
 
-void Journal::array_rows(LoggedArray& array, const motion::Trajectory& trajectory,
-                         const std::vector<MotorId>& motors) {
-  std::size_t& logged = array.rows;
+void Journal::trajectory_rows(LoggedTrajectory& logged, const motion::Trajectory& trajectory,
+                              const std::vector<MotorId>& motors) {
   const bool cubic = trajectory.interpolation() == motion::Trajectory::Interpolation::kCubic;
   do {
-    const std::size_t until = std::min(trajectory.rows(), logged + kRowsPerLine);
+    const std::size_t until = std::min(trajectory.rows(), logged.rows + kRowsPerLine);
     const bool last = until == trajectory.rows() && trajectory.closed();
-    nlohmann::json line = {{"event", "array"},
-                           {"array", array.number},
+    nlohmann::json line = {{"event", "trajectory"},
+                           {"trajectory", logged.number},
                            {"interpolation", cubic ? "cubic" : "linear"},
                            {"closed", last}};
     for (const MotorId id : motors) line["motors"].push_back(installation_[id].name());
     line["rows"] = nlohmann::json::array();
-    for (; logged < until; ++logged) {
-      nlohmann::json row = {trajectory.time_ns(logged)};
+    for (; logged.rows < until; ++logged.rows) {
+      nlohmann::json row = {trajectory.time_ns(logged.rows)};
       for (std::size_t m = 0; m < motors.size(); ++m) {
-        row.push_back(trajectory.position(logged, m));
+        row.push_back(trajectory.position(logged.rows, m));
       }
       line["rows"].push_back(std::move(row));
     }
     outputs_.move_log(json_text(line));
-  } while (logged < trajectory.rows());
+  } while (logged.rows < trajectory.rows());
 }
 
 void Journal::changed(MotorId motor, const motion::Change& change) {

@@ -29,16 +29,16 @@ class Journal final : public Service {
   };
   std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);
   std::uint64_t path_laid(const std::vector<MotorId>& motors, const motion::Path& path);
-  // An array in the log, and how many of its rows are there.
-  struct LoggedArray {
+  // A trajectory in the log, and how many of its rows are there.
+  struct LoggedTrajectory {
     std::uint64_t number = 0;
     std::size_t rows = 0;
   };
   // Before its motors follow it.
-  LoggedArray array_begun() { return {.number = ++last_id_}; }
+  LoggedTrajectory trajectory_begun() { return {.number = ++last_id_}; }
   // Rows that it has now and that have not been logged, and whether one follows.
-  void array_rows(LoggedArray& array, const motion::Trajectory& trajectory,
-                  const std::vector<MotorId>& motors);
+  void trajectory_rows(LoggedTrajectory& logged, const motion::Trajectory& trajectory,
+                       const std::vector<MotorId>& motors);
   void changed(MotorId motor, const motion::Change& change);
   void ended(MotorId motor, std::string_view result);
   void position_set(MotorId motor, std::int64_t from_steps, const api::Asker& by);

@@ -34,7 +34,7 @@ std::string Pauses::left_alone(MotorId id) const {
   if (motor.is<motion::Armed>()) return "waiting for the trigger";
   if (motor.is<motion::Travelling>()) return "travelling by its MCU";
   if (motor.is<motion::Local>()) return "moved by local inputs";
-  if (motor.follows()) return "following an array";
+  if (motor.follows()) return "following a trajectory";
   return {};
 }
 
@@ -53,12 +53,12 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   named = installation_.with_lines(std::move(named));
   const auto follows = [this](MotorId id) { return installation_[id].follows(); };
   const auto moves = [this](MotorId id) { return installation_[id].moves(); };
-  const auto array = std::ranges::find_if(named, follows);
-  if (array != named.end() &&
+  const auto trajectory = std::ranges::find_if(named, follows);
+  if (trajectory != named.end() &&
       std::ranges::count_if(named, moves) == std::ranges::count_if(named, follows)) {
     return asker.answer(api::Refused{
-        installation_[*array].name() +
-        " follows an array, whose times go on: stop it, and follow the rest of the rows from "
+        installation_[*trajectory].name() +
+        " follows a trajectory, whose times go on: stop it, and follow the rest of the rows from "
         "where its motors stand"});
   }
   asker.answer(api::Accepted{});

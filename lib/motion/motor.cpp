@@ -498,10 +498,10 @@ event::Ended Motor::reached() {
 }
 
 event::Ended Motor::ran_out() {
-  event::Ended event =
-      ended(Outcome::kStopped, axis_.trajectory()->trajectory->closed()
-                                   ? "its array ended in motion; ramped down by its table"
-                                   : "no further rows of its array came; ramped down by its table");
+  event::Ended event = ended(
+      Outcome::kStopped, axis_.trajectory()->trajectory->closed()
+                             ? "its trajectory ended in motion; ramped down by its table"
+                             : "no further rows of its trajectory came; ramped down by its table");
   event.by_plan = true;
   return event;
 }

@@ -42,7 +42,7 @@ Result<void> Motor::may_move_to(std::int64_t target, bushd_delay shortest_delay)
                 " first, then move it by itself");
   }
   if (follows()) {
-    return fail("it follows an array; run " + words::remedy("stop", name()) +
+    return fail("it follows a trajectory; run " + words::remedy("stop", name()) +
                 " first, then move it by itself");
   }
   if (restored_reason_ && setup_.restored_refused) {
@@ -111,7 +111,7 @@ Result<std::int64_t> Motor::rounded_distance_from() const {
   if (jogs_)
     return fail(fmt::format("it jogs, and nobody has said where it is to stand; {}", kRemedy));
   if (follows())
-    return fail(fmt::format("it follows an array, which may get more rows; {}", kRemedy));
+    return fail(fmt::format("it follows a trajectory, which may get more rows; {}", kRemedy));
   return target_steps();
 }
 

@@ -74,7 +74,7 @@ struct Desk {
                               }};
 };
 
-// Of motors m01 and m02; the last of these begins the motion. `round`: arrays have numbers.
+// Of motors m01 and m02; the last of these begins the motion. `round`: trajectories have numbers.
 struct Kind {
   const char* name;
   std::function<std::vector<api::Request>(std::int64_t round)> requests;
@@ -93,7 +93,7 @@ std::vector<api::Request> path_in_parts(std::int32_t rows, std::int32_t rows_of_
   return parts;
 }
 
-std::vector<api::Request> array_in_parts(std::int64_t number, int parts) {
+std::vector<api::Request> trajectory_in_parts(std::int64_t number, int parts) {
   std::vector<api::Request> requests;
   api::Follow common{.array = number, .motors = {"m01", "m02"}};
   for (int i = 0; i < parts; ++i) {
@@ -120,7 +120,7 @@ const std::vector<Kind> kKinds{
      }},
     {"path", [](std::int64_t) { return path_in_parts(40, 40); }},
     {"path in parts", [](std::int64_t) { return path_in_parts(60, 20); }},
-    {"array", [](std::int64_t round) { return array_in_parts(round, 2); }},
+    {"trajectory", [](std::int64_t round) { return trajectory_in_parts(round, 2); }},
     {"arm",
      [](std::int64_t) {
        return std::vector<api::Request>{
@@ -316,9 +316,10 @@ TEST_F(StopOrder, OfRowsThatAreBeingChecked) {
   Lab lab(toml_with_homes());
   lab.connect();
   Desk desk(lab);
-  const Kind array{"array", [](std::int64_t round) { return array_in_parts(round, 1); }};
+  const Kind trajectory{"trajectory",
+                        [](std::int64_t round) { return trajectory_in_parts(round, 1); }};
   for (const api::Request& stop : kStops) {
-    check(desk, array, stop, [&](const auto& requests) {
+    check(desk, trajectory, stop, [&](const auto& requests) {
       desk.take(desk.mover, requests.front());
       desk.carry_out();
     });

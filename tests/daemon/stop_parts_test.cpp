@@ -1,5 +1,5 @@
-// Stops of what is under way in part only: a path or an array whose rows still come, a motor that
-// has been homed and is to move on, a jog whose end is not as it should be.
+// Stops of what is under way in part only: a path or a trajectory whose rows still come, a motor
+// that has been homed and is to move on, a jog whose end is not as it should be.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -83,8 +83,8 @@ TEST(StopParts, APathThatWasEndedBeforeItsFirstPartIsNoDryRunLater) {
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
-api::Follow part_of_array(Part part, std::vector<double> time_s = {},
-                          std::vector<double> positions = {}) {
+api::Follow part_of_trajectory(Part part, std::vector<double> time_s = {},
+                               std::vector<double> positions = {}) {
   return {.part = part,
           .array = 7,
           .motors = {"m01", "m02"},
@@ -104,20 +104,20 @@ TEST(StopParts, APartThatWasAskedForBeforeAStopEndsTheWhole) {
               HasSubstr("stopped: m01: stopped by command"));
   const std::vector<double> times{0, 2};
   const std::vector<double> positions{0, 0, 100, 0};
-  EXPECT_THAT(late->result(late->ask(part_of_array(Part::kRows, times, positions))),
+  EXPECT_THAT(late->result(late->ask(part_of_trajectory(Part::kRows, times, positions))),
               HasSubstr("done: "));
-  EXPECT_THAT(late->result(late->ask(part_of_array(Part::kRun), before)),
+  EXPECT_THAT(late->result(late->ask(part_of_trajectory(Part::kRun), before)),
               HasSubstr("stopped: m01: stopped by command"));
   lab.run_for(1);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 // It runs; these rows of it were sent before the stop, and are taken before it or after it.
-struct RunningArray {
-  RunningArray() : lab(hall(1, 2)) {
+struct RunningTrajectory {
+  RunningTrajectory() : lab(hall(1, 2)) {
     lab.connect();
-    late->result(late->ask(part_of_array(Part::kRows, {0, 2}, {0, 0, 100, 0})));
-    run = late->ask(part_of_array(Part::kRun));
+    late->result(late->ask(part_of_trajectory(Part::kRows, {0, 2}, {0, 0, 100, 0})));
+    run = late->ask(part_of_trajectory(Part::kRun));
     lab.run_for(0.5);
   }
   std::string result_of_rows(const api::Request& stop, bool taken_before, const api::Follow& rows) {
@@ -133,34 +133,36 @@ struct RunningArray {
   std::int64_t run = 0;
 };
 
-// None of these ends the motion of a motor that follows an array: so they end none of its rows.
-TEST(StopParts, WhatDoesNotStopARunningArrayLeavesItsRowsWhole) {
+// None of these ends the motion of a motor that follows a trajectory: so they end none of its rows.
+TEST(StopParts, WhatDoesNotStopARunningTrajectoryLeavesItsRowsWhole) {
   const std::vector<api::Request> harmless{api::Hold{{"m01"}}, api::Pause{{"m01"}},
                                            api::Jog{.motor = "m01"}, api::Disarm{{"m01"}}};
   for (const api::Request& stop : harmless) {
     for (const bool taken : {false, true}) {
       SCOPED_TRACE(std::string(api::name_of(stop)) + (taken ? ", rows taken" : ", rows not taken"));
-      RunningArray array;
-      EXPECT_EQ(array.result_of_rows(stop, taken, part_of_array(Part::kRows, {3}, {100, 0})),
-                "done: 3 rows can be followed so far");
-      EXPECT_THAT(array.late->result(array.late->ask(part_of_array(Part::kLastRows, {5}, {0, 0}))),
+      RunningTrajectory trajectory;
+      EXPECT_EQ(
+          trajectory.result_of_rows(stop, taken, part_of_trajectory(Part::kRows, {3}, {100, 0})),
+          "done: 3 rows can be followed so far");
+      EXPECT_THAT(trajectory.late->result(
+                      trajectory.late->ask(part_of_trajectory(Part::kLastRows, {5}, {0, 0}))),
                   HasSubstr("done: 4 rows"));
-      EXPECT_THAT(array.late->result(array.run), HasSubstr("reached: "));
-      EXPECT_EQ(array.lab.shaft_steps("m01"), 0);
-      EXPECT_THAT(array.lab.errors(), IsEmpty());
+      EXPECT_THAT(trajectory.late->result(trajectory.run), HasSubstr("reached: "));
+      EXPECT_EQ(trajectory.lab.shaft_steps("m01"), 0);
+      EXPECT_THAT(trajectory.lab.errors(), IsEmpty());
     }
   }
 }
 
-TEST(StopParts, RowsOfARunningArrayThatAStopEndsSaySo) {
+TEST(StopParts, RowsOfARunningTrajectoryThatAStopEndsSaySo) {
   for (const bool taken : {false, true}) {
     SCOPED_TRACE(taken ? "rows taken" : "rows not taken");
-    RunningArray array;
-    const std::string rows = array.result_of_rows(api::Stop{{"m02"}}, taken,
-                                                  part_of_array(Part::kLastRows, {4}, {9, 0}));
+    RunningTrajectory trajectory;
+    const std::string rows = trajectory.result_of_rows(
+        api::Stop{{"m02"}}, taken, part_of_trajectory(Part::kLastRows, {4}, {9, 0}));
     EXPECT_THAT(rows, HasSubstr("stopped: "));
     EXPECT_THAT(rows, HasSubstr("stopped by command"));
-    EXPECT_THAT(array.late->result(array.run), HasSubstr("stopped: "));
+    EXPECT_THAT(trajectory.late->result(trajectory.run), HasSubstr("stopped: "));
   }
 }
 

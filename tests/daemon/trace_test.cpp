@@ -1,6 +1,6 @@
 // A day in a lab, judged by tools/check-trace from the log of moves and the pins alone: moves in
 // every way of emission, homing, local motion, a limit switch, jogs, pauses, moves of two legs,
-// lines, arrays.
+// lines, trajectories.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -102,13 +102,13 @@ class Trace : public Traced<Manner> {
     EXPECT_EQ(lab.wait(by({-1200, -600, 300})).result, "reached");
   }
   // Straight and cubic, to its end, in motion beyond it, stopped, and with rows that come later.
-  void follow_arrays(Lab& lab) {
+  void follow_trajectories(Lab& lab) {
     const std::vector<std::string> motors{"m02", "m03", "m05"};
-    std::int64_t array = 0;
+    std::int64_t trajectory = 0;
     using Part = api::Follow::Part;
     const auto rows = [&](Part part, bool cubic, const std::vector<std::vector<double>>& all) {
       api::Follow follow{.part = part,
-                         .array = array,
+                         .array = trajectory,
                          .motors = motors,
                          .cubic = cubic,
                          .stretch = cubic ? 1.1 : 1};
@@ -122,7 +122,7 @@ class Trace : public Traced<Manner> {
       return lab.send(follow);
     };
     const auto begin = [&] {
-      ++array;
+      ++trajectory;
       begins_.clear();
       for (const auto& motor : motors) begins_.push_back(lab.motor(motor).position_steps);
     };
@@ -187,7 +187,7 @@ class Trace : public Traced<Manner> {
               1);
     EXPECT_EQ(check(lab,
                     [](auto& event) {
-                      if (event["event"] != "array") return true;
+                      if (event["event"] != "trajectory") return true;
                       event["rows"][1][0] = event["rows"][1][0].template get<int>() + 9'000'000;
                       return true;
                     }),
@@ -242,7 +242,7 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   move_at_speeds(lab);
   change_on_the_way(lab);
   move_along_lines(lab);
-  follow_arrays(lab);
+  follow_trajectories(lab);
   lab.run_for(0.1);
   write(lab);
   EXPECT_EQ(check(lab, [](auto&) { return true; }), 0) << said();

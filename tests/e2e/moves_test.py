@@ -116,9 +116,9 @@ class Moves(EndToEndTest):
         self.assert_one_result_each()
         self.assert_trace_is_right(status)
         # The log has what the file says, computed otherwise: in 2^-32 step, and ns.
-        arrays = [event for event in self.moves() if event["event"] == "array"]
-        self.assertEqual([event["interpolation"] for event in arrays], ["linear", "cubic"])
-        for event, stretch in zip(arrays, (1, Fraction(5, 4))):
+        trajectories = [event for event in self.moves() if event["event"] == "trajectory"]
+        self.assertEqual([event["interpolation"] for event in trajectories], ["linear", "cubic"])
+        for event, stretch in zip(trajectories, (1, Fraction(5, 4))):
             told = [[int(Fraction(str(t)) * 10**9 * stretch), *(int(Fraction(str(p)) * 2**32) for p in at)] for t, *at in rows]
             self.assertEqual(event["rows"], told)
 

@@ -30,7 +30,7 @@ bool begins_motion(CommandKind kind) {
     case CommandKind::kJog:
     case CommandKind::kLine:
     case CommandKind::kPath:
-    case CommandKind::kArray:
+    case CommandKind::kTrajectory:
     case CommandKind::kArmLine:
       return true;
     default:
@@ -332,8 +332,8 @@ Request Clients::compose(CommandKind kind) {
       return arm_line();
     case CommandKind::kPath:
       return move_along_path();
-    case CommandKind::kArray:
-      return tell_array();
+    case CommandKind::kTrajectory:
+      return tell_trajectory();
     case CommandKind::kCamac:
       return of_program();
     case CommandKind::kChased:

@@ -30,7 +30,7 @@ class Clients {
   Request enable_all() { return of_all_online(Ask::kEnable); }
   Request clear_all() { return of_all_online(Ask::kClearFaults); }
   // What those ask who have begun to jog; before quiet they die.
-  // So do those whose array was told; what is left of it comes later.
+  // So do those whose trajectory was told; what is left of it comes later.
   std::vector<Request> due(bushd::sim::TimeNs now_ns);
   void let_go() {
     joggers_.die();
@@ -83,7 +83,7 @@ class Clients {
   std::vector<Choice> some_at_rest(std::int64_t most);
   Request move_along_path();
   Request first_of_parts(Request path);
-  Request tell_array();
+  Request tell_trajectory();
   Request of_some(Ask ask, std::vector<std::string> motors);
   std::vector<std::string> motors_with(bool bushd::api::MotorState::* flag) const;
   std::optional<Request> remedy_of_pauses();
@@ -110,7 +110,7 @@ class Clients {
     Request request;
   };
   std::vector<Later> later_;
-  std::int64_t arrays_ = 0;
+  std::int64_t trajectories_ = 0;
   std::int64_t parts_ = 0;  // paths told in parts
   CommandCounts sent_by_kind_{};
 };

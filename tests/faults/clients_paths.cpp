@@ -1,4 +1,4 @@
-// What clients ask of several motors at a time: paths, and arrays of positions in time.
+// What clients ask of several motors at a time: paths, and trajectories of positions in time.
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
@@ -107,12 +107,12 @@ Request Clients::first_of_parts(Request path) {
 
 // No motor turns round: how close steps may be there is no rule of its table. Of straight lines
 // each is about as slow as a motor that starts; cubics are up to four times as fast.
-Request Clients::tell_array() {
+Request Clients::tell_trajectory() {
   const std::vector<Choice> some = some_at_rest(4);
   if (some.empty()) return move(1);
   Request rows = make(Ask::kRows);
   rows.user = true;
-  rows.array = ++arrays_;
+  rows.trajectory = ++trajectories_;
   rows.cubic = random_.one_in(2);
   std::vector<std::int64_t> ways;
   for (const Choice& choice : some) {
@@ -139,7 +139,7 @@ Request Clients::tell_array() {
   run.times_ms.clear();
   const std::int64_t run_after_ns = random_.between(100, 1'500) * kMsNs;
   rows.last_rows = count < 4 || random_.one_in(2);
-  // Parts may come in another order, and begin another array then.
+  // Parts may come in another order, and begin another trajectory then.
   run.unknown_way = !rows.last_rows;
   later_.push_back({.after_ns = run_after_ns, .due_ns = 0, .request = std::move(run)});
   if (rows.last_rows) return rows;

@@ -75,7 +75,7 @@ enum class CommandKind : std::uint8_t {
   kLine,
   kCamac,
   kPath,
-  kArray,
+  kTrajectory,
   kShutter,
   kArmLine,
   kChased,

@@ -137,7 +137,7 @@ api::Follow follow_of(const Request& request) {
   return {.part = !rows               ? Part::kRun
                   : request.last_rows ? Part::kLastRows
                                       : Part::kRows,
-          .array = request.array,
+          .array = request.trajectory,
           .motors = request.motors,
           .cubic = request.cubic,
           .time_s = numbers_of(request.times_ms, 1000),
@@ -150,7 +150,7 @@ std::string_view word_of(const Request& request) {
       return request.line ? "line by" : "move by";
     case Ask::kMoveTo:
       if (!request.points.empty()) return request.exact ? "exact path to" : "path to";
-      if (request.array != 0) return "follow to";
+      if (request.trajectory != 0) return "follow to";
       return request.line ? "line to" : "move to";
     case Ask::kArm:
       if (request.line) return request.rising ? "arm line (rising)" : "arm line (falling)";
@@ -175,7 +175,7 @@ api::Request api_of(const Request& request) {
                        .speed = speed_of(request)};
     case Ask::kMoveTo:
       if (!request.points.empty()) return path_of(request);
-      if (request.array != 0) return follow_of(request);
+      if (request.trajectory != 0) return follow_of(request);
       if (request.line) return line_of(request);
       return api::Move{.kind = api::Move::Kind::kAbsolute,
                        .motors = motor_steps(request),
@@ -213,7 +213,7 @@ api::Request api_of(const Request& request) {
     case Ask::kConfigure:
       return configure_of(request);
     case Ask::kRows:
-      if (request.array == 0) return path_of(request);
+      if (request.trajectory == 0) return path_of(request);
       return follow_of(request);
     case Ask::kCamac:
       return api::Camac{.block = {.mode = request.block_mode,
@@ -259,7 +259,7 @@ std::string text_of(const Request& request) {
   if (request.renew) how += " (renewed)";
   if (request.ask == Ask::kJog) how += fmt::format(", {} ms", request.keepalive_ms);
   if (request.steps_after) how += fmt::format(", {} steps after", *request.steps_after);
-  if (request.array != 0) how += fmt::format(" array {}", request.array);
+  if (request.trajectory != 0) how += fmt::format(" trajectory {}", request.trajectory);
   if (!request.points.empty()) how += fmt::format(" by {}", fmt::join(request.points, ","));
   if (!request.times_ms.empty()) how += fmt::format(" at {}", fmt::join(request.times_ms, ","));
   for (const auto& [naf, count] : runs_of(request.cycles)) {

@@ -37,7 +37,7 @@ enum class Ask : std::uint8_t {
   kRelease,
   kConfigure,
   kCamac,
-  kRows,  // of an array, or points of a path that others follow
+  kRows,  // of a trajectory, or points of a path that others follow
 };
 
 // What a motor may be given in operation. Numbers are millionths of its unit.
@@ -63,15 +63,15 @@ struct Request {
   std::vector<std::int64_t> steps{};   // as many as motors
   bool user = false;                   // they are millionths of each motor's unit
   bool line = false;                   // kMoveBy, kMoveTo, kArm: all on one way
-  std::vector<std::int64_t> points{};  // of a path, or an array, row by row, in millionths
+  std::vector<std::int64_t> points{};  // of a path, or a trajectory, row by row, in millionths
   std::vector<double> point_speeds{};  // of a path of one motor: to each point
   bool exact = false;                  // a path: with a rest at each point
   // Of a path in parts, all of which know all points: which rows this one tells; 0: to the last.
   std::size_t first_row = 0;
   std::size_t end_row = 0;
-  std::int64_t array = 0;                // its number; kMoveTo: to be followed
+  std::int64_t trajectory = 0;           // its number; kMoveTo: to be followed
   std::vector<std::int64_t> times_ms{};  // kRows: of each row
-  bool cubic = false;                    // an array
+  bool cubic = false;                    // a trajectory
   bool last_rows = false;                // kRows
   bool dial = false;                     // kSetPosition: on the dial
   std::int64_t speed_micro = 0;          // of moves and jogs, millionths a second; 0: none

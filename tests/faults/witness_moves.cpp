@@ -125,7 +125,7 @@ std::vector<std::int64_t> Witness::legs_to(const Motor& motor, const Request& re
   const std::int64_t backlash = units_.backlash_steps(index);
   const std::int64_t way = target - plant_steps(motor);
   const bool rests = !motor.moves();
-  const bool straight = !request.points.empty() || request.array != 0;
+  const bool straight = !request.points.empty() || request.trajectory != 0;
   if (straight || request.ask == Ask::kArm || backlash == 0 || (rests && way == 0)) return {target};
   const bool near =
       std::abs(way) <= std::abs(backlash) || !units_.approach_is_slower(index, request);
@@ -303,7 +303,8 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   Motor& motor = *find(line.at("motor").get<std::string>());
   if (changes) return run_changed(motor, line.at("tick"));
   if (begins && on_run) {
-    const bool on_line = line.contains("line") || line.contains("path") || line.contains("array");
+    const bool on_line =
+        line.contains("line") || line.contains("path") || line.contains("trajectory");
     on_run(now_ns, motor.mcu, motor.output, on_line);
   }
   if (begins && motor.move) return run_begins(now_ns, motor);

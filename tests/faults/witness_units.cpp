@@ -59,7 +59,7 @@ std::int64_t Witness::said_steps(const Motor& motor) const {
 // In the daemon's count.
 std::optional<std::int64_t> Witness::target_asked(const Motor& motor, const Request& request,
                                                   std::size_t i) const {
-  // How far a program goes nobody knows, and of an array the last part may come later and be
+  // How far a program goes nobody knows, and of a trajectory the last part may come later and be
   // refused: neither acceptance nor refusal is judged by that.
   if (!trusted(motor) || !offset(motor) || request.unknown_way) return std::nullopt;
   if (request.ask == Ask::kMoveTo) return position_asked(request, i);

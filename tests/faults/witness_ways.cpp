@@ -63,7 +63,7 @@ std::int64_t ticks_apart(const std::vector<std::vector<std::int64_t>>& changed_a
 // Where all of it is known, and all motors rest.
 void Witness::begin_way(Asked& asked) {
   const Request& request = asked.request;
-  if (request.array != 0) return;
+  if (request.trajectory != 0) return;
   // Edges at several MCUs may be apart, and a short line over before that is known.
   const bool several = std::ranges::any_of(request.motors, [&](const std::string& name) {
     return find(name)->mcu != find(request.motors.front())->mcu;

@@ -146,7 +146,7 @@ class Blocking(PythonTest):
                     client.move_line(by={"a0": 5, "b1": -200}, duration_s=0.001)
         self.assert_one_result_each()
 
-    def test_paths_and_arrays(self):
+    def test_paths_and_trajectories(self):
         self.bring_up_with_unit()
         for how in (SOCKET, LCM):
             with self.connect(**how) as client:

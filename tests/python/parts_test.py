@@ -238,7 +238,7 @@ class Arguments(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "1 speeds for 2 points"):
             requests.move_path(["a"], [[1], [2]], speeds=[3])
 
-    def test_rows_of_an_array_come_in_several_messages_and_then_run(self):
+    def test_rows_of_a_trajectory_come_in_several_messages_and_then_run(self):
         times = [n / 8 for n in range(5000)]
         made = [request.message for request in requests.follow(["a"], times, [[-t] for t in times], array=4, cubic=True)]
         kind = messages.follow_t

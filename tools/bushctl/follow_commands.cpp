@@ -1,4 +1,4 @@
-// bushctl follow: an array of times and positions out of a file, told in parts and run.
+// bushctl follow: a trajectory out of a file, told in parts and run.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -123,7 +123,7 @@ void add_follow_command(CommandLine& line) {
           "motors' units. All motors are on one bus, and stand at the first row. All of it is "
           "checked before anything moves: what cannot be followed is named, with the stretch of "
           "time by which it can be. With --wait the exit code is 0 only if every motor came to the "
-          "last row. A stop of one motor stops all; a pause is refused; arrays wait for no "
+          "last row. A stop of one motor stops all; a pause is refused; trajectories wait for no "
           "trigger.")
       .file("FILE", &options->file, "Rows of time and positions")
       .choice("--interpolation", &options->interpolation, {"linear", "cubic"},

@@ -128,7 +128,7 @@ class MotorCheck:
 
     def _check_limited(self, move, steps, edges):
         made = move.direction * (move.result_steps - move.from_steps)
-        # Along an array it may have turned round.
+        # Along a trajectory it may have turned round.
         seen = move.direction * sum(1 if edge.direction else -1 for edge in edges) if move.turns else len(edges)
         if made != seen:
             text = f"move {move.id} is said to have made {made} steps until its limit, its edges are {seen}"

@@ -4,7 +4,7 @@ import json
 import math
 from collections import defaultdict
 
-from check_trace.arrays import Array, ArrayMove
+from check_trace.trajectories import Trajectory, TrajectoryMove
 from check_trace.lines import Envelope, LineMove, Part
 from check_trace.motion import ENDINGS, Move
 from check_trace.problems import InputError
@@ -88,7 +88,7 @@ class MoveLog:
         self._at_steps = {}  # by motor name: where the last result or "set" leaves it
         self._tables = Tables()
         self._ways = {}  # by number: the tables of lines
-        self._arrays = {}  # by number
+        self._trajectories = {}  # by number
         self._ticks = set()  # (bus, tick_ns)
         self.paths = {}  # by number of the way: shortest delays by motor's name
         self.levels = {}  # by address: which outputs are active low
@@ -106,7 +106,7 @@ class MoveLog:
             "table": self._tables.told,
             "line": self._line,
             "path": self._path,
-            "array": self._array,
+            "trajectory": self._trajectory,
             "move": self._move,
             "stop": self._change,
             "retarget": self._change,
@@ -168,8 +168,8 @@ class MoveLog:
             move = PathMove(event, table)
         elif "line" in event:
             move = LineMove(event, table, self._ways[event["line"]["way"]])
-        elif "array" in event:
-            move = ArrayMove(event, table, self._arrays[event["array"]["array"]])
+        elif "trajectory" in event:
+            move = TrajectoryMove(event, table, self._trajectories[event["trajectory"]["trajectory"]])
         else:
             move = Move(event, table)
         motor.moves.append(move)
@@ -184,13 +184,13 @@ class MoveLog:
     def _path(self, event):
         self.paths[event["way"]] = {motor["motor"]: motor["shortest_delay"] for motor in event["motors"]}
 
-    def _array(self, event):
-        """The first rows of an array, or further ones."""
-        number = event["array"]
-        if number in self._arrays:
-            self._arrays[number].add(event)
+    def _trajectory(self, event):
+        """The first rows of a trajectory, or further ones."""
+        number = event["trajectory"]
+        if number in self._trajectories:
+            self._trajectories[number].add(event)
         else:
-            self._arrays[number] = Array(event)
+            self._trajectories[number] = Trajectory(event)
 
     def _change(self, event):
         move = self._moves.get((event["motor"], event["id"]))

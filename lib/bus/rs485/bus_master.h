@@ -76,9 +76,9 @@ class BusMaster {
 
   // --- Motion that the tick source plans
 
-  // Every displacement of every tick reaches the motor in its tick: lines, paths and arrays need
-  // that. Where it is no, a motor makes runs of its table, at least as slow as the table says, and
-  // its ticks wait for it.
+  // Every displacement of every tick reaches the motor in its tick: lines, paths and trajectories
+  // need that. Where it is no, a motor makes runs of its table, at least as slow as the table says,
+  // and its ticks wait for it.
   virtual bool streams() const { return false; }
   // Motors make their parts of a line's run with motors of other buses that answer yes, each by
   // itself and no faster than the slowest (line_pace.h). Then the bus has one motor.

@@ -25,7 +25,7 @@ class Asking:
         session = Session(client_id, loses=link.loses, remedy=link.remedy, prefix=prefix, timing=timing)
         self._timing = timing
         self._driver = Driver(link, session)
-        self._arrays = 0  # numbers of those that it has told
+        self._trajectories = 0  # numbers of those that it has told
 
     def _begin(self, request: Request) -> Exchange:
         return self._driver.session.begin(request, self._driver.now())

@@ -193,8 +193,8 @@ class Moving(Asking):
         followed, and the least stretch that would do. Waiting and results as of `move()`.
         """
         names = list(motors)
-        self._arrays += 1
-        parts = requests.follow(names, time_s, positions, array=self._arrays, cubic=cubic, stretch=stretch)
+        self._trajectories += 1
+        parts = requests.follow(names, time_s, positions, array=self._trajectories, cubic=cubic, stretch=stretch)
         return await self._moved(parts, names, wait, check)
 
     @overload

@@ -31,7 +31,7 @@ api::MovePath path(const Name& motor, const Name& other, std::int32_t rows, std:
   return asked;
 }
 
-api::Follow array(const Name& motor, const Name& other, api::Follow::Part part) {
+api::Follow trajectory(const Name& motor, const Name& other, api::Follow::Part part) {
   api::Follow asked{.part = part, .array = 3, .motors = {motor, other}};
   if (part == api::Follow::Part::kRun) return asked;
   asked.time_s = {0, 1.5, 3};
@@ -72,13 +72,13 @@ const std::vector<Row>& requests() {
        }},
       {"part of a path",
        [](const Name& m, const Name& o, Random& r) -> api::Request { return path(m, o, 6, 3, r); }},
-      {"array",
+      {"trajectory",
        [](const Name& m, const Name& o, Random&) -> api::Request {
-         return array(m, o, api::Follow::Part::kLastRows);
+         return trajectory(m, o, api::Follow::Part::kLastRows);
        }},
-      {"run of an array",
+      {"run of a trajectory",
        [](const Name& m, const Name& o, Random&) -> api::Request {
-         return array(m, o, api::Follow::Part::kRun);
+         return trajectory(m, o, api::Follow::Part::kRun);
        }},
       {"stop", [](const Name& m, const Name&, Random&) -> api::Request { return api::Stop{{m}}; }},
       {"stop, named twice",

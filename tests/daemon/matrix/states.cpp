@@ -14,7 +14,7 @@ void run_somewhere(WatchedLab& lab) {
 void move(WatchedLab& lab, Amounts amounts) {
   lab.ask(api::Move{.motors = std::move(amounts)});
 }
-api::Follow array(api::Follow::Part part) {
+api::Follow trajectory(api::Follow::Part part) {
   api::Follow asked{.part = part, .array = 3, .motors = {"c", "d"}};
   if (part == api::Follow::Part::kRun) return asked;
   asked.time_s = {0, 4, 8};
@@ -110,13 +110,13 @@ const std::vector<State>& states() {
              .motors = {"c", "d"}, .rows = 3, .positions = {400, 100, 900, 300, 1500, -200}});
          run_somewhere(lab);
        }},
-      {"array loaded", "c", false, "d",
-       [](WatchedLab& lab) { lab.ask(array(api::Follow::Part::kLastRows)); }},
+      {"trajectory loaded", "c", false, "d",
+       [](WatchedLab& lab) { lab.ask(trajectory(api::Follow::Part::kLastRows)); }},
       {"following", "c", true, "d",
        [](WatchedLab& lab) {
-         const auto loaded = lab.ask(array(api::Follow::Part::kLastRows));
+         const auto loaded = lab.ask(trajectory(api::Follow::Part::kLastRows));
          lab.run_till([&] { return lab.has_result(loaded); });
-         lab.ask(array(api::Follow::Part::kRun));
+         lab.ask(trajectory(api::Follow::Part::kRun));
          lab.run(lab.below(2500) * 1e-3);
        }},
       {"jogging", "c", true, "d",

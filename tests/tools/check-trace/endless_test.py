@@ -14,7 +14,7 @@ from check_trace_test import TABLE, TOP, CheckTraceTest
 from synthetic import TICK_NS
 
 sys.path.insert(0, str(TOP / "tools"))
-from check_trace import arrays, clock, motion
+from check_trace import clock, motion, trajectories
 
 LOADER = importlib.machinery.SourceFileLoader("check_trace_program", str(TOP / "tools" / "check-trace"))
 CHECK_TRACE = importlib.util.module_from_spec(importlib.util.spec_from_loader(LOADER.name, LOADER))
@@ -52,7 +52,7 @@ class WithoutEnd(CheckTraceTest):
 
         said = io.StringIO()
         with contextlib.ExitStack() as patches:
-            for owner, name in ((motion.Table, "delay_from_start"), (motion.Table, "delay_before_end"), (arrays.Array, "at")):
+            for owner, name in ((motion.Table, "delay_from_start"), (motion.Table, "delay_before_end"), (trajectories.Trajectory, "at")):
                 patches.enter_context(mock.patch.object(owner, name, counted(getattr(owner, name))))
             patches.enter_context(mock.patch.object(sys, "argv", ["check-trace", "--moves", str(moves), "--trace", str(trace), *more]))
             patches.enter_context(contextlib.redirect_stdout(said))
@@ -124,12 +124,12 @@ class WithoutEnd(CheckTraceTest):
         self.assertNotIn("problem", said[1])
         self.assertIn("400 steps commanded, 400 steps made", said[-1])
 
-    def test_an_array_goes_on_when_the_trace_ends(self):
+    def test_a_trajectory_goes_on_when_the_trace_ends(self):
         # 20 steps a second for three years; a tick of them has an edge in its middle or none.
         whole = 10**8
         rows = [[0, 0], [whole * 10**9, 20 * whole * 2**32]]
-        scene = self.one(400, array={"array": 1, "column": 0})
-        scene.events[:] = [{"event": "array", "array": 1, "interpolation": "linear", "rows": rows, "closed": True}, scene.events[0]]
+        scene = self.one(400, trajectory={"trajectory": 1, "column": 0})
+        scene.events[:] = [{"event": "trajectory", "trajectory": 1, "interpolation": "linear", "rows": rows, "closed": True}, scene.events[0]]
         scene.edges[1, 0] = [[100 * TICK_NS + 50_000_000 * n + 25_000_000, 1] for n in range(400)]
         code, said = self.work_of(scene)
         self.assertEqual(said[0], "problem: theta (hall:1, output 0): move 1 has no result")

@@ -1,6 +1,6 @@
-// Motors that follow arrays of times and positions, over the real firmware core: what is checked
-// and said beforehand, where they are at any time, and what ends one motor's part does to the
-// others.
+// Motors that follow trajectories of times and positions, over the real firmware core: what is
+// checked and said beforehand, where they are at any time, and what ends one motor's part does to
+// the others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,10 +52,10 @@ struct UnderWay {
   std::int64_t run = 0;
 };
 
-class Arrays : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Format, Arrays, testing::Values("fine", "coarse"));
+class Trajectories : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Format, Trajectories, testing::Values("fine", "coarse"));
 
-TEST(ArraysAndLimits, AreToldFromTheLowestPositionToTheHighest) {
+TEST(TrajectoriesAndLimits, AreToldFromTheLowestPositionToTheHighest) {
   std::string toml = hall(1, 1);
   const std::string name = "name = \"m01\"\n";
   toml.insert(
@@ -72,7 +72,7 @@ TEST(ArraysAndLimits, AreToldFromTheLowestPositionToTheHighest) {
               testing::HasSubstr("m01 would go to 30.000 mm; allowed: -20.000 mm to 5.000 mm"));
 }
 
-TEST_P(Arrays, AllMotorsAreWhereTheRowsSayAtAnyTime) {
+TEST_P(Trajectories, AllMotorsAreWhereTheRowsSayAtAnyTime) {
   Lab lab(hall(2, 2, GetParam()));
   lab.connect();
   const Answer loaded = lab.wait(lab.send(there_and_back()));
@@ -100,7 +100,7 @@ TEST_P(Arrays, AllMotorsAreWhereTheRowsSayAtAnyTime) {
   expect_clean(lab);
 }
 
-TEST(Array, WhatCannotBeFollowedIsNamedAndNothingMoves) {
+TEST(Trajectory, WhatCannotBeFollowedIsNamedAndNothingMoves) {
   Lab lab(hall(2, 2));
   lab.connect();
   const Answer fast = lab.wait(lab.send(part_of(Part::kLastRows, {0, 1}, {0, 0, 20, 150})));
@@ -109,14 +109,14 @@ TEST(Array, WhatCannotBeFollowedIsNamedAndNothingMoves) {
       fast.reason,
       "row 1 (0 s): m03 is to change at once to 150 steps/s; allowed: 100 steps/s; with times "
       "stretched by 1.500 all motors can follow it");
-  EXPECT_THAT(lab.wait(lab.send(part_of(Part::kRun))).reason, HasSubstr("no such array"));
+  EXPECT_THAT(lab.wait(lab.send(part_of(Part::kRun))).reason, HasSubstr("no such trajectory"));
   auto stretched = part_of(Part::kLastRows, {0, 1}, {0, 0, 20, 150});
   stretched.stretch = 1.5;
   EXPECT_EQ(lab.wait(lab.send(stretched)).result, "done");
   EXPECT_EQ(lab.shaft_steps("m03"), 0);
 }
 
-TEST(Array, RowsAreCheckedForWhatTheyAre) {
+TEST(Trajectory, RowsAreCheckedForWhatTheyAre) {
   Lab lab(hall(2, 2));
   lab.connect();
   const auto refusal = [&](const api::Follow& follow) {
@@ -137,15 +137,15 @@ TEST(Array, RowsAreCheckedForWhatTheyAre) {
   EXPECT_THAT(refusal(stretch), HasSubstr("stretched by 0"));
 }
 
-TEST(Array, MotorsStandAtTheFirstRow) {
+TEST(Trajectory, MotorsStandAtTheFirstRow) {
   Lab lab(hall(2, 2));
   lab.connect();
   lab.wait(lab.send(part_of(Part::kLastRows, {0, 1}, {3, 0, 10, 10})));
   EXPECT_EQ(lab.wait(lab.send(part_of(Part::kRun))).reason,
-            "m01 stands at 0 steps, and the array begins at 3 steps; move it there first");
+            "m01 stands at 0 steps, and the trajectory begins at 3 steps; move it there first");
 }
 
-TEST(Array, RowsMayComeWhileItRunsAndAnOpenEndRampsDown) {
+TEST(Trajectory, RowsMayComeWhileItRunsAndAnOpenEndRampsDown) {
   Lab lab(hall(2, 2));
   lab.connect();
   EXPECT_EQ(lab.wait(lab.send(part_of(Part::kRows, {0, 1.5}, {0, 0, 120, 60}))).reason,
@@ -159,20 +159,21 @@ TEST(Array, RowsMayComeWhileItRunsAndAnOpenEndRampsDown) {
   EXPECT_THAT(late.reason, HasSubstr("come too late"));
   const Answer end = lab.wait(run);
   EXPECT_EQ(end.result, "stopped");
-  EXPECT_THAT(end.reason, HasSubstr("no further rows of its array came; ramped down by its table"));
+  EXPECT_THAT(end.reason,
+              HasSubstr("no further rows of its trajectory came; ramped down by its table"));
   EXPECT_NEAR(static_cast<double>(end.position_steps[0]), 241, 1);
   EXPECT_EQ(lab.shaft_steps("m01"), end.position_steps[0]);
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
-TEST(Array, AStopOfOneStopsAll) {
-  UnderWay array;
-  Lab& lab = array.lab;
-  EXPECT_THAT(lab.wait(lab.send(api::Pause{})).reason, HasSubstr("follows an array"));
+TEST(Trajectory, AStopOfOneStopsAll) {
+  UnderWay trajectory;
+  Lab& lab = trajectory.lab;
+  EXPECT_THAT(lab.wait(lab.send(api::Pause{})).reason, HasSubstr("follows a trajectory"));
   EXPECT_THAT(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).reason,
-              HasSubstr("follows an array"));
+              HasSubstr("follows a trajectory"));
   lab.send(Ask::kStop, {"m03"});
-  const Answer end = lab.wait(array.run);
+  const Answer end = lab.wait(trajectory.run);
   EXPECT_EQ(end.result, "stopped");
   EXPECT_LT(lab.shaft_steps("m01"), 119);
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
@@ -180,27 +181,27 @@ TEST(Array, AStopOfOneStopsAll) {
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
-TEST(Array, ALostMcuRampsDownTheOthers) {
-  UnderWay array;
-  Lab& lab = array.lab;
+TEST(Trajectory, ALostMcuRampsDownTheOthers) {
+  UnderWay trajectory;
+  Lab& lab = trajectory.lab;
   lab.bus(0).reboot(1, 2'000'000'000);
-  const Answer end = lab.wait(array.run);
+  const Answer end = lab.wait(trajectory.run);
   EXPECT_THAT(end.motor_results, ElementsAre("stopped", "link"));
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
   EXPECT_LT(lab.shaft_steps("m01"), 119);
 }
 
-TEST(Array, AnEmergencyStopEndsIt) {
-  UnderWay array;
-  Lab& lab = array.lab;
+TEST(Trajectory, AnEmergencyStopEndsIt) {
+  UnderWay trajectory;
+  Lab& lab = trajectory.lab;
   lab.wait(lab.send(Ask::kEmergencyStop, {}));
-  EXPECT_EQ(lab.wait(array.run).result, "stopped");
+  EXPECT_EQ(lab.wait(trajectory.run).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
   EXPECT_EQ(lab.shaft_steps("m03"), lab.motor("m03").position_steps);
 }
 
 // One that has come to its last row waits for its settling time, though another one has ended.
-TEST(Array, OneThatArrivesSettlesThoughAnotherHasEnded) {
+TEST(Trajectory, OneThatArrivesSettlesThoughAnotherHasEnded) {
   int alone = 0;
   for (std::int64_t left = 1; left < 8; ++left) {
     SCOPED_TRACE(left);

@@ -1,5 +1,5 @@
-// What inputs and outputs of the MCUs do while motors follow an array: position compare goes on,
-// and a limit switch that one motor meets ends the array for all.
+// What inputs and outputs of the MCUs do while motors follow a trajectory: position compare goes
+// on, and a limit switch that one motor meets ends the trajectory for all.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,10 +45,10 @@ class Pins final : public sim::EdgeSink {
   std::vector<sim::TimeNs> steps_ns;
 };
 
-class ArrayInputs : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Format, ArrayInputs, testing::Values("fine", "coarse"));
+class TrajectoryInputs : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Format, TrajectoryInputs, testing::Values("fine", "coarse"));
 
-TEST_P(ArrayInputs, APulseComesWhereTheMotorPasses) {
+TEST_P(TrajectoryInputs, APulseComesWhereTheMotorPasses) {
   Pins pins;
   Lab lab(hall(2, 2, GetParam()), "", &pins);
   lab.connect();
@@ -72,7 +72,7 @@ TEST_P(ArrayInputs, APulseComesWhereTheMotorPasses) {
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
-TEST_P(ArrayInputs, ALimitSwitchEndsTheArrayForAll) {
+TEST_P(TrajectoryInputs, ALimitSwitchEndsTheTrajectoryForAll) {
   std::string toml = hall(2, 2, GetParam());
   const std::string first = "output = 0\n";
   toml.insert(toml.find(first) + first.size(), "limit = \"positive\"\n");

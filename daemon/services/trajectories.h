@@ -1,5 +1,6 @@
-// Motors of one bus follow arrays of times and positions (motion/trajectory.h). Rows are checked
-// as they come, in slices: what motors can follow takes longer to find out than a request may.
+// Motors of one bus follow trajectories: positions over time (motion/trajectory.h). Rows are
+// checked as they come, in slices: what motors can follow takes longer to find out than a request
+// may.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +20,13 @@
 
 namespace bushd::daemon {
 
-class Arrays final : public Service {
+class Trajectories final : public Service {
  public:
   // Of those that are loaded and do not run, the oldest one gives way to one more.
   static constexpr std::size_t kMostLoaded = 8;
 
-  Arrays(Installation& installation, const Interlocks& interlocks, Journal& journal, Moves& moves,
-         OpenMoves& open_moves)
+  Trajectories(Installation& installation, const Interlocks& interlocks, Journal& journal,
+               Moves& moves, OpenMoves& open_moves)
       : installation_(installation),
         interlocks_(interlocks),
         journal_(journal),
@@ -43,14 +44,15 @@ class Arrays final : public Service {
   void step(std::int64_t now_us) override;
 
  private:
-  // Of a motor, when its array was begun: what the check goes by.
+  // Of a motor, when its trajectory was begun: what the check goes by.
   struct Part {
     MotorId motor;
     tables::TablePtr table;
     units::Coordinates coordinates;
     motion::TrajectoryCheck::Motor bounds;
   };
-  struct Array {
+  // A trajectory of a client, from its first rows on.
+  struct Loaded {
     std::string client;
     std::int64_t number;
     std::vector<Part> parts;
@@ -65,51 +67,52 @@ class Arrays final : public Service {
     bool dropped = false;  // a stop has ended it, and its last rows were told that
     // From when it runs: the rows that have been checked.
     std::shared_ptr<motion::Trajectory> followed;
-    Journal::LoggedArray logged{};
+    Journal::LoggedTrajectory logged{};
 
     std::vector<MotorId> motors() const;
   };
-  // Rows of an array, to be checked, and then to be tried with longer times.
+  using Place = std::list<Loaded>::iterator;
+  // Rows of a trajectory, to be checked, and then to be tried with longer times.
   struct Job {
     api::Asker asker;
-    std::list<Array>::iterator array;
+    Place trajectory;
     std::unique_ptr<motion::Trajectory> longer;
     std::unique_ptr<motion::TrajectoryCheck> check_of_longer;
     std::int64_t thousandths = 1000;
     int tries = 0;
   };
 
-  // A stop ends an array that does not run yet, with all parts that are still to come. One that
+  // A stop ends a trajectory that does not run yet, with all parts that are still to come. One that
   // runs is ended by what ends the motion of its motors.
-  std::optional<Precedence::Overtaken> overtaken(const Array& array) const;
-  std::optional<MotorId> no_more(const Array& array) const;
-  std::optional<api::Reply> stopped(const api::Asker& asker, const Array& array) const;
-  std::list<Array>::iterator find(const api::Asker& asker, std::int64_t number);
-  Result<std::list<Array>::iterator> begin(const api::Asker& asker, const api::Follow& request);
-  Result<void> may_go_on(const Array& array, const api::Follow& request) const;
-  Result<void> has_time(std::int64_t now_us, const Array& array) const;
-  Result<void> take(Array& array, const api::Follow& request) const;
+  std::optional<Precedence::Overtaken> overtaken(const Loaded& loaded) const;
+  std::optional<MotorId> no_more(const Loaded& loaded) const;
+  std::optional<api::Reply> stopped(const api::Asker& asker, const Loaded& loaded) const;
+  Place find(const api::Asker& asker, std::int64_t number);
+  Result<Place> begin(const api::Asker& asker, const api::Follow& request);
+  Result<void> may_go_on(const Loaded& loaded, const api::Follow& request) const;
+  Result<void> has_time(std::int64_t now_us, const Loaded& loaded) const;
+  Result<void> take(Loaded& loaded, const api::Follow& request) const;
   void take_rows(std::int64_t now_us, const api::Asker& asker, const api::Follow& request);
-  std::vector<motion::TrajectoryCheck::Motor> bounds_of(const Array& array) const;
-  std::uint32_t tick_ns_of(const Array& array) const;
+  std::vector<motion::TrajectoryCheck::Motor> bounds_of(const Loaded& loaded) const;
+  std::uint32_t tick_ns_of(const Loaded& loaded) const;
 
   void end_job(std::int64_t now_us);
   bool try_longer(Job& job) const;
-  void accept_rows(Array& array);
+  void accept_rows(Loaded& loaded);
   std::string text_of(const Job& job) const;
-  api::MovePlan plan_of(const Array& array) const;
+  api::MovePlan plan_of(const Loaded& loaded) const;
 
   void run(std::int64_t now_us, const api::Asker& asker, const api::Follow& request);
-  Result<void> may_run(const Array& array) const;
-  bool follow(std::int64_t now_us, Array& array);
-  bool follows(const Array& array, MotorId motor) const;
+  Result<void> may_run(const Loaded& loaded) const;
+  bool follow(std::int64_t now_us, Loaded& loaded);
+  bool follows(const Loaded& loaded, MotorId motor) const;
 
   Installation& installation_;
   const Interlocks& interlocks_;
   Journal& journal_;
   Moves& moves_;
   OpenMoves& open_;
-  std::list<Array> arrays_;  // the newest last
+  std::list<Loaded> trajectories_;  // the newest last
   std::deque<Job> jobs_;
   std::uint64_t units_ = 0;
   std::int64_t now_us_ = 0;

@@ -1,4 +1,4 @@
-"""Motors that follow arrays of times and positions, computed anew with exact fractions of whole numbers (lib/motion/trajectory.h has the
+"""Motors that follow trajectories, computed anew with exact fractions of whole numbers (lib/motion/trajectory.h has the
 same law in words).
 
 Positions count in 2^-32 step, times in ns from the first row. Between rows the motion is, rounded down, p + d t / h, or Hermite's cubic by
@@ -21,11 +21,11 @@ STEP = 2**32
 SHARE_BITS = 40
 MOST_IN_A_TICK = 127 * STEP
 
-# row: of the array, before the tick's end; None: it ramps down. turned: in this tick, or it has still to catch up at its beginning
+# row: of the trajectory, before the tick's end; None: it ramps down. turned: in this tick, or it has still to catch up at its beginning
 Tick = namedtuple("Tick", "told_256 direction row last turned")
 
 
-class Array:
+class Trajectory:
     """The rows of all its motors."""
 
     def __init__(self, event):
@@ -71,14 +71,14 @@ class Array:
         return begin + total
 
 
-class ArrayMove(Move):
-    """One motor's way along an array, and by its table to rest where that ends in motion, or is stopped."""
+class TrajectoryMove(Move):
+    """One motor's way along a trajectory, and by its table to rest where that ends in motion, or is stopped."""
 
     turns = True
 
-    def __init__(self, event, table, array):
-        self._array = array
-        self._column = event["array"]["column"]
+    def __init__(self, event, table, trajectory):
+        self._trajectory = trajectory
+        self._column = event["trajectory"]["column"]
         self._stop = None
         self._known = None
         super().__init__(event, table)
@@ -99,7 +99,7 @@ class ArrayMove(Move):
     @property
     def goal_steps(self):
         """Where its last row is; what the log says of its target is that of the rows that were there then."""
-        return (self._array.positions[-1][self._column] + STEP // 2) // STEP
+        return (self._trajectory.positions[-1][self._column] + STEP // 2) // STEP
 
     @goal_steps.setter
     def goal_steps(self, steps):
@@ -107,21 +107,21 @@ class ArrayMove(Move):
 
     def _rests(self):
         """It needs no ramp after the last row: it is at most as fast there as the first code, but for rounding."""
-        array = self._array
-        if not array.closed or array.cubic:
-            return array.closed
-        way = abs(array.positions[-1][self._column] - array.positions[-2][self._column])
+        trajectory = self._trajectory
+        if not trajectory.closed or trajectory.cubic:
+            return trajectory.closed
+        way = abs(trajectory.positions[-1][self._column] - trajectory.positions[-2][self._column])
         first_ns = max(self.table.accel[0], self.table.decel[0]) * self.table.unit_ns
-        return way * first_ns * 10**8 <= (array.times[-1] - array.times[-2]) * STEP * (10**8 + 1)
+        return way * first_ns * 10**8 <= (trajectory.times[-1] - trajectory.times[-2]) * STEP * (10**8 + 1)
 
     def _ticks(self):
         """What its MCU is told at the end of each tick, in 1/256 step."""
-        array, column = self._array, self._column
-        known = array.known()
-        end_ns = array.times[known]
+        trajectory, column = self._trajectory, self._column
+        known = trajectory.known()
+        end_ns = trajectory.times[known]
         rests = self._rests()
-        at = array.positions[0][column]
-        rest = (array.positions[known][column] + STEP // 2) // STEP * STEP
+        at = trajectory.positions[0][column]
+        rest = (trajectory.positions[known][column] + STEP // 2) // STEP * STEP
         told = (at + STEP // 2) // STEP * STEP
         made = told // STEP
         least = min(self.tick_ns * STEP // (2 * self.table.accel[0] * self.table.unit_ns), STEP)
@@ -133,10 +133,10 @@ class ArrayMove(Move):
             stopped = self._stop is not None and self.start_tick + tick >= self._stop
             if stopped or (time_ns > end_ns and not rests):
                 break
-            while row + 1 < known and array.times[row + 1] < time_ns:
+            while row + 1 < known and trajectory.times[row + 1] < time_ns:
                 row += 1
             over = rests and time_ns >= end_ns
-            before, at = at, array.positions[known][column] if over else array.at(row, column, time_ns)
+            before, at = at, trajectory.positions[known][column] if over else trajectory.at(row, column, time_ns)
             way = at - before
             lags = direction == 0 or told != before + direction * (STEP // 2)
             turns = way != 0 and (direction == 0 or (way > 0) != (direction > 0))
@@ -145,7 +145,7 @@ class ArrayMove(Move):
             aim = at + direction * (STEP // 2) if way else at
             if over:
                 aim = rest
-            elif rests and row + 1 == known and not array.cubic and way:
+            elif rests and row + 1 == known and not trajectory.cubic and way:
                 aim = min(aim, rest) if direction > 0 else max(aim, rest)
             most = min(max(2 * abs(way), least), MOST_IN_A_TICK)
             move = max(-most, min(aim - told, most))
@@ -173,13 +173,13 @@ class ArrayMove(Move):
 
     def _ramp(self, tick, row, at, told, made, direction, fastest, fastest_told):
         """As if its MCU heard no more: the running step, as fast as it and the one before it were anywhere, and the fewest that follow."""
-        array, column = self._array, self._column
+        trajectory, column = self._trajectory, self._column
         time_ns = (tick + 1) * self.tick_ns
-        if time_ns <= array.times[array.known()] or self._rests():
-            while row + 1 < array.known() and array.times[row + 1] < time_ns:
+        if time_ns <= trajectory.times[trajectory.known()] or self._rests():
+            while row + 1 < trajectory.known() and trajectory.times[row + 1] < time_ns:
                 row += 1
-            over = time_ns >= array.times[array.known()]
-            way = (array.positions[array.known()][column] if over else array.at(row, column, time_ns)) - at
+            over = time_ns >= trajectory.times[trajectory.known()]
+            way = (trajectory.positions[trajectory.known()][column] if over else trajectory.at(row, column, time_ns)) - at
             if direction == 0 or way * direction > 0:
                 fastest = max(fastest, abs(way))
         unit_ns = self.table.unit_ns
@@ -210,17 +210,17 @@ class ArrayMove(Move):
                 return
 
     def _due(self, tick, row, level):
-        """When the motion crosses a position in this tick, from the beginning of the array; None: not in this tick."""
-        array, column = self._array, self._column
-        low, high = tick * self.tick_ns, min((tick + 1) * self.tick_ns, array.times[array.known()])
+        """When the motion crosses a position in this tick, from the beginning of the trajectory; None: not in this tick."""
+        trajectory, column = self._trajectory, self._column
+        low, high = tick * self.tick_ns, min((tick + 1) * self.tick_ns, trajectory.times[trajectory.known()])
         if high <= low:
             return None
 
         def at(time_ns):
             k = row
-            while k > 0 and array.times[k] > time_ns:
+            while k > 0 and trajectory.times[k] > time_ns:
                 k -= 1
-            return array.at(k, column, time_ns)
+            return trajectory.at(k, column, time_ns)
 
         rises = at(high) > at(low)
         if (at(low) - level) * (1 if rises else -1) > 0 or (at(high) - level) * (1 if rises else -1) < 0:
@@ -232,17 +232,17 @@ class ArrayMove(Move):
 
     def _swing(self, tick, row):
         """The greatest and the least speed around a tick, in steps per ns."""
-        array, column = self._array, self._column
-        end_ns = array.times[array.known()]
+        trajectory, column = self._trajectory, self._column
+        end_ns = trajectory.times[trajectory.known()]
         speeds = []
         for part in range(-4, 8):
             begin, end = ((4 * tick + part) * self.tick_ns // 4, (4 * tick + part + 1) * self.tick_ns // 4)
             if begin < 0 or end > end_ns:
                 speeds.append(0)
                 continue
-            k = bisect.bisect_right(array.times, begin, 0, array.known()) - 1
-            last = bisect.bisect_left(array.times, end, 1, array.known()) - 1
-            speeds.append((array.at(last, column, end) - array.at(k, column, begin)) / STEP / (end - begin))
+            k = bisect.bisect_right(trajectory.times, begin, 0, trajectory.known()) - 1
+            last = bisect.bisect_left(trajectory.times, end, 1, trajectory.known()) - 1
+            speeds.append((trajectory.at(last, column, end) - trajectory.at(k, column, begin)) / STEP / (end - begin))
         return max(speeds), min(speeds)
 
     def _work_out(self):
@@ -288,7 +288,7 @@ class ArrayMove(Move):
     def too_close(self, most):
         """Judged are steps between two turns, of the rows alone; of a cubic, whose speed changes within a tick, with what that makes."""
         table = self.table
-        slack = 1 / 32 if self._array.cubic else 1e-6
+        slack = 1 / 32 if self._trajectory.cubic else 1e-6
         run = []
 
         def judge(ends, index=0):
