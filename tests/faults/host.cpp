@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "small_world.h"
+#include "bare_world.h"
 #include "times.h"
 
 namespace bushfaults {
@@ -27,12 +27,12 @@ constexpr bushd::sim::TimeNs kEndsInNs = 20 * kSecond;
 }  // namespace
 
 Host::Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness,
-           Recent& recent, SmallWorld* small, std::uint64_t seed, bool keeps)
+           Recent& recent, BareWorld* bare, std::uint64_t seed, bool keeps)
     : config_(config),
       bus_(bus),
       witness_(witness),
       recent_(recent),
-      small_(small),
+      bare_(bare),
       random_(seed, kHostStream),
       garbler_{bushd::sim::Garbler(seed, kHostStream + 1),
                bushd::sim::Garbler(seed, kHostStream + 2)} {
@@ -68,7 +68,7 @@ void Host::start() {
     }
   }
   if (plugged_) core().port_opened(now_us(), {});
-  if (small_ != nullptr) small_->daemon_started(now_ns_, *daemon_);
+  if (bare_ != nullptr) bare_->daemon_started(now_ns_, *daemon_);
   step();
 }
 
@@ -79,7 +79,7 @@ void Host::plug_in() {
 }
 
 void Host::send(bushd::BusId bus, std::span<const std::uint8_t> bytes) {
-  if (small_ != nullptr && small_->has(bus)) return small_->send(now_ns_, bus, bytes);
+  if (bare_ != nullptr && bare_->has(bus)) return bare_->send(now_ns_, bus, bytes);
   const auto pieces = garbler_[static_cast<std::size_t>(Direction::kOut)].pass(now_ns_, bytes);
   if (!plugged_ || silent()) return;
   TimeNs at_ns = std::max(free_ns_, now_ns_ + random_.between(20'000, latency_ns_ / 4));
@@ -111,7 +111,7 @@ void Host::deliver() {
 
 void Host::step() {
   daemon_->step();
-  if (small_ != nullptr) small_->answer_orders(now_ns_, *daemon_);
+  if (bare_ != nullptr) bare_->answer_orders(now_ns_, *daemon_);
   if (!witness_.promise().heard_all()) {
     witness_.violated(now_ns_, "an answer of the core's has not arrived");
   }
@@ -122,7 +122,7 @@ void Host::step() {
 bool Host::anything_due() const {
   return (ends_at_ns_ && now_ns_ >= *ends_at_ns_) || now_ns_ >= wake_ns_ || !messages_.empty() ||
          !disk_.empty() || (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) ||
-         (kept_ && kept_->next_ns() <= now_ns_) || (small_ != nullptr && small_->due(now_ns_));
+         (kept_ && kept_->next_ns() <= now_ns_) || (bare_ != nullptr && bare_->due(now_ns_));
 }
 
 void Host::run(TimeNs now_ns) {
@@ -131,7 +131,7 @@ void Host::run(TimeNs now_ns) {
     recent_.note(now_ns_, "the PC has lost power while it wrote to its disk");
     cut_power(now_ns_, now_ns_ + kStartAgainNs);
   }
-  if (small_ != nullptr) small_->advance_to(now_ns_);
+  if (bare_ != nullptr) bare_->advance_to(now_ns_);
   take_in();
   if (!plugged_ && now_ns_ >= back_ns_) {
     recent_.note(now_ns_, "adapter is back");
@@ -146,7 +146,7 @@ void Host::run(TimeNs now_ns) {
   }
   if (now_ns_ < paused_until_ns_ || !anything_due()) return;
   deliver();
-  if (small_ != nullptr) small_->tell(now_ns_, *daemon_);
+  if (bare_ != nullptr) bare_->tell(now_ns_, *daemon_);
   if (kept_) kept_->run(now_ns_, core());
   for (const auto& told : std::exchange(disk_, {})) told();
   daemon_->hear();
@@ -166,7 +166,7 @@ void Host::end(TimeNs now_ns, TimeNs gone_ns) {
   ends_at_ns_ = now_ns + kEndWatchedNs;
   gone_ns_ = gone_ns;
   witness_.daemon_ends(now_ns);
-  if (small_ != nullptr) small_->daemon_ends(now_ns);
+  if (bare_ != nullptr) bare_->daemon_ends(now_ns);
   core().shut_down(now_us());
   step();
 }
@@ -175,7 +175,7 @@ void Host::end(TimeNs now_ns, TimeNs gone_ns) {
 bool Host::end_if_due() {
   if (!ends_at_ns_ || now_ns_ < *ends_at_ns_) return false;
   const bool rests =
-      core().at_rest() && core().settled() && (small_ == nullptr || !small_->any_open());
+      core().at_rest() && core().settled() && (bare_ == nullptr || !bare_->any_open());
   if (!rests && now_ns_ < *ends_at_ns_ - kEndWatchedNs + kEndsInNs) return false;
   kill(now_ns_, now_ns_ + gone_ns_);
   return true;
@@ -228,8 +228,8 @@ class Host::Overhearing final : public bushd::api::Session {
 
 bushd::api::Asker Host::carry_out(const bushd::api::Asker& asker,
                                   const bushd::api::Request& request) {
-  if (small_ != nullptr) {
-    if (const auto own = small_->hear(now_ns_, asker, request)) return *own;
+  if (bare_ != nullptr) {
+    if (const auto own = bare_->hear(now_ns_, asker, request)) return *own;
   }
   const auto asked = witness_.promise().carried_out(asker.session->client_id(), asker.number);
   if (!asked || packet_of(*asked).payload !=
@@ -263,8 +263,8 @@ void Host::hear(const std::optional<bushd::lcm::DaemonMessage>& message) {
 }
 
 void Host::publish(bushd::McuId mcu, const bushd::api::StateSnapshot& state) {
-  if (small_ != nullptr && small_->has(mcu)) {
-    small_->state(now_ns_, state);
+  if (bare_ != nullptr && bare_->has(mcu)) {
+    bare_->state(now_ns_, state);
   } else {
     witness_.state(now_ns_, mcu.value, state);
   }
@@ -273,7 +273,7 @@ void Host::publish(bushd::McuId mcu, const bushd::api::StateSnapshot& state) {
 }
 
 void Host::publish(bushd::McuId mcu, const bushd::api::Description& description) {
-  if (small_ == nullptr || !small_->has(mcu)) witness_.description(now_ns_, description);
+  if (bare_ == nullptr || !bare_->has(mcu)) witness_.description(now_ns_, description);
   daemon_->publishing().publish(mcu, description);
 }
 
@@ -287,11 +287,11 @@ void Host::publish_lam(const bushd::api::CamacLam& lam) {
 }
 
 void Host::pulse(bushd::BusId bus, const bushd::link::PulseOrder& order) {
-  small_->pulse(now_ns_, bus, order);
+  bare_->pulse(now_ns_, bus, order);
 }
 
 void Host::move_log(const std::string& line) {
-  if (small_ == nullptr || !small_->has(line)) witness_.move_log(now_ns_, line);
+  if (bare_ == nullptr || !bare_->has(line)) witness_.move_log(now_ns_, line);
 }
 
 void Host::serve_tables(const bushd::api::Asker& asker, const bushd::api::Request&) {
@@ -344,13 +344,13 @@ void Host::unplug(TimeNs now_ns, TimeNs until_ns) {
 void Host::pause(TimeNs now_ns, TimeNs until_ns) {
   paused_until_ns_ = std::max({paused_until_ns_, now_ns, until_ns});
   witness_.positions().pause(now_ns, until_ns);
-  if (small_ != nullptr) small_->daemon_paused(until_ns);
+  if (bare_ != nullptr) bare_->daemon_paused(until_ns);
 }
 
 void Host::kill(TimeNs now_ns, TimeNs until_ns) {
   now_ns_ = now_ns;
   starts_ns_ = daemon_ ? until_ns : std::max(starts_ns_, until_ns);
-  if (small_ != nullptr) small_->daemon_gone(now_ns, false);
+  if (bare_ != nullptr) bare_->daemon_gone(now_ns, false);
   daemon_.reset();
   ends_at_ns_.reset();
   messages_.clear();
@@ -361,7 +361,7 @@ void Host::kill(TimeNs now_ns, TimeNs until_ns) {
 
 void Host::cut_power(TimeNs now_ns, TimeNs until_ns) {
   kill(now_ns, until_ns);
-  if (small_ != nullptr) small_->daemon_gone(now_ns, true);
+  if (bare_ != nullptr) bare_->daemon_gone(now_ns, true);
   if (kept_) kept_->cut_power();
   arriving_.clear();
   free_ns_ = 0;

@@ -20,7 +20,7 @@
 
 namespace bushfaults {
 
-class SmallWorld;
+class BareWorld;
 
 // What clients send.
 using Message = std::variant<bushd::lcm::Hello, Request>;
@@ -32,9 +32,9 @@ class Host final : public bushd::daemon::Outputs {
   static constexpr TimeNs kStrideNs = 400'000;
 
   // All of them outlive the host. The daemon starts at once. `keeps` positions on a disk.
-  // `small`: null, or the last buses of `config`.
+  // `bare`: null, or the last buses of `config`.
   Host(const bushd::config::Config& config, bushd::sim::Bus& bus, Witness& witness, Recent& recent,
-       SmallWorld* small, std::uint64_t seed, bool keeps);
+       BareWorld* bare, std::uint64_t seed, bool keeps);
   ~Host() override;
 
   // Null: they are not.
@@ -111,7 +111,7 @@ class Host final : public bushd::daemon::Outputs {
   bushd::sim::Bus& bus_;
   Witness& witness_;
   Recent& recent_;
-  SmallWorld* const small_;
+  BareWorld* const bare_;
   bushd::sim::Random random_;
   std::array<bushd::sim::Garbler, 2> garbler_;  // by Direction
   TimeNs now_ns_ = 0;

@@ -48,7 +48,7 @@ void add_rates(CLI::App& app, std::array<double, kSize>& rates, const std::strin
   }
 }
 
-void add_small(CLI::App& app, bushfaults::SmallOptions& small) {
+void add_bare(CLI::App& app, bushfaults::BareOptions& bare) {
   const std::string group = "Controllers without firmware";
   const auto add = [&](const std::string& name, auto& value, const std::string& what) {
     app.add_option(name, value, what)
@@ -56,11 +56,11 @@ void add_small(CLI::App& app, bushfaults::SmallOptions& small) {
         ->capture_default_str()
         ->group(group);
   };
-  add("--serial-pulse", small.serial_pulse, "Serial ports that make the pulses of a motor each");
-  add("--boards", small.boards, "Commutator boards, of three motors each");
-  add("--keypads", small.keypads, "Keypads, each of one of these motors");
-  add("--controller-faults", small.faults_per_hour, "Faults of all of them per hour");
-  add("--controller-commands", small.commands_per_hour, "Commands for their motors per hour");
+  add("--serial-pulse", bare.serial_pulse, "Serial ports that make the pulses of a motor each");
+  add("--boards", bare.boards, "Commutator boards, of three motors each");
+  add("--keypads", bare.keypads, "Keypads, each of one of these motors");
+  add("--controller-faults", bare.faults_per_hour, "Faults of all of them per hour");
+  add("--controller-commands", bare.commands_per_hour, "Commands for their motors per hour");
 }
 
 int run(int argc, char** argv) {
@@ -112,7 +112,7 @@ int run(int argc, char** argv) {
   app.add_flag("--all-kinds", all_kinds,
                "All kinds at once: those whose rate is 0 get one by the seed");
   app.add_flag("--json", json, "Print the summary as a JSON object");
-  add_small(app, options.small);
+  add_bare(app, options.bare);
   add_rates<bushfaults::FaultKind>(app, options.fault_rates, "Faults per hour");
   add_rates<bushfaults::CommandKind>(app, options.command_rates, "Commands per hour");
   try {
@@ -147,7 +147,7 @@ int run(int argc, char** argv) {
     options.fault_rates[static_cast<std::size_t>(bushfaults::FaultKind::kSecondDaemon)] = 0;
   }
   bushfaults::furnish(*config, options.fault_rates, options.command_rates, options.seed);
-  auto whole = bushfaults::with_small(*config, options.small, options.seed);
+  auto whole = bushfaults::with_bare(*config, options.bare, options.seed);
   if (!whole) {
     fmt::print(stderr, "bushfaults: {}\n", whole.error().text());
     return kUsage;

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "bare_world.h"
 #include "base/json_text.h"
 #include "installation.h"
-#include "small_world.h"
 
 namespace bushfaults {
 namespace {
@@ -40,19 +40,19 @@ nlohmann::json json_of(const std::array<std::uint64_t, kSize>& counts) {
   return all;
 }
 
-std::string small_summary(const World& world) {
-  if (world.small() == nullptr) return {};
-  const SmallWorld& small = *world.small();
+std::string bare_summary(const World& world) {
+  if (world.bare() == nullptr) return {};
+  const BareWorld& bare = *world.bare();
   std::string text = "without firmware\n";
-  for (const auto& [what, count] : small.faults()) {
+  for (const auto& [what, count] : bare.faults()) {
     text += fmt::format("           {:<24}{:>9}\n", what, count);
   }
-  for (const auto& [result, count] : small.judge().results()) {
+  for (const auto& [result, count] : bare.judge().results()) {
     text += fmt::format("           motions {:<16}{:>9}\n", result, count);
   }
   return text + fmt::format("           {} keys, {} steps in {} runs, {} states checked\n",
-                            small.keys(), small.judge().steps(), small.judge().runs(),
-                            small.judge().states_checked());
+                            bare.keys(), bare.judge().steps(), bare.judge().runs(),
+                            bare.judge().states_checked());
 }
 
 }  // namespace
@@ -110,7 +110,7 @@ std::string summary_text(const World& world, double processor_s) {
                       static_cast<double>(world.skew().worst_ns()) / 1000);
   text += fmt::format("age        {:.0f} ms of the report behind a state, at most\n",
                       static_cast<double>(world.witness().positions().worst_age_ns()) / 1e6);
-  text += small_summary(world);
+  text += bare_summary(world);
   text += fmt::format("violations {}\n", world.witness().violation() ? 1 : 0);
   return text;
 }
@@ -155,7 +155,7 @@ std::string story(const World& world, const Options& options) {
       "Again: bushfaults --seed {} --hours {} --motors {} --mcus {} {}{}{} and the same rates\n",
       in_seconds(violation.time_ns), violation.what, world.recent().text(), options.seed,
       options.hours, options.motors, options.mcus, options.all_kinds ? "--all-kinds " : "",
-      small_text(options.small), ways_text(world.config()));
+      bare_text(options.bare), ways_text(world.config()));
 }
 
 }  // namespace bushfaults

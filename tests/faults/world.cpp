@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "bare_world.h"
 #include "programs.h"
-#include "small_world.h"
 #include "times.h"
 
 namespace bushfaults {
@@ -43,14 +43,14 @@ World::World(const Options& options, bushd::config::Config config, bushd::config
       witness_(config_, bus_, plant_, recent_),
       skew_(config_, bus_, witness_),
       clients_(config_, witness_, options.command_rates, options.seed),
-      small_(options.small.any()
-                 ? std::make_unique<SmallWorld>(whole_, config_.buses.size(), options.small,
-                                                options.seed, options.keep_positions, recent_,
-                                                [this](TimeNs now_ns, const std::string& what) {
-                                                  witness_.violated(now_ns, what);
-                                                })
-                 : nullptr),
-      host_(whole_, bus_, witness_, recent_, small_.get(), options.seed, options.keep_positions),
+      bare_(options.bare.any()
+                ? std::make_unique<BareWorld>(whole_, config_.buses.size(), options.bare,
+                                              options.seed, options.keep_positions, recent_,
+                                              [this](TimeNs now_ns, const std::string& what) {
+                                                witness_.violated(now_ns, what);
+                                              })
+                : nullptr),
+      host_(whole_, bus_, witness_, recent_, bare_.get(), options.seed, options.keep_positions),
       mail_(clients_, host_, options.seed) {
   add_mcus();
   add_motors();
@@ -147,7 +147,7 @@ void World::spell_of_trouble(TimeNs until_ns) {
     next_fault_ns_[i] =
         per_hour > 0 ? now_ns_ + chance_[i].wait(static_cast<double>(kHour) / per_hour) : kNever;
   }
-  if (small_) small_->trouble(true);
+  if (bare_) bare_->trouble(true);
   while (now_ns_ < until_ns && !witness_.violation()) {
     const auto next = std::min_element(next_fault_ns_.begin(), next_fault_ns_.end());
     advance(std::min({until_ns, next_command_ns_, *next}));
@@ -174,10 +174,10 @@ void World::spell_of_trouble(TimeNs until_ns) {
 
 void World::calm() {
   if (witness_.violation()) return;
-  if (small_) {
-    small_->trouble(false);
-    small_->let_go(now_ns_);
-    run_until(small_->faults_over_ns());
+  if (bare_) {
+    bare_->trouble(false);
+    bare_->let_go(now_ns_);
+    run_until(bare_->faults_over_ns());
   }
   if (host_.kept() != nullptr) host_.kept()->lose_power_after(UINT64_MAX);
   run_until(std::max({now_ns_, host_.faults_over_ns(), mcus_up_ns_, inputs_->released_ns(),
@@ -189,14 +189,14 @@ void World::calm() {
   be_well(began_ns);
   if (witness_.violation()) return;
   run_until(now_ns_ + kSecond);
-  const auto open = [this] { return witness_.commands_open() || (small_ && small_->any_open()); };
+  const auto open = [this] { return witness_.commands_open() || (bare_ && bare_->any_open()); };
   while (open() && now_ns_ < began_ns + kMoveNs && !witness_.violation()) {
     run_until(now_ns_ + 100 * kMs);
   }
   if (witness_.violation()) return;
   if (open()) {
     witness_.violated(now_ns_, "a command without a result in calm" +
-                                   (small_ ? ", " + small_->open_text() : std::string()));
+                                   (bare_ ? ", " + bare_->open_text() : std::string()));
   }
   witness_.check_deadlines(now_ns_);
   if (const std::uint64_t steps = witness_.steps_unaccounted(); steps != 0) {
@@ -208,17 +208,17 @@ void World::calm() {
 
 void World::be_well(TimeNs began_ns) {
   for (std::size_t i = 0; i < config_.mcus.size(); ++i) witness_.expect(i, is_up(i));
-  const auto ready = [this] { return witness_.all_ready() && (!small_ || !small_->not_ready()); };
+  const auto ready = [this] { return witness_.all_ready() && (!bare_ || !bare_->not_ready()); };
   while (!ready() && now_ns_ < began_ns + kWellAfterNs && !witness_.violation()) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
     // What a client has switched off or stopped only a client sets going again.
     mail_.send(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
-    if (small_ && small_->not_ready()) small_->clear_faults();
+    if (bare_ && bare_->not_ready()) bare_->clear_faults();
   }
   if (ready() || witness_.violation()) return;
-  const auto of_small = small_ ? small_->not_ready() : std::nullopt;
+  const auto of_bare = bare_ ? bare_->not_ready() : std::nullopt;
   witness_.violated(now_ns_, "not READY 5 s after the last fault: " + witness_.not_ready() +
-                                 of_small.value_or(""));
+                                 of_bare.value_or(""));
 }
 
 void World::run_until(TimeNs until_ns) {

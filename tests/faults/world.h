@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "bare_config.h"
 #include "clients.h"
 #include "config/config.h"
 #include "host.h"
@@ -27,12 +28,11 @@
 #include "sim/bus.h"
 #include "sim/plant.h"
 #include "skew.h"
-#include "small_config.h"
 #include "witness.h"
 
 namespace bushfaults {
 
-class SmallWorld;
+class BareWorld;
 
 struct Options {
   std::uint64_t seed = 1;
@@ -47,7 +47,7 @@ struct Options {
   CommandRates command_rates = usual_command_rates();
   bool keep_positions = false;
   bool all_kinds = false;  // as it was said
-  SmallOptions small;
+  BareOptions bare;
   std::int64_t crystal_ppm = 50;
 };
 
@@ -69,7 +69,7 @@ class World {
   const Skew& skew() const { return skew_; }
   const Witness& witness() const { return witness_; }
   const bushd::sim::Plant& plant() const { return plant_; }
-  const SmallWorld* small() const { return small_.get(); }
+  const BareWorld* bare() const { return bare_.get(); }
   const SecondDaemon::Counts& second_daemons() const { return second_->counts(); }
   const Recent& recent() const { return recent_; }
   // Motors that were asked for what they know after a night without power, by their trust then.
@@ -106,7 +106,7 @@ class World {
   Witness witness_;
   Skew skew_;
   Clients clients_;
-  std::unique_ptr<SmallWorld> small_;  // null: there are none
+  std::unique_ptr<BareWorld> bare_;  // null: there are none
   Host host_;
   Mail mail_;
   std::vector<std::unique_ptr<bushd::sim::PaceRules>> rules_;  // by group

@@ -1,4 +1,4 @@
-#include "small_world.h"
+#include "bare_world.h"
 
 #include <fmt/ranges.h>
 
@@ -16,38 +16,37 @@ namespace api = bushd::api;
 using bushd::sim::TimeNs;
 
 constexpr TimeNs kForever = std::numeric_limits<TimeNs>::max() / 4;
-constexpr std::uint32_t kSmallWorldStream = 700;  // of randomness; ports have others
-constexpr std::uint32_t kSmallFaultStream = 701;
-constexpr std::uint32_t kSmallPortStream = 710;
+constexpr std::uint32_t kBareWorldStream = 700;  // of randomness; ports have others
+constexpr std::uint32_t kBareFaultStream = 701;
+constexpr std::uint32_t kBarePortStream = 710;
 // From a byte of a keypad to what it means.
 constexpr TimeNs kKeyReactionNs = 50 * kMs;
 
 }  // namespace
 
 // Who asks for moves of these motors.
-class SmallWorld::Desk final : public api::Session {
+class BareWorld::Desk final : public api::Session {
  public:
-  explicit Desk(SmallWorld& world)
-      : Session(api::Transport::kSocket, "desk", true), world_(world) {}
+  explicit Desk(BareWorld& world) : Session(api::Transport::kSocket, "desk", true), world_(world) {}
   void answer(std::int64_t number, const api::Reply& reply) override {
     world_.judge_.replied(world_.now_ns_, number, reply);
   }
   std::int64_t next() { return ++number_; }
 
  private:
-  SmallWorld& world_;
+  BareWorld& world_;
   std::int64_t number_ = 0;
 };
 
-SmallWorld::SmallWorld(const bushd::config::Config& config, std::size_t first_bus,
-                       const SmallOptions& options, std::uint64_t seed, bool keeps, Recent& recent,
-                       SmallJudge::Violated violated)
+BareWorld::BareWorld(const bushd::config::Config& config, std::size_t first_bus,
+                     const BareOptions& options, std::uint64_t seed, bool keeps, Recent& recent,
+                     BareJudge::Violated violated)
     : config_(config),
       first_bus_(first_bus),
       options_(options),
       recent_(recent),
-      random_(seed, kSmallWorldStream),
-      chance_(seed, kSmallFaultStream),
+      random_(seed, kBareWorldStream),
+      chance_(seed, kBareFaultStream),
       judge_(config,
              static_cast<std::size_t>(
                  std::ranges::find_if(config.motors,
@@ -68,10 +67,10 @@ SmallWorld::SmallWorld(const bushd::config::Config& config, std::size_t first_bu
     }
     first_mcu_ = std::min(first_mcu_, port.mcu);
     first_motor_ = std::min(first_motor_, port.motors.front());
-    const auto stream = kSmallPortStream + static_cast<std::uint32_t>(bus);
+    const auto stream = kBarePortStream + static_cast<std::uint32_t>(bus);
     if (config.buses[bus].kind == bushd::config::BusKind::kSerialPulse) {
       port.pulses = std::make_unique<PulsePort>(seed, stream, judge_, port.mcu);
-      const auto home = small_home_switch(config, port.motors.front(), seed);
+      const auto home = bare_home_switch(config, port.motors.front(), seed);
       port.pulses->drive.attach_switch(0, *home);
       judge_.has_switch(port.motors.front(), home->at_steps,
                         config.motors[port.motors.front()].home->position_steps);
@@ -86,9 +85,9 @@ SmallWorld::SmallWorld(const bushd::config::Config& config, std::size_t first_bu
   }
 }
 
-SmallWorld::~SmallWorld() = default;
+BareWorld::~BareWorld() = default;
 
-bool SmallWorld::has(const std::string& json_line) const {
+bool BareWorld::has(const std::string& json_line) const {
   const nlohmann::json line = nlohmann::json::parse(json_line);
   if (!line.contains("motor")) return false;
   const auto motor = std::ranges::find(config_.motors, line.at("motor").get<std::string>(),
@@ -98,17 +97,17 @@ bool SmallWorld::has(const std::string& json_line) const {
 
 // --- The daemon's
 
-void SmallWorld::send(TimeNs now_ns, bushd::BusId bus, std::span<const std::uint8_t> bytes) {
+void BareWorld::send(TimeNs now_ns, bushd::BusId bus, std::span<const std::uint8_t> bytes) {
   Port& port = ports_[bus.value - first_bus_];
   if (port.plugged && port.board) port.board->send(now_ns, bytes);
 }
 
-void SmallWorld::pulse(TimeNs now_ns, bushd::BusId bus, const bushd::link::PulseOrder& order) {
+void BareWorld::pulse(TimeNs now_ns, bushd::BusId bus, const bushd::link::PulseOrder& order) {
   Port& port = ports_[bus.value - first_bus_];
   if (port.plugged) port.status = port.pulses->carry_out(now_ns, order);
 }
 
-void SmallWorld::answer_orders(TimeNs now_ns, DaemonRun& daemon) {
+void BareWorld::answer_orders(TimeNs now_ns, DaemonRun& daemon) {
   for (Port& port : ports_) {
     if (!port.status) continue;
     const auto status = *std::exchange(port.status, std::nullopt);
@@ -116,8 +115,8 @@ void SmallWorld::answer_orders(TimeNs now_ns, DaemonRun& daemon) {
   }
 }
 
-std::optional<api::Asker> SmallWorld::hear(TimeNs now_ns, const api::Asker& asker,
-                                           const api::Request& request) {
+std::optional<api::Asker> BareWorld::hear(TimeNs now_ns, const api::Asker& asker,
+                                          const api::Request& request) {
   if (asker.session == desk_) {
     judge_.asked(now_ns, asker.number, request);
     return asker;
@@ -132,7 +131,7 @@ std::optional<api::Asker> SmallWorld::hear(TimeNs now_ns, const api::Asker& aske
   return asker;
 }
 
-void SmallWorld::daemon_started(TimeNs now_ns, DaemonRun& daemon) {
+void BareWorld::daemon_started(TimeNs now_ns, DaemonRun& daemon) {
   now_ns_ = now_ns;
   judge_.daemon_started(now_ns);
   desk_ = std::make_shared<Desk>(*this);
@@ -146,7 +145,7 @@ void SmallWorld::daemon_started(TimeNs now_ns, DaemonRun& daemon) {
   for (Pad& pad : pads_) open_keypad(pad, daemon);
 }
 
-void SmallWorld::open_keypad(Pad& pad, DaemonRun& daemon) {
+void BareWorld::open_keypad(Pad& pad, DaemonRun& daemon) {
   pad.keypad = std::make_unique<bushd::daemon::Keypad>(
       *pad.config, name(pad.motor), [&daemon](api::Asker asker, api::Request request) {
         daemon.ask(std::move(asker), std::move(request));
@@ -155,7 +154,7 @@ void SmallWorld::open_keypad(Pad& pad, DaemonRun& daemon) {
 }
 
 // What the driver has it sends, unless the computer has no power.
-void SmallWorld::daemon_gone(TimeNs now_ns, bool power) {
+void BareWorld::daemon_gone(TimeNs now_ns, bool power) {
   now_ns_ = now_ns;
   for (Port& port : ports_) {
     port.status.reset();
@@ -166,7 +165,7 @@ void SmallWorld::daemon_gone(TimeNs now_ns, bool power) {
   desk_.reset();
 }
 
-void SmallWorld::daemon_paused(TimeNs until_ns) {
+void BareWorld::daemon_paused(TimeNs until_ns) {
   judge_.paused(now_ns_, until_ns);
   for (const Port& port : ports_) {
     for (const std::size_t motor : port.motors) {
@@ -176,7 +175,7 @@ void SmallWorld::daemon_paused(TimeNs until_ns) {
   }
 }
 
-void SmallWorld::advance_to(TimeNs now_ns) {
+void BareWorld::advance_to(TimeNs now_ns) {
   now_ns_ = now_ns;
   for (Port& port : ports_) {
     if (port.pulses) {
@@ -211,7 +210,7 @@ void SmallWorld::advance_to(TimeNs now_ns) {
   }
 }
 
-bool SmallWorld::due(TimeNs now_ns) const {
+bool BareWorld::due(TimeNs now_ns) const {
   if (clears_ || (trouble_ && now_ns >= next_ask_ns_)) return true;
   for (const Port& port : ports_) {
     if (!port.told || (!port.plugged && now_ns >= port.back_ns)) return true;
@@ -228,7 +227,7 @@ bool SmallWorld::due(TimeNs now_ns) const {
   return false;
 }
 
-void SmallWorld::tell(TimeNs now_ns, DaemonRun& daemon) {
+void BareWorld::tell(TimeNs now_ns, DaemonRun& daemon) {
   now_ns_ = now_ns;
   for (Port& port : ports_) tell(now_ns, daemon, port);
   for (Pad& pad : pads_) {
@@ -255,7 +254,7 @@ void SmallWorld::tell(TimeNs now_ns, DaemonRun& daemon) {
   emergency_ = false;
 }
 
-void SmallWorld::tell(TimeNs now_ns, DaemonRun& daemon, Port& port) {
+void BareWorld::tell(TimeNs now_ns, DaemonRun& daemon, Port& port) {
   const bushd::BusId bus{port.bus};
   if (!port.told) {
     port.told = true;
@@ -274,7 +273,7 @@ void SmallWorld::tell(TimeNs now_ns, DaemonRun& daemon, Port& port) {
 
 // --- Keys
 
-void SmallWorld::note_keys(TimeNs now_ns, Pad& pad, std::span<const std::uint8_t> bytes) {
+void BareWorld::note_keys(TimeNs now_ns, Pad& pad, std::span<const std::uint8_t> bytes) {
   if (!bytes.empty()) {
     recent_.note(now_ns, fmt::format("keys of {}: {:02x}", name(pad.motor), fmt::join(bytes, " ")));
   }
@@ -292,7 +291,7 @@ void SmallWorld::note_keys(TimeNs now_ns, Pad& pad, std::span<const std::uint8_t
   }
 }
 
-void SmallWorld::tell(TimeNs now_ns, Pad& pad) {
+void BareWorld::tell(TimeNs now_ns, Pad& pad) {
   const auto bytes = pad.box.take_bytes();
   if (!pad.plugged && now_ns >= pad.back_ns) {
     pad.plugged = true;
@@ -305,7 +304,7 @@ void SmallWorld::tell(TimeNs now_ns, Pad& pad) {
   }
 }
 
-void SmallWorld::press_keys(TimeNs now_ns, Pad& pad) {
+void BareWorld::press_keys(TimeNs now_ns, Pad& pad) {
   if (pad.next_ns != 0) {
     const auto kind = random_.below(10);
     if (kind < 7) {
@@ -319,7 +318,7 @@ void SmallWorld::press_keys(TimeNs now_ns, Pad& pad) {
   pad.next_ns = now_ns + random_.wait(4e9);
 }
 
-void SmallWorld::let_go(TimeNs now_ns) {
+void BareWorld::let_go(TimeNs now_ns) {
   for (Port& port : ports_) {
     if (!port.board) continue;
     port.board->end_faults();
@@ -335,11 +334,11 @@ void SmallWorld::let_go(TimeNs now_ns) {
 
 // --- Requests
 
-void SmallWorld::ask_for(DaemonRun& daemon, const api::Request& request) {
+void BareWorld::ask_for(DaemonRun& daemon, const api::Request& request) {
   daemon.ask({.session = desk_, .number = desk_->next()}, request);
 }
 
-void SmallWorld::ask(TimeNs now_ns, DaemonRun& daemon) {
+void BareWorld::ask(TimeNs now_ns, DaemonRun& daemon) {
   if (emergency_ && random_.one_in(4)) clears_ = true;
   const std::size_t motor = pick_motor();
   // Who does not know where it stands says it.
@@ -358,7 +357,7 @@ void SmallWorld::ask(TimeNs now_ns, DaemonRun& daemon) {
   ask_for(daemon, request);
 }
 
-api::Request SmallWorld::next_move(std::size_t motor) {
+api::Request BareWorld::next_move(std::size_t motor) {
   api::Move move{.motors = {{name(motor), std::int64_t{0}}}};
   std::int64_t steps = random_.magnitude(1, 1'500);
   if (random_.one_in(2)) steps = -steps;
@@ -379,7 +378,7 @@ api::Request SmallWorld::next_move(std::size_t motor) {
   return move;
 }
 
-api::Request SmallWorld::next_request() {
+api::Request BareWorld::next_request() {
   const std::size_t motor = pick_motor();
   const auto kind = random_.below(100);
   if (kind < 62) return next_move(motor);
@@ -398,7 +397,7 @@ api::Request SmallWorld::next_request() {
   return next_move(motor);
 }
 
-std::optional<std::string> SmallWorld::not_ready() const {
+std::optional<std::string> BareWorld::not_ready() const {
   for (const Port& port : ports_) {
     if (judge_.seen(port.motors.front()) == api::McuState::kReady) continue;
     return config_.mcus[port.mcu].id + " is not READY";

@@ -10,25 +10,24 @@
 #include <string>
 #include <vector>
 
+#include "bare_config.h"
+#include "bare_judge.h"
+#include "bare_ports.h"
 #include "daemon/fronts/keypad.h"
 #include "daemon_run.h"
 #include "recent.h"
 #include "sim/random.h"
-#include "small_config.h"
-#include "small_judge.h"
-#include "small_ports.h"
 
 namespace bushfaults {
 
-class SmallWorld {
+class BareWorld {
  public:
   using TimeNs = bushd::sim::TimeNs;
 
   // `config`, of all, outlives it; the first of these controllers is the bus `first_bus`.
-  SmallWorld(const bushd::config::Config& config, std::size_t first_bus,
-             const SmallOptions& options, std::uint64_t seed, bool keeps, Recent& recent,
-             SmallJudge::Violated violated);
-  ~SmallWorld();
+  BareWorld(const bushd::config::Config& config, std::size_t first_bus, const BareOptions& options,
+            std::uint64_t seed, bool keeps, Recent& recent, BareJudge::Violated violated);
+  ~BareWorld();
 
   // --- The daemon's
 
@@ -69,7 +68,7 @@ class SmallWorld {
   bool any_open() const { return judge_.any_open(); }
   std::string open_text() const { return judge_.open_text(); }
 
-  const SmallJudge& judge() const { return judge_; }
+  const BareJudge& judge() const { return judge_; }
   const std::map<std::string, std::uint64_t>& faults() const { return faults_; }
   std::uint64_t keys() const { return keys_; }
 
@@ -121,11 +120,11 @@ class SmallWorld {
   const std::size_t first_bus_;
   std::size_t first_mcu_ = 0;
   std::size_t first_motor_ = 0;
-  const SmallOptions options_;
+  const BareOptions options_;
   Recent& recent_;
   bushd::sim::Random random_;
   bushd::sim::Random chance_;
-  SmallJudge judge_;
+  BareJudge judge_;
   std::vector<Port> ports_;
   std::vector<Pad> pads_;
   std::shared_ptr<Desk> desk_;

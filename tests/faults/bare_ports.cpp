@@ -1,4 +1,4 @@
-#include "small_ports.h"
+#include "bare_ports.h"
 
 #include <algorithm>
 #include <utility>

@@ -35,14 +35,14 @@
 
 namespace bushfaults {
 
-class SmallJudge final : public bushd::sim::EdgeSink {
+class BareJudge final : public bushd::sim::EdgeSink {
  public:
   using TimeNs = bushd::sim::TimeNs;
   using Violated = std::function<void(TimeNs now_ns, const std::string& what)>;
 
   // Of `config` the motors from `first_motor` on. `keeps`: positions outlive the daemon.
-  SmallJudge(const bushd::config::Config& config, std::size_t first_motor, bool keeps,
-             Recent& recent, Violated violated);
+  BareJudge(const bushd::config::Config& config, std::size_t first_motor, bool keeps,
+            Recent& recent, Violated violated);
 
   // Its home switch, and the position that is set there.
   void has_switch(std::size_t motor, std::int64_t at_steps, std::int64_t set_to);

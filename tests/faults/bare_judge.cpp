@@ -1,4 +1,4 @@
-#include "small_judge.h"
+#include "bare_judge.h"
 
 #include <fmt/core.h>
 
@@ -41,8 +41,8 @@ TimeNs at(const std::vector<TimeNs>& side, std::size_t i) {
 
 }  // namespace
 
-SmallJudge::SmallJudge(const bushd::config::Config& config, std::size_t first_motor, bool keeps,
-                       Recent& recent, Violated violated)
+BareJudge::BareJudge(const bushd::config::Config& config, std::size_t first_motor, bool keeps,
+                     Recent& recent, Violated violated)
     : first_(first_motor), keeps_(keeps), recent_(recent), violated_(std::move(violated)) {
   for (std::size_t i = first_motor; i < config.motors.size(); ++i) {
     const bushd::config::Motor& from = config.motors[i];
@@ -67,18 +67,18 @@ SmallJudge::SmallJudge(const bushd::config::Config& config, std::size_t first_mo
   }
 }
 
-void SmallJudge::has_switch(std::size_t motor, std::int64_t at_steps, std::int64_t set_to) {
+void BareJudge::has_switch(std::size_t motor, std::int64_t at_steps, std::int64_t set_to) {
   motors_[motor - first_].home_offset = at_steps - set_to;
 }
 
-SmallJudge::Motor* SmallJudge::find(const std::string& name) {
+BareJudge::Motor* BareJudge::find(const std::string& name) {
   const auto found = std::ranges::find(motors_, name, &Motor::name);
   return found == motors_.end() ? nullptr : &*found;
 }
 
 // --- Steps
 
-void SmallJudge::edge(const bushd::sim::Edge& edge) {
+void BareJudge::edge(const bushd::sim::Edge& edge) {
   const auto found = by_output_.find({edge.mcu, edge.index});
   if (edge.signal == bushd::sim::Signal::kDir) {
     if (found != by_output_.end()) {
@@ -95,7 +95,7 @@ void SmallJudge::edge(const bushd::sim::Edge& edge) {
   }
 }
 
-void SmallJudge::step(TimeNs time_ns, Motor& motor) {
+void BareJudge::step(TimeNs time_ns, Motor& motor) {
   if (!motor.run.empty() && time_ns - motor.run.back() > motor.rest_ns &&
       motor.excused_ns < motor.run.back()) {
     judge_run(motor);
@@ -113,7 +113,7 @@ void SmallJudge::step(TimeNs time_ns, Motor& motor) {
   }
 }
 
-void SmallJudge::judge_run(Motor& motor) {
+void BareJudge::judge_run(Motor& motor) {
   const std::size_t n = motor.run.size();
   for (std::size_t j = 2; j <= n; ++j) {
     const TimeNs decel = motor.cut       ? 0
@@ -138,7 +138,7 @@ void SmallJudge::judge_run(Motor& motor) {
   }
 }
 
-void SmallJudge::advance_to(TimeNs now_ns) {
+void BareJudge::advance_to(TimeNs now_ns) {
   for (Motor& motor : motors_) {
     if (!motor.run.empty() && now_ns - motor.run.back() > motor.rest_ns &&
         motor.excused_ns < motor.run.back()) {
@@ -150,40 +150,40 @@ void SmallJudge::advance_to(TimeNs now_ns) {
   }
 }
 
-void SmallJudge::excused_until(std::size_t motor, TimeNs until_ns) {
+void BareJudge::excused_until(std::size_t motor, TimeNs until_ns) {
   Motor& it = motors_[motor - first_];
   it.excused_ns = std::max(it.excused_ns, until_ns);
 }
 
-void SmallJudge::cut_off(std::size_t motor) {
+void BareJudge::cut_off(std::size_t motor) {
   motors_[motor - first_].cut = true;
 }
 
-void SmallJudge::port_lost(std::size_t motor) {
+void BareJudge::port_lost(std::size_t motor) {
   motors_[motor - first_].cut = motors_[motor - first_].lost = true;
 }
 
-void SmallJudge::paused(TimeNs now_ns, TimeNs until_ns) {
+void BareJudge::paused(TimeNs now_ns, TimeNs until_ns) {
   if (now_ns > paused_until_ns_) paused_ns_ = now_ns;
   paused_until_ns_ = std::max(paused_until_ns_, until_ns);
 }
 
-TimeNs SmallJudge::oldest_ns(TimeNs now_ns) const {
+TimeNs BareJudge::oldest_ns(TimeNs now_ns) const {
   return (now_ns > paused_until_ns_ + kAgeNs ? now_ns : std::min(now_ns, paused_ns_)) - kAgeNs;
 }
 
-void SmallJudge::change(std::size_t motor) {
+void BareJudge::change(std::size_t motor) {
   motors_[motor - first_].changed = true;
 }
 
-void SmallJudge::keys_until(std::size_t motor, TimeNs until_ns) {
+void BareJudge::keys_until(std::size_t motor, TimeNs until_ns) {
   motors_[motor - first_].keys_ns = until_ns;
   motors_[motor - first_].changed = true;
 }
 
 // --- Requests
 
-void SmallJudge::daemon_started(TimeNs) {
+void BareJudge::daemon_started(TimeNs) {
   for (Motor& motor : motors_) {
     motor.seen = api::McuState::kOffline;
     motor.lost = false;
@@ -196,7 +196,7 @@ void SmallJudge::daemon_started(TimeNs) {
   }
 }
 
-void SmallJudge::daemon_gone(TimeNs now_ns) {
+void BareJudge::daemon_gone(TimeNs now_ns) {
   for (auto& [number, open] : open_) close(now_ns, open);
   open_.clear();
   for (Motor& motor : motors_) {
@@ -206,15 +206,15 @@ void SmallJudge::daemon_gone(TimeNs now_ns) {
   }
 }
 
-void SmallJudge::begin(TimeNs, Open& open, const std::string& name,
-                       std::optional<std::int64_t> target) {
+void BareJudge::begin(TimeNs, Open& open, const std::string& name,
+                      std::optional<std::int64_t> target) {
   const Motor* motor = find(name);
   if (motor == nullptr) return;
   open.motors.push_back(static_cast<std::size_t>(motor - motors_.data()));
   open.target.push_back(target);
 }
 
-void SmallJudge::asked(TimeNs now_ns, std::int64_t number, const api::Request& request) {
+void BareJudge::asked(TimeNs now_ns, std::int64_t number, const api::Request& request) {
   Open& open = open_[number];
   open = {.text = std::string(api::name_of(request)), .since_ns = now_ns, .order = ++requests_};
   recent_.note(now_ns, fmt::format("desk #{}: {}", number, open.text));
@@ -261,7 +261,7 @@ void SmallJudge::asked(TimeNs now_ns, std::int64_t number, const api::Request& r
   }
 }
 
-void SmallJudge::asked_by_others(TimeNs now_ns, const api::Request& request) {
+void BareJudge::asked_by_others(TimeNs now_ns, const api::Request& request) {
   const auto* stop = std::get_if<api::Stop>(&request);
   const auto* pause = std::get_if<api::Pause>(&request);
   const auto* hold = std::get_if<api::Hold>(&request);
@@ -287,14 +287,14 @@ void SmallJudge::asked_by_others(TimeNs now_ns, const api::Request& request) {
   }
 }
 
-void SmallJudge::close(TimeNs now_ns, Open& open) {
+void BareJudge::close(TimeNs now_ns, Open& open) {
   for (const std::size_t i : open.motors) {
     --motors_[i].open;
     motors_[i].caused_ns = std::max(motors_[i].caused_ns, now_ns);
   }
 }
 
-void SmallJudge::replied(TimeNs now_ns, std::int64_t number, const api::Reply& reply) {
+void BareJudge::replied(TimeNs now_ns, std::int64_t number, const api::Reply& reply) {
   const auto found = open_.find(number);
   if (found == open_.end()) {
     return violated_(now_ns, fmt::format("desk #{} is answered after its end", number));
@@ -327,7 +327,7 @@ void SmallJudge::replied(TimeNs now_ns, std::int64_t number, const api::Reply& r
   open_.erase(found);
 }
 
-void SmallJudge::completed(TimeNs now_ns, Open& open, const api::Completed& result) {
+void BareJudge::completed(TimeNs now_ns, Open& open, const api::Completed& result) {
   if (open.set_offset && result.outcome == api::Outcome::kDone) {
     Motor& motor = motors_[open.motors[0]];
     motor.offset = *open.set_offset;
@@ -346,7 +346,7 @@ void SmallJudge::completed(TimeNs now_ns, Open& open, const api::Completed& resu
   for (std::size_t i = 0; i < all->size(); ++i) ended(now_ns, open, i, (*all)[i]);
 }
 
-void SmallJudge::ended(TimeNs now_ns, Open& open, std::size_t i, const api::MotorResult& result) {
+void BareJudge::ended(TimeNs now_ns, Open& open, std::size_t i, const api::MotorResult& result) {
   Motor& motor = motors_[open.motors[i]];
   if (motor.name != result.motor) return violated(now_ns, motor, "has the result of another motor");
   // Another one of the same request may have moved on, and this one by another request.
@@ -366,7 +366,7 @@ void SmallJudge::ended(TimeNs now_ns, Open& open, std::size_t i, const api::Moto
   }
 }
 
-std::string SmallJudge::open_text() const {
+std::string BareJudge::open_text() const {
   std::string text;
   for (const auto& [number, open] : open_) {
     text += fmt::format("{}#{} {} of {} s", text.empty() ? "" : ", ", number, open.text,
@@ -375,14 +375,14 @@ std::string SmallJudge::open_text() const {
   return text;
 }
 
-bool SmallJudge::rests(std::size_t motor) const {
+bool BareJudge::rests(std::size_t motor) const {
   const Motor& it = motors_[motor - first_];
   return it.resting && it.run.empty();
 }
 
 // --- States
 
-void SmallJudge::state(TimeNs now_ns, const api::StateSnapshot& state) {
+void BareJudge::state(TimeNs now_ns, const api::StateSnapshot& state) {
   ++states_checked_;
   const bool online = state.state != api::McuState::kOffline;
   for (const api::MotorState& claim : state.motors) {
@@ -394,7 +394,7 @@ void SmallJudge::state(TimeNs now_ns, const api::StateSnapshot& state) {
   }
 }
 
-bool SmallJudge::was_there(TimeNs now_ns, const Motor& motor, std::int64_t at) const {
+bool BareJudge::was_there(TimeNs now_ns, const Motor& motor, std::int64_t at) const {
   std::int64_t low = motor.position;
   std::int64_t high = motor.position;
   for (std::size_t i = motor.path.size(); i-- > 0;) {
@@ -409,7 +409,7 @@ bool SmallJudge::was_there(TimeNs now_ns, const Motor& motor, std::int64_t at) c
   return at >= low - motor.unseen && at <= high + motor.unseen;
 }
 
-void SmallJudge::check(TimeNs now_ns, Motor& motor, const api::MotorState& claim, bool online) {
+void BareJudge::check(TimeNs now_ns, Motor& motor, const api::MotorState& claim, bool online) {
   motor.trusted = is_good(claim.trust);
   if (!motor.trusted) {
     if (claim.trust != api::Trust::kUncertain) return;
@@ -450,7 +450,7 @@ void SmallJudge::check(TimeNs now_ns, Motor& motor, const api::MotorState& claim
 }
 
 // "... while 12 steps were under way: as many may be missing".
-void SmallJudge::check_uncertain(TimeNs now_ns, const Motor& motor, const api::MotorState& claim) {
+void BareJudge::check_uncertain(TimeNs now_ns, const Motor& motor, const api::MotorState& claim) {
   const std::string& reason = claim.uncertain_reason;
   if (reason.empty()) return violated(now_ns, motor, "is uncertain without a reason");
   const auto end = reason.find(" steps were under way");

@@ -13,9 +13,9 @@
 
 namespace bushfaults {
 
-struct SmallOptions {
+struct BareOptions {
   std::size_t serial_pulse = 0;  // ports, of one motor each
-  std::size_t boards = 0;        // of kSmallBoardMotors motors each
+  std::size_t boards = 0;        // of kBareBoardMotors motors each
   std::size_t keypads = 0;       // one a motor, of the first ones
   double faults_per_hour = 1200;
   double commands_per_hour = 3600;
@@ -23,17 +23,17 @@ struct SmallOptions {
   bool any() const { return serial_pulse + boards > 0; }
 };
 
-inline constexpr std::size_t kSmallBoardMotors = 3;
+inline constexpr std::size_t kBareBoardMotors = 3;
 
 // `config` and these. Why not: a keypad without a motor.
-bushd::Result<bushd::config::Config> with_small(const bushd::config::Config& config,
-                                                const SmallOptions& options, std::uint64_t seed);
+bushd::Result<bushd::config::Config> with_bare(const bushd::config::Config& config,
+                                               const BareOptions& options, std::uint64_t seed);
 
 // Of the motor of a serial port, by its index in the configuration: its home switch at CD.
-std::optional<bushd::sim::SwitchOptions> small_home_switch(const bushd::config::Config& config,
-                                                           std::size_t motor, std::uint64_t seed);
+std::optional<bushd::sim::SwitchOptions> bare_home_switch(const bushd::config::Config& config,
+                                                          std::size_t motor, std::uint64_t seed);
 
 // "--serial-pulse 2 ...", or nothing.
-std::string small_text(const SmallOptions& options);
+std::string bare_text(const BareOptions& options);
 
 }  // namespace bushfaults

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "small_world.h"
+#include "bare_world.h"
 #include "times.h"
 
 namespace bushfaults {
@@ -16,7 +16,7 @@ constexpr TimeNs kAfterFaultNs = 50 * kMs;
 
 }  // namespace
 
-TimeNs SmallWorld::faults_over_ns() const {
+TimeNs BareWorld::faults_over_ns() const {
   TimeNs over_ns = now_ns_;
   for (const Port& port : ports_) {
     over_ns = std::max(over_ns, port.lines_until_ns);
@@ -31,12 +31,12 @@ TimeNs SmallWorld::faults_over_ns() const {
   return over_ns;
 }
 
-void SmallWorld::fault(TimeNs now_ns, const std::string& what, const std::string& of) {
+void BareWorld::fault(TimeNs now_ns, const std::string& what, const std::string& of) {
   ++faults_[what];
   recent_.note(now_ns, fmt::format("fault: {} {}", of, what));
 }
 
-void SmallWorld::disturb(TimeNs now_ns) {
+void BareWorld::disturb(TimeNs now_ns) {
   const auto which = chance_.below(ports_.size() + pads_.size());
   if (which >= ports_.size()) return disturb_keypad(now_ns, pads_[which - ports_.size()]);
   Port& port = ports_[which];
@@ -45,7 +45,7 @@ void SmallWorld::disturb(TimeNs now_ns) {
   port.pulses ? disturb_pulses(now_ns, port) : disturb_board(now_ns, port);
 }
 
-void SmallWorld::unplug(TimeNs now_ns, Port& port, TimeNs for_ns) {
+void BareWorld::unplug(TimeNs now_ns, Port& port, TimeNs for_ns) {
   port.plugged = port.told = false;
   port.back_ns = now_ns + for_ns;
   port.status.reset();
@@ -54,7 +54,7 @@ void SmallWorld::unplug(TimeNs now_ns, Port& port, TimeNs for_ns) {
   fault(now_ns, "port lost", config_.buses[port.bus].name);
 }
 
-void SmallWorld::disturb_pulses(TimeNs now_ns, Port& port) {
+void BareWorld::disturb_pulses(TimeNs now_ns, Port& port) {
   const std::string& of = config_.buses[port.bus].name;
   const std::size_t motor = port.motors.front();
   if (chance_.one_in(3)) {
@@ -69,7 +69,7 @@ void SmallWorld::disturb_pulses(TimeNs now_ns, Port& port) {
   fault(now_ns, "stalled driver", of);
 }
 
-void SmallWorld::disturb_board(TimeNs now_ns, Port& port) {
+void BareWorld::disturb_board(TimeNs now_ns, Port& port) {
   using Fault = BoardPort::AnswerFault;
   const std::string& of = config_.buses[port.bus].name;
   for (const std::size_t motor : port.motors) judge_.cut_off(motor);
@@ -107,7 +107,7 @@ void SmallWorld::disturb_board(TimeNs now_ns, Port& port) {
   }
 }
 
-void SmallWorld::disturb_keypad(TimeNs now_ns, Pad& pad) {
+void BareWorld::disturb_keypad(TimeNs now_ns, Pad& pad) {
   const std::string of = "keypad of " + name(pad.motor);
   switch (chance_.below(3)) {
     case 0:

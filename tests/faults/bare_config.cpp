@@ -1,4 +1,4 @@
-#include "small_config.h"
+#include "bare_config.h"
 
 #include <fmt/core.h>
 
@@ -9,8 +9,8 @@
 namespace bushfaults {
 namespace {
 
-constexpr std::uint32_t kSmallStream = 600;      // of randomness
-constexpr std::uint32_t kSmallHomeStream = 601;  // and the next ones, one for each motor
+constexpr std::uint32_t kBareStream = 600;      // of randomness
+constexpr std::uint32_t kBareHomeStream = 601;  // and the next ones, one for each motor
 constexpr std::array<std::uint32_t, 4> kBoardBauds = {9'600, 19'200, 57'600, 115'200};
 
 bushd_stop_mode stop_mode(bushd::sim::Random& random) {
@@ -48,7 +48,7 @@ void add_board(bushd::config::Config& config, bushd::sim::Random& random, std::s
                          .start_hz = static_cast<std::uint32_t>(random.between(40, 100)),
                          .answer_ms = 100};
   bus.emergency_stop = stop_mode(random);
-  for (std::size_t i = 0; i < kSmallBoardMotors; ++i) {
+  for (std::size_t i = 0; i < kBareBoardMotors; ++i) {
     config.motors.push_back({.name = fmt::format("b{}{}", number, static_cast<char>('a' + i)),
                              .mcu = {config.mcus.size()},
                              .output = {static_cast<std::uint8_t>(i * 3)},
@@ -60,10 +60,10 @@ void add_board(bushd::config::Config& config, bushd::sim::Random& random, std::s
 
 }  // namespace
 
-bushd::Result<bushd::config::Config> with_small(const bushd::config::Config& config,
-                                                const SmallOptions& options, std::uint64_t seed) {
+bushd::Result<bushd::config::Config> with_bare(const bushd::config::Config& config,
+                                               const BareOptions& options, std::uint64_t seed) {
   bushd::config::Config whole = config;
-  bushd::sim::Random random(seed, kSmallStream);
+  bushd::sim::Random random(seed, kBareStream);
   for (std::size_t i = 1; i <= options.serial_pulse; ++i) add_port(whole, random, i);
   for (std::size_t i = 1; i <= options.boards; ++i) add_board(whole, random, i);
   if (config.motors.size() + options.keypads > whole.motors.size()) {
@@ -81,11 +81,11 @@ bushd::Result<bushd::config::Config> with_small(const bushd::config::Config& con
   return whole;
 }
 
-std::optional<bushd::sim::SwitchOptions> small_home_switch(const bushd::config::Config& config,
-                                                           std::size_t motor, std::uint64_t seed) {
+std::optional<bushd::sim::SwitchOptions> bare_home_switch(const bushd::config::Config& config,
+                                                          std::size_t motor, std::uint64_t seed) {
   const auto& home = config.motors[motor].home;
   if (!home) return std::nullopt;
-  bushd::sim::Random random(seed, kSmallHomeStream + static_cast<std::uint32_t>(motor));
+  bushd::sim::Random random(seed, kBareHomeStream + static_cast<std::uint32_t>(motor));
   return bushd::sim::SwitchOptions{
       .at_steps = random.between(200, 2'000) * (home->positive ? 1 : -1),
       .positive_end = home->positive,
@@ -95,7 +95,7 @@ std::optional<bushd::sim::SwitchOptions> small_home_switch(const bushd::config::
       .input = std::uint8_t{0}};
 }
 
-std::string small_text(const SmallOptions& options) {
+std::string bare_text(const BareOptions& options) {
   if (!options.any()) return {};
   return fmt::format(
       "--serial-pulse {} --boards {} --keypads {} --controller-faults {} --controller-commands {} ",
