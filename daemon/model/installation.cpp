@@ -172,8 +172,8 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
 link::LineRun Mcu::line_run(const motion::LineShare& share, bushd_delay shortest_delay,
                             link::Tick ticks) const {
   // What really begins has its table there. A dry run may ask before: this is where it would be.
-  const auto slot = master_.slot_of(on_bus_, share.table->view());
-  return {.slot = slot.value_or(BUSHD_SCRATCH_SLOT),
+  const auto bank = master_.bank_of(on_bus_, share.table->view());
+  return {.bank = bank.value_or(BUSHD_SCRATCH_BANK),
           .shortest_delay = shortest_delay,
           .longest = share.longest,
           .from = share.from,

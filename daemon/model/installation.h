@@ -96,7 +96,7 @@ class Mcu {
   bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
   bool can_run_slowly() const { return master_.can_run_slowly(on_bus_); }
   bool has_table(const bushd_table& table) const {
-    return master_.slot_of(on_bus_, table).has_value();
+    return master_.bank_of(on_bus_, table).has_value();
   }
   bool keeps_up_with(const bushd_table& table, bushd_delay shortest_delay, bool alone) const {
     return master_.keeps_up_with(on_bus_, table, shortest_delay, alone);

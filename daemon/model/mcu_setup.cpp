@@ -108,7 +108,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const TableOf& t
   const auto drive_of = [&](const config::Motor* motor) -> const config::Drive& {
     return drives[id_of(motor)];
   };
-  // Slots are given in the order of outputs.
+  // Banks are given in the order of outputs.
   std::ranges::sort(motors, {}, [](const config::Motor* motor) { return motor->output; });
   for (const config::Motor* motor : motors) {
     add_places(setup, *motor);

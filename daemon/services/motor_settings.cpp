@@ -127,9 +127,9 @@ Result<void> MotorSettings::mcu_takes(const Plan& plan, MotorId id) const {
   }
   if (auto good = installation_.has_table(id, installation_.tables(), drives); !good) return good;
   const link::McuSetup setup = installation_.setup_of(mcu.id, installation_.tables(), drives);
-  if (setup.tables.size() > BUSHD_TABLE_SLOTS) {
+  if (setup.tables.size() > BUSHD_TABLE_BANKS) {
     return fail("MCU " + mcu.name() + " would need " + std::to_string(setup.tables.size()) +
-                " different tables; allowed: " + std::to_string(BUSHD_TABLE_SLOTS) +
+                " different tables; allowed: " + std::to_string(BUSHD_TABLE_BANKS) +
                 ". Give its motors the same `acceleration`, or the same table");
   }
   return mcu.has_room(setup);

@@ -205,9 +205,9 @@ Result<void> TablesInService::fits(const Tables& tables, GroupId group,
       if (!good) return good;
     }
     const link::McuSetup setup = installation_.setup_of(mcu.id, tables, installation_.drives());
-    if (setup.tables.size() > BUSHD_TABLE_SLOTS) {
+    if (setup.tables.size() > BUSHD_TABLE_BANKS) {
       return fail("MCU " + mcu.name() + " would need " + std::to_string(setup.tables.size()) +
-                  " different tables; allowed: " + std::to_string(BUSHD_TABLE_SLOTS));
+                  " different tables; allowed: " + std::to_string(BUSHD_TABLE_BANKS));
     }
     if (auto room = mcu.has_room(setup); !room) return room;
   }

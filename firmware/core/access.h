@@ -31,7 +31,7 @@ static inline int16_t* bushd_mcu_queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t
 
 static inline const bushd_table* bushd_mcu_table_of(const bushd_mcu* mcu,
                                                     const bushd_mcu_motor* motor) {
-  return &mcu->tables.slot[motor->table].table;
+  return &mcu->tables.bank[motor->table].table;
 }
 
 // Whether it makes runs with such a delay (BUSHD_CAN_SLOW_RUNS).

@@ -180,7 +180,7 @@ void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs) {
 }
 
 static bool slow_enough(const bushd_mcu* mcu, const bushd_home* message) {
-  const bushd_table* table = &mcu->tables.slot[mcu->motor[message->motor].table].table;
+  const bushd_table* table = &mcu->tables.bank[mcu->motor[message->motor].table].table;
   const uint16_t first = bushd_table_accel(table, 0);
   const uint16_t last = bushd_table_decel(table, 0);
   const uint64_t slowest_ns = (uint64_t)(first > last ? first : last) * table->time_unit_ns;

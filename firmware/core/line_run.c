@@ -20,7 +20,7 @@ static inline bool is_on_line(const bushd_mcu* mcu, uint8_t m) {
 }
 
 static bushd_status check_table(const bushd_mcu* mcu, const bushd_line_part* part) {
-  const bushd_table* table = bushd_mcu_checked_table(mcu, part->slot);
+  const bushd_table* table = bushd_mcu_checked_table(mcu, part->bank);
   if (table == NULL) return BUSHD_E_NO_TABLE;
   const bool slow_only = (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
   if (slow_only &&
@@ -81,10 +81,10 @@ static void place_all(bushd_mcu* mcu) {
 
 // The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
 static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
-  bushd_run_start(&mcu->line.run, bushd_mcu_checked_table(mcu, part->slot), part->steps, 1,
+  bushd_run_start(&mcu->line.run, bushd_mcu_checked_table(mcu, part->bank), part->steps, 1,
                   part->shortest_delay);
   if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;
-  mcu->line.slot = part->slot;
+  mcu->line.bank = part->bank;
   mcu->line.longest = part->longest;
   mcu->line.step = part->from + 1u;
   mcu->line.last = part->from + part->steps;
@@ -228,7 +228,7 @@ void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_
   const bushd_run* run = &mcu->line.run;
   place_all(mcu);
   const uint16_t forward = begin_tick(mcu->motor, slot_buffer->steps, motors);
-  emit_tick(mcu, slot_buffer, motors, bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table));
+  emit_tick(mcu, slot_buffer, motors, bushd_mcu_run_tick_of(mcu, mcu->line.bank, run->table));
   mcu->direction = (mcu->direction & (uint16_t)~motors) | forward;
   mcu->stream.begun |= motors;
   if (bushd_run_done(run)) end_ramp_down(mcu, motors);
@@ -272,7 +272,7 @@ uint16_t bushd_mcu_line_delay(const bushd_mcu* mcu, uint8_t m) {
 // longer delay rather than a shorter one.
 static void note_speed(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   const bushd_run* run = &mcu->line.run;
-  const uint32_t units = bushd_mcu_run_tick_of(mcu, mcu->line.slot, run->table)->units;
+  const uint32_t units = bushd_mcu_run_tick_of(mcu, mcu->line.bank, run->table)->units;
   const uint32_t of_run = units * 256u / (uint16_t)bushd_run_delay(run);  // 15 bits
   motor->displacement = (uint16_t)(of_run * motor->on_line.share >> 16);
   motor->still_ticks = 0;

@@ -16,7 +16,7 @@ typedef struct bushd_mcu bushd_mcu;
 typedef struct bushd_mcu_line {
   uint16_t unplaced;  // of its motors, before it begins: their followers are still to be started
   uint16_t motors;  // on it: those whose bushd_mcu_on_line counts, as long as their mode is a run's
-  uint8_t slot;     // of its table
+  uint8_t bank;     // of its table
   uint32_t longest;
   uint32_t step;  // of the line, that is under way, counted from 1
   uint32_t last;  // and where the run ends

@@ -79,7 +79,7 @@ typedef struct bushd_mcu_config {
   // Of motors 0 .. velocity_motors-1, that may move locally by the velocity loop; all zero.
   bushd_mcu_velocity* velocity;
   uint8_t velocity_motors;     // at most BUSHD_MAX_VELOCITY_MOTORS
-  bushd_mcu_scratch* scratch;  // NULL: it has no BUSHD_SCRATCH_SLOT
+  bushd_mcu_scratch* scratch;  // NULL: it has no BUSHD_SCRATCH_BANK
   uint16_t* codes;             // table memory
   uint16_t code_count;
   // BUSHD_MCU_MAX_REPLY bytes for answers. May be the end of the receiver's buffer, if the port
@@ -109,7 +109,7 @@ typedef struct bushd_mcu {
   uint16_t direction;   // of the slot_buffer prepared last; 1: positive
   uint16_t autonomous;  // motors that move by homing, travel or local inputs
   uint16_t homed;
-  bushd_run_tick run_tick[BUSHD_TABLE_SLOTS];         // in the terms of each table
+  bushd_run_tick run_tick[BUSHD_TABLE_BANKS];         // in the terms of each table
   bushd_set_inputs inputs;                            // settings
   bushd_mcu_switches switches[BUSHD_MOTORS_PER_MCU];  // settings
   bushd_mcu_stream stream;
@@ -162,7 +162,7 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
 #define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                     \
   (sizeof(bushd_set_outputs) + sizeof(uint32_t) + sizeof(bushd_format) +                        \
    sizeof(bushd_set_inputs) + BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) +               \
-   sizeof(bushd_emission) + sizeof(bushd_local) + BUSHD_TABLE_SLOTS * sizeof(bushd_mcu_table) + \
+   sizeof(bushd_emission) + sizeof(bushd_local) + BUSHD_TABLE_BANKS * sizeof(bushd_mcu_table) + \
    sizeof(uint8_t) + sizeof(uint16_t) + (code_count) * sizeof(uint16_t) +                       \
    BUSHD_MOTORS_PER_MCU * sizeof(int8_t) + BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +  \
    BUSHD_MAX_VELOCITY_MOTORS * sizeof(bushd_mcu_velocity_settings))

@@ -54,7 +54,7 @@ typedef struct bushd_mcu_start {
 typedef struct bushd_mcu_motor {
   int32_t position_steps;     // until the start of the present tick
   int16_t remainder;          // exact position minus steps made, 1/256 step
-  int8_t table;               // table slot, -1: none
+  int8_t table;               // table bank, -1: none
   uint8_t mode : 3;           // bushd_mcu_mode
   bool exact : 1;             // `run` is emitted exact to a slot, not by displacements
   bool has_out_of_order : 1;  // only in a stream

@@ -55,7 +55,7 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
     case LOCAL:
       return piece_of(&mcu->local.settings, sizeof mcu->local.settings);
     case TABLES:
-      return piece_of(mcu->tables.slot, sizeof mcu->tables.slot);
+      return piece_of(mcu->tables.bank, sizeof mcu->tables.bank);
     case VALID_TABLES:
       return piece_of(&mcu->tables.valid, sizeof mcu->tables.valid);
     case CODES_USED:

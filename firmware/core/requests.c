@@ -195,8 +195,9 @@ static bushd_status answer_identify(bushd_mcu* mcu, const bushd_frame* frame, an
   bushd_identify message;
   const bushd_status status = bushd_decode_identify(frame->payload, frame->payload_size, &message);
   if (status != BUSHD_OK) return status;
-  const uint8_t slot = bushd_identify_slot(mcu->config.unique_id, message.salt, message.slots);
-  if (!answer_at(a, (uint32_t)slot * message.slot_units)) return BUSHD_E_FORMAT;
+  const uint8_t window =
+      bushd_identify_window(mcu->config.unique_id, message.salt, message.windows);
+  if (!answer_at(a, (uint32_t)window * message.window_units)) return BUSHD_E_FORMAT;
   a->size = encode_identity(mcu, a->payload);
   return BUSHD_OK;
 }

@@ -442,8 +442,8 @@ bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks) {
 
 // The run of an entry: what its motor's table makes of it.
 static bool restore(const bushd_mcu* mcu, const bushd_table_ticks_entry* entry, bushd_run* run) {
-  const int8_t slot = mcu->motor[entry->motor].table;
-  return bushd_run_restore(run, &mcu->tables.slot[slot].table, &entry->state);
+  const int8_t bank = mcu->motor[entry->motor].table;
+  return bushd_run_restore(run, &mcu->tables.bank[bank].table, &entry->state);
 }
 
 static void put_run(bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* range, bushd_run* run) {

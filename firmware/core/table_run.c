@@ -23,10 +23,10 @@ __attribute__((noinline)) static void make_run_tick(const bushd_mcu* mcu, const 
 }
 
 // Divisions: in the first tick of a run at most, and where homing changes to its slow table.
-const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t slot,
+const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t bank,
                                             const bushd_table* table) {
   bushd_run_tick* tick =
-      slot == BUSHD_SCRATCH_SLOT ? &mcu->config.scratch->run_tick : &mcu->run_tick[slot];
+      bank == BUSHD_SCRATCH_BANK ? &mcu->config.scratch->run_tick : &mcu->run_tick[bank];
   if (!bushd_run_tick_fits(tick, mcu->tick_ns, table)) make_run_tick(mcu, table, tick);
   return tick;
 }
@@ -42,7 +42,7 @@ void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_
 
 bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint32_t* spare_ns) {
   bushd_mcu_made* made = &mcu->motor[entry->motor].made;
-  bushd_run_start(&made->run, &mcu->tables.slot[entry->slot].table, entry->steps, entry->direction,
+  bushd_run_start(&made->run, &mcu->tables.bank[entry->bank].table, entry->steps, entry->direction,
                   entry->shortest_delay);
   return bushd_mcu_ticks_of_run(&made->run, mcu->tick_ns, &made->until, spare_ns);
 }
@@ -51,7 +51,7 @@ static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
                                 const bushd_table_run_entry* entry) {
   const bushd_mcu_motor* motor = &mcu->motor[entry->motor];
   if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
-  if (motor->table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
+  if (motor->table != (int8_t)entry->bank) return BUSHD_E_NO_TABLE;
   if (!bushd_mcu_runs_so_slowly(mcu, entry->shortest_delay)) return BUSHD_E_FORMAT;
   // There is room for one run.
   return motor->mode == BUSHD_MCU_STREAM ? BUSHD_OK : BUSHD_E_STATE;

@@ -18,8 +18,8 @@ bool bushd_mcu_make_run(bushd_mcu* mcu, const bushd_table_run_entry* entry, uint
 // How many ticks a run takes from its beginning.
 bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
                             uint32_t* spare_ns);
-// The tick in the terms of the table in this slot, or of that which its motor has for now.
-const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t slot, const bushd_table* table);
+// The tick in the terms of the table in this bank, or of that which its motor has for now.
+const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t bank, const bushd_table* table);
 // The motor's run, just started, begins in this tick and takes as many.
 void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks);
 // Steps that a motor may make in this direction from the end of the tick that is emitted on before

@@ -21,12 +21,12 @@ typedef struct bushd_mcu_table {
 } bushd_mcu_table;
 
 typedef struct bushd_mcu_table_memory {
-  bushd_mcu_table slot[BUSHD_TABLE_SLOTS];
-  uint8_t valid;        // slots whose table has come whole, and is good
+  bushd_mcu_table bank[BUSHD_TABLE_BANKS];
+  uint8_t valid;        // banks whose table has come whole, and is good
   uint16_t codes_used;  // of the port's table memory
 } bushd_mcu_table_memory;
 
-// The table in BUSHD_SCRATCH_SLOT, by which no motor ramps down and lines may go. Its codes lie
+// The table in BUSHD_SCRATCH_BANK, by which no motor ramps down and lines may go. Its codes lie
 // behind those of all others, and are no part of what a port keeps over resets. Any TABLE_BEGIN
 // discards it.
 typedef struct bushd_mcu_scratch {
@@ -38,8 +38,8 @@ typedef struct bushd_mcu_scratch {
 bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);
 bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message);
 bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message);
-// The one in this slot; NULL if none has come whole. Precondition: slot <= BUSHD_SCRATCH_SLOT.
-const bushd_table* bushd_mcu_checked_table(const bushd_mcu* mcu, uint8_t slot);
+// The one in this bank; NULL if none has come whole. Precondition: bank <= BUSHD_SCRATCH_BANK.
+const bushd_table* bushd_mcu_checked_table(const bushd_mcu* mcu, uint8_t bank);
 bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message);
 bushd_tables bushd_mcu_tables(const bushd_mcu* mcu);
 void bushd_mcu_forget_tables(bushd_mcu* mcu);

@@ -16,7 +16,7 @@
 
 static bushd_status check_entry(const bushd_mcu* mcu, const bushd_table_run_entry* entry) {
   if (entry->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
-  if (mcu->motor[entry->motor].table != (int8_t)entry->slot) return BUSHD_E_NO_TABLE;
+  if (mcu->motor[entry->motor].table != (int8_t)entry->bank) return BUSHD_E_NO_TABLE;
   if (!bushd_mcu_runs_so_slowly(mcu, entry->shortest_delay)) return BUSHD_E_FORMAT;
   const bool forbidden =
       (bushd_mcu_forbidden(mcu, entry->direction) & motor_bit(entry->motor)) != 0;

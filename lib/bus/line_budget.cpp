@@ -21,10 +21,10 @@ double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
   const double bytes_per_us = baud / 10.0 * 1e-6;
   const double polls_per_s = 1.0 / (kPollPeriodUs * 1e-6);
   double bytes_per_s = (kFrameCost + kSyncBytes) / (kSyncPeriodUs * 1e-6);
-  bytes_per_s += (kFrameCost + 1.0 + kFirstSlotUs * bytes_per_us) * polls_per_s;
+  bytes_per_s += (kFrameCost + 1.0 + kFirstWindowUs * bytes_per_us) * polls_per_s;
   for (const std::uint8_t motors : motors_per_mcu) {
     const double report =
-        kPollEntryBytes + kFrameCost + BUSHD_REPORT_SIZE(motors) + kSlotGuardUs * bytes_per_us;
+        kPollEntryBytes + kFrameCost + BUSHD_REPORT_SIZE(motors) + kWindowGuardUs * bytes_per_us;
     bytes_per_s += report * polls_per_s;
     if (motors == 0) continue;
     const double ticks = ticks_per_frame(motors, format, tick_ns);

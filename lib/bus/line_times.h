@@ -15,8 +15,8 @@ inline constexpr unsigned kMaxTicksPerFrame = 16;
 inline constexpr std::int64_t kMaxFrameUs = 150'000;
 // From a poll's end to the first answer, and from one answer to the next: what an MCU may need to
 // begin and to let the line go.
-inline constexpr std::int64_t kFirstSlotUs = 1'000;
-inline constexpr std::int64_t kSlotGuardUs = 600;
+inline constexpr std::int64_t kFirstWindowUs = 1'000;
+inline constexpr std::int64_t kWindowGuardUs = 600;
 
 // Ticks that a full frame of TICKS holds. Precondition: motors > 0.
 inline unsigned ticks_per_frame(unsigned motors, bushd_format format, std::uint32_t tick_ns) {

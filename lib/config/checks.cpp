@@ -179,7 +179,7 @@ Result<void> check_board_speed(const Loading& loading, std::size_t index) {
                   config.table_of(motor).name(), fastest_ns, code_ns, bus.name, bus.start_hz)));
 }
 
-Result<void> check_table_slots(const Loading& loading) {
+Result<void> check_table_banks(const Loading& loading) {
   const Config& config = loading.config;
   tables::Gentler gentler;
   std::vector<std::set<const tables::Table*>> used(config.mcus.size());
@@ -189,13 +189,13 @@ Result<void> check_table_slots(const Loading& loading) {
     const auto table = gentler.of(config.group_of(motor).table, motor.drive.acceleration);
     if (!table) return fail(loading.motors[i].error("acceleration", table.error().message));
     of_mcu.insert(table->get());
-    if (of_mcu.size() <= BUSHD_TABLE_SLOTS) continue;
+    if (of_mcu.size() <= BUSHD_TABLE_BANKS) continue;
     return fail(loading.motors[i].error(
         "group",
         fmt::format("is one table too many for MCU \"{}\"; allowed: {} different tables among its "
                     "motors. Let groups share a table (and `acceleration`) or move the motor to "
                     "another MCU",
-                    config.mcu_of(motor).id, BUSHD_TABLE_SLOTS)));
+                    config.mcu_of(motor).id, BUSHD_TABLE_BANKS)));
   }
   return {};
 }
@@ -270,7 +270,7 @@ Result<void> check_together(const Loading& loading) {
     if (auto checked = check_idle(loading, i); !checked) return checked;
   }
   if (auto checked = check_motor_inputs(loading); !checked) return checked;
-  if (auto checked = check_table_slots(loading); !checked) return checked;
+  if (auto checked = check_table_banks(loading); !checked) return checked;
   for (std::size_t i = 0; i < loading.config.buses.size(); ++i) {
     if (auto checked = check_line(loading, i); !checked) return checked;
   }

@@ -12,7 +12,7 @@ namespace bushd::config {
 // The fixed rates that libserial can set, rising.
 std::span<const std::uint32_t> baud_rates();
 
-// Every bus has an MCU, every table is slow enough for its bus's tick, fits its MCU's table slots,
+// Every bus has an MCU, every table is slow enough for its bus's tick, fits its MCU's table banks,
 // and no line is asked for more than it can carry.
 Result<void> check_together(const Loading& loading);
 

@@ -10,15 +10,15 @@ extern "C" {
 
 #define BUSHD_PROTOCOL_VERSION 5u
 #define BUSHD_MOTORS_PER_MCU 16u
-#define BUSHD_TABLE_SLOTS 8u
-#define BUSHD_SCRATCH_SLOT 8u  // volatile: its table is lost at a reset (BUSHD_CAN_SCRATCH)
+#define BUSHD_TABLE_BANKS 8u
+#define BUSHD_SCRATCH_BANK 8u  // volatile: its table is lost at a reset (BUSHD_CAN_SCRATCH)
 #define BUSHD_MIN_TICK_NS 200000u
 #define BUSHD_MAX_TICK_NS 20000000u
 #define BUSHD_UNIQUE_ID_SIZE 8u
 #define BUSHD_REPLY_UNIT_NS 10000u  // of times at which an answer shall begin
 
 typedef enum bushd_type {
-  BUSHD_MSG_IDENTIFY = 0x01,      // bushd_identify -> reply: bushd_identity, in a slot
+  BUSHD_MSG_IDENTIFY = 0x01,      // bushd_identify -> reply: bushd_identity, in a reply window
   BUSHD_MSG_CONFIGURE = 0x02,     // bushd_configure -> acknowledgement
   BUSHD_MSG_TABLE_BEGIN = 0x03,   // bushd_table_begin -> acknowledgement
   BUSHD_MSG_TABLE_DATA = 0x04,    // bushd_table_data -> acknowledgement

@@ -37,7 +37,7 @@ bushd_line_entry bushd_next_line_entry(const uint8_t** at) {
 
 static void put_line(writer* w, const bushd_line_part* line, const bushd_line_entry* entries,
                      uint8_t count) {
-  put8(w, line->slot);
+  put8(w, line->bank);
   put16(w, line->shortest_delay);
   put32(w, line->longest);
   put32(w, line->from);
@@ -50,13 +50,13 @@ static void put_line(writer* w, const bushd_line_part* line, const bushd_line_en
 
 // To the payload's end.
 static bushd_status get_line(reader* r, bushd_line_part* line, bool in_range) {
-  line->slot = get8(r);
+  line->bank = get8(r);
   line->shortest_delay = get16(r);
   line->longest = get32(r);
   line->from = get32(r);
   line->steps = get32(r);
   if (r->short_of_bytes) return BUSHD_E_LENGTH;
-  if (line->slot > BUSHD_SCRATCH_SLOT || line->longest > INT32_MAX || line->from >= line->longest ||
+  if (line->bank > BUSHD_SCRATCH_BANK || line->longest > INT32_MAX || line->from >= line->longest ||
       line->steps < 1 || line->steps > line->longest - line->from) {
     in_range = false;
   }

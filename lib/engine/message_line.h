@@ -16,7 +16,7 @@ extern "C" {
 // A run of a table, and the motors of one MCU that follow it. The others of the line are told the
 // same, but for their own entries.
 typedef struct bushd_line_part {
-  uint8_t slot;             // of the run's table, whosever it is, or BUSHD_SCRATCH_SLOT
+  uint8_t bank;             // of the run's table, whosever it is, or BUSHD_SCRATCH_BANK
   uint16_t shortest_delay;  // no delay of the run is shorter, time units of that table; 0: none
   uint32_t longest;         // L, below 2^31
   uint32_t from;            // steps of the line that are over when the run begins

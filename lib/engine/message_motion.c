@@ -146,7 +146,7 @@ bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks
 #define HEAD_PARTS 0x40u                    // TABLE_TICKS: the parts follow; else it cruises
 #define HEAD_SINCE_NS 0x20u                 // TABLE_TICKS
 #define HEAD_LEAD 0x10u                     // TABLE_TICKS
-#define HEAD_SLOT_SHIFT 4u                  // TABLE_RUN: three bits
+#define HEAD_BANK_SHIFT 4u                  // TABLE_RUN: three bits
 #define STEPS_LIMITED UINT32_C(0x80000000)  // TABLE_RUN, with the steps: a shortest delay follows
 
 static void put_entry(writer* w, const bushd_table_ticks_entry* entry, uint8_t flags) {
@@ -240,7 +240,7 @@ bool bushd_next_table_ticks_entry(const bushd_table_ticks* message, uint16_t* at
 
 static void put_run_entries(writer* w, const bushd_table_run_entry* entries, uint8_t count) {
   for (uint8_t i = 0; i < count; ++i) {
-    uint8_t head = (uint8_t)(entries[i].motor | entries[i].slot << HEAD_SLOT_SHIFT);
+    uint8_t head = (uint8_t)(entries[i].motor | entries[i].bank << HEAD_BANK_SHIFT);
     if (entries[i].direction > 0) head |= HEAD_POSITIVE;
     put8(w, head);
     const bushd_delay shortest_delay = entries[i].shortest_delay;
@@ -273,7 +273,7 @@ static bushd_table_run_entry get_run_entry(reader* r, bool* in_range) {
   const bushd_delay shortest_delay =
       (steps & STEPS_LIMITED) != 0 ? get_shortest_delay(r, in_range) : (bushd_delay)0;
   const bushd_table_run_entry entry = {
-      (uint8_t)(head & HEAD_MOTOR), (uint8_t)(head >> HEAD_SLOT_SHIFT & 7u),
+      (uint8_t)(head & HEAD_MOTOR), (uint8_t)(head >> HEAD_BANK_SHIFT & 7u),
       head & HEAD_POSITIVE ? 1 : -1, steps & ~STEPS_LIMITED, shortest_delay};
   return entry;
 }

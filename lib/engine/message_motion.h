@@ -55,8 +55,8 @@ typedef struct bushd_local {
   uint16_t keypad_ticks;
 } bushd_local;
 
-// Asks `count` MCUs for reports, each in a reply slot of its own: entry i (bushd_poll_entry) names
-// an address and when, after this frame's end, its answer begins.
+// Asks `count` MCUs for reports, each in a reply window of its own: entry i (bushd_poll_entry)
+// names an address and when, after this frame's end, its answer begins.
 #define BUSHD_POLL_MAX_ENTRIES ((BUSHD_FRAME_MAX_PAYLOAD - 1u) / 3u)
 typedef struct bushd_poll_entry {
   uint8_t address;
@@ -137,7 +137,7 @@ typedef struct bushd_table_run {
 #define BUSHD_TABLE_RUN_MAX_ENTRY 13u
 typedef struct bushd_table_run_entry {
   uint8_t motor;
-  uint8_t slot;                // of the table; must be the one assigned to the motor
+  uint8_t bank;                // of the table; must be the one assigned to the motor
   int8_t direction;            // +1, -1
   uint32_t steps;              // 1 .. 2^31 - 1
   bushd_delay shortest_delay;  // no delay is shorter, time units of the table; 0: none

@@ -15,17 +15,17 @@ static void get_id(reader* r, uint8_t* unique_id) {
 size_t bushd_encode_identify(const bushd_identify* message, uint8_t* payload) {
   writer w = {payload};
   put16(&w, message->salt);
-  put8(&w, message->slots);
-  put16(&w, message->slot_units);
+  put8(&w, message->windows);
+  put16(&w, message->window_units);
   return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_identify(const uint8_t* payload, size_t size, bushd_identify* message) {
   reader r = read_from(payload, size);
   message->salt = get16(&r);
-  message->slots = get8(&r);
-  message->slot_units = get16(&r);
-  return finish(&r, message->slots >= 1);
+  message->windows = get8(&r);
+  message->window_units = get16(&r);
+  return finish(&r, message->windows >= 1);
 }
 
 static uint32_t fnv1a(uint32_t hash, const uint8_t* bytes, uint8_t count) {
@@ -33,16 +33,16 @@ static uint32_t fnv1a(uint32_t hash, const uint8_t* bytes, uint8_t count) {
   return hash;
 }
 
-// A CRC would not do: it is linear, so two MCUs that share a slot of 2^n would share it whatever
+// A CRC would not do: it is linear, so two MCUs that share a window of 2^n would share it whatever
 // the salt. Hence FNV-1a and the last mixing of MurmurHash3.
-uint8_t bushd_identify_slot(const uint8_t* unique_id, uint16_t salt, uint8_t slots) {
+uint8_t bushd_identify_window(const uint8_t* unique_id, uint16_t salt, uint8_t windows) {
   uint8_t bytes[2];
   bushd_put_u16(bytes, salt);
   uint32_t hash = fnv1a(UINT32_C(2166136261), unique_id, BUSHD_UNIQUE_ID_SIZE);
   hash = fnv1a(hash, bytes, sizeof bytes);
   hash = (hash ^ hash >> 16) * UINT32_C(0x85EBCA6B);
   hash = (hash ^ hash >> 13) * UINT32_C(0xC2B2AE35);
-  return (uint8_t)((hash ^ hash >> 16) % slots);
+  return (uint8_t)((hash ^ hash >> 16) % windows);
 }
 
 size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload) {
@@ -142,7 +142,7 @@ bushd_status bushd_decode_emission(const uint8_t* payload, size_t size, bushd_em
 
 size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload) {
   writer w = {payload};
-  put8(&w, message->slot);
+  put8(&w, message->bank);
   put16(&w, message->accel_count);
   put16(&w, message->decel_count);
   put16(&w, message->cruise);
@@ -154,20 +154,20 @@ size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* paylo
 bushd_status bushd_decode_table_begin(const uint8_t* payload, size_t size,
                                       bushd_table_begin* message) {
   reader r = read_from(payload, size);
-  message->slot = get8(&r);
+  message->bank = get8(&r);
   message->accel_count = get16(&r);
   message->decel_count = get16(&r);
   message->cruise = get16(&r);
   message->time_unit_ns = get32(&r);
   message->revision = get32(&r);
-  return finish(&r, message->slot <= BUSHD_SCRATCH_SLOT && message->accel_count >= 1 &&
+  return finish(&r, message->bank <= BUSHD_SCRATCH_BANK && message->accel_count >= 1 &&
                         message->cruise >= 1 && message->time_unit_ns >= 1);
 }
 
-size_t bushd_encode_table_data(uint8_t slot, uint16_t offset, uint8_t count, const uint16_t* codes,
+size_t bushd_encode_table_data(uint8_t bank, uint16_t offset, uint8_t count, const uint16_t* codes,
                                uint8_t* payload) {
   writer w = {payload};
-  put8(&w, slot);
+  put8(&w, bank);
   put16(&w, offset);
   put8(&w, count);
   for (uint8_t i = 0; i < count; ++i) put16(&w, codes[i]);
@@ -177,33 +177,33 @@ size_t bushd_encode_table_data(uint8_t slot, uint16_t offset, uint8_t count, con
 bushd_status bushd_decode_table_data(const uint8_t* payload, size_t size,
                                      bushd_table_data* message) {
   reader r = read_from(payload, size);
-  message->slot = get8(&r);
+  message->bank = get8(&r);
   message->offset = get16(&r);
   message->count = get8(&r);
   message->codes = take(&r, 2u * message->count);
-  return finish(&r, message->slot <= BUSHD_SCRATCH_SLOT && message->count >= 1 &&
+  return finish(&r, message->bank <= BUSHD_SCRATCH_BANK && message->count >= 1 &&
                         message->count <= BUSHD_TABLE_DATA_MAX_CODES);
 }
 
 size_t bushd_encode_table_end(const bushd_table_end* message, uint8_t* payload) {
   writer w = {payload};
-  put8(&w, message->slot);
+  put8(&w, message->bank);
   put32(&w, message->crc);
   return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_table_end(const uint8_t* payload, size_t size, bushd_table_end* message) {
   reader r = read_from(payload, size);
-  message->slot = get8(&r);
+  message->bank = get8(&r);
   message->crc = get32(&r);
-  return finish(&r, message->slot <= BUSHD_SCRATCH_SLOT);
+  return finish(&r, message->bank <= BUSHD_SCRATCH_BANK);
 }
 
 size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload) {
   writer w = {payload + 1};
   uint8_t valid = 0;
-  for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    const bushd_table_held* held = &message->slot[i];
+  for (uint8_t i = 0; i < BUSHD_TABLE_BANKS; ++i) {
+    const bushd_table_held* held = &message->bank[i];
     if (held->valid) valid = (uint8_t)(valid | 1u << i);
     put32(&w, held->crc);
     put32(&w, held->revision);
@@ -215,10 +215,10 @@ size_t bushd_encode_tables(const bushd_tables* message, uint8_t* payload) {
 bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tables* message) {
   reader r = read_from(payload, size);
   const uint8_t valid = get8(&r);
-  for (uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    message->slot[i].valid = ((unsigned)valid >> i & 1u) != 0;
-    message->slot[i].crc = get32(&r);
-    message->slot[i].revision = get32(&r);
+  for (uint8_t i = 0; i < BUSHD_TABLE_BANKS; ++i) {
+    message->bank[i].valid = ((unsigned)valid >> i & 1u) != 0;
+    message->bank[i].crc = get32(&r);
+    message->bank[i].revision = get32(&r);
   }
   return finish(&r, true);
 }
@@ -226,15 +226,15 @@ bushd_status bushd_decode_tables(const uint8_t* payload, size_t size, bushd_tabl
 size_t bushd_encode_assign(const bushd_assign* message, uint8_t* payload) {
   writer w = {payload};
   put8(&w, message->motor);
-  put8(&w, message->slot);
+  put8(&w, message->bank);
   return (size_t)(w.at - payload);
 }
 
 bushd_status bushd_decode_assign(const uint8_t* payload, size_t size, bushd_assign* message) {
   reader r = read_from(payload, size);
   message->motor = get8(&r);
-  message->slot = get8(&r);
-  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU && message->slot < BUSHD_TABLE_SLOTS);
+  message->bank = get8(&r);
+  return finish(&r, message->motor < BUSHD_MOTORS_PER_MCU && message->bank < BUSHD_TABLE_BANKS);
 }
 
 size_t bushd_encode_control(const bushd_control* message, uint8_t* payload) {

@@ -15,15 +15,15 @@ extern "C" {
 
 // Asks for identities; the one request that may be broadcast and is answered all the same. To keep
 // apart MCUs that have the same address (or all of them, on a broadcast) each answers in one of
-// `slots` reply slots, chosen by bushd_identify_slot: slot i begins i x slot_units after this
-// frame's end, in BUSHD_REPLY_UNIT_NS.
+// `windows` reply windows, chosen by bushd_identify_window: window i begins i x window_units after
+// this frame's end, in BUSHD_REPLY_UNIT_NS.
 typedef struct bushd_identify {
   uint16_t salt;
-  uint8_t slots;  // >= 1
-  uint16_t slot_units;
+  uint8_t windows;  // >= 1
+  uint16_t window_units;
 } bushd_identify;
-// Two MCUs that share a slot are apart after a few other salts.
-uint8_t bushd_identify_slot(const uint8_t* unique_id, uint16_t salt, uint8_t slots);
+// Two MCUs that share a window are apart after a few other salts.
+uint8_t bushd_identify_window(const uint8_t* unique_id, uint16_t salt, uint8_t windows);
 
 enum {
   BUSHD_CAN_COARSE = 1 << 0,
@@ -47,7 +47,7 @@ enum {
 #define BUSHD_CAN_CURRENTS UINT32_C(0x8000)
 #define BUSHD_CAN_VELOCITY UINT32_C(0x10000)
 #define BUSHD_CAN_KEYPAD UINT32_C(0x20000)
-#define BUSHD_CAN_SCRATCH UINT32_C(0x40000)      // has BUSHD_SCRATCH_SLOT
+#define BUSHD_CAN_SCRATCH UINT32_C(0x40000)      // has BUSHD_SCRATCH_BANK
 #define BUSHD_CAN_CLEAR_NAMED UINT32_C(0x80000)  // bushd_control.faults
 #define BUSHD_CAN_OUTPUTS UINT32_C(0x100000)     // levels of its outputs may be chosen
 #define BUSHD_CAN_SLOW_RUNS UINT32_C(0x200000)   // shortest delays and slow delays beyond 16 bits
@@ -112,10 +112,10 @@ typedef struct bushd_emission {
 } bushd_emission;
 
 // A table is sent as: begin, data (accelerating side, then decelerating side unless it is the
-// same), end. `slot` 0 .. BUSHD_TABLE_SLOTS-1, or BUSHD_SCRATCH_SLOT: a table that lines go by.
+// same), end. `bank` 0 .. BUSHD_TABLE_BANKS-1, or BUSHD_SCRATCH_BANK: a table that lines go by.
 // Codes run from slow to fast on both sides.
 typedef struct bushd_table_begin {
-  uint8_t slot;
+  uint8_t bank;
   uint16_t accel_count;
   uint16_t decel_count;  // 0: the decelerating side is the accelerating one
   uint16_t cruise;
@@ -125,30 +125,30 @@ typedef struct bushd_table_begin {
 
 #define BUSHD_TABLE_DATA_MAX_CODES 120u
 typedef struct bushd_table_data {
-  uint8_t slot;
+  uint8_t bank;
   uint16_t offset;       // of the first code, counted over both sides
   uint8_t count;         // 1 .. BUSHD_TABLE_DATA_MAX_CODES
   const uint8_t* codes;  // count little-endian 16-bit codes, unaligned
 } bushd_table_data;
 
 typedef struct bushd_table_end {
-  uint8_t slot;
+  uint8_t bank;
   uint32_t crc;  // bushd_table_crc32 (engine/table.h) of the whole table
 } bushd_table_end;
 
-// What an MCU holds over resets, by table slot.
+// What an MCU holds over resets, by table bank.
 typedef struct bushd_table_held {
   bool valid;
   uint32_t crc;
   uint32_t revision;
 } bushd_table_held;
 typedef struct bushd_tables {
-  bushd_table_held slot[BUSHD_TABLE_SLOTS];
+  bushd_table_held bank[BUSHD_TABLE_BANKS];
 } bushd_tables;
 
 typedef struct bushd_assign {
   uint8_t motor;
-  uint8_t slot;
+  uint8_t bank;
 } bushd_assign;
 
 enum {
@@ -238,7 +238,7 @@ typedef struct bushd_acknowledgement {
 } bushd_acknowledgement;
 
 #define BUSHD_IDENTITY_SIZE 24u
-#define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_SLOTS)
+#define BUSHD_TABLES_SIZE (1u + 8u * BUSHD_TABLE_BANKS)
 
 // Encoders return the payload's size. Preconditions are the ranges given above.
 size_t bushd_encode_identify(const bushd_identify* message, uint8_t* payload);
@@ -246,7 +246,7 @@ size_t bushd_encode_identity(const bushd_identity* message, uint8_t* payload);
 size_t bushd_encode_configure(const bushd_configure* message, uint8_t* payload);
 size_t bushd_encode_emission(const bushd_emission* message, uint8_t* payload);
 size_t bushd_encode_table_begin(const bushd_table_begin* message, uint8_t* payload);
-size_t bushd_encode_table_data(uint8_t slot, uint16_t offset, uint8_t count, const uint16_t* codes,
+size_t bushd_encode_table_data(uint8_t bank, uint16_t offset, uint8_t count, const uint16_t* codes,
                                uint8_t* payload);
 size_t bushd_encode_table_end(const bushd_table_end* message, uint8_t* payload);
 size_t bushd_encode_assign(const bushd_assign* message, uint8_t* payload);

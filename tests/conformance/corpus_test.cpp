@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 class SentTables {
  public:
   void begin(const bushd_table_begin& message) {
-    Sent& sent = sent_[message.slot];
+    Sent& sent = sent_[message.bank];
     sent.table = {};
     sent.table.accel.count = message.accel_count;
     sent.table.decel.count = message.decel_count != 0 ? message.decel_count : message.accel_count;
@@ -38,13 +38,13 @@ class SentTables {
     sent.decel_at = message.decel_count != 0 ? message.accel_count : 0;
   }
   void data(const bushd_table_data& message) {
-    Sent& sent = sent_[message.slot];
+    Sent& sent = sent_[message.bank];
     for (std::size_t i = 0; i < message.count && message.offset + i < sent.codes.size(); ++i) {
       sent.codes[message.offset + i] = bushd_get_u16(message.codes + 2 * i);
     }
   }
-  std::uint32_t crc(std::uint8_t slot) {
-    Sent& sent = sent_[slot];
+  std::uint32_t crc(std::uint8_t bank) {
+    Sent& sent = sent_[bank];
     if (sent.codes.empty()) return 0;
     sent.table.accel.code = sent.codes.data();
     sent.table.decel.code = sent.codes.data() + sent.decel_at;
@@ -91,7 +91,7 @@ class ImageReplay final : public fuzz::Programmed {
             last_.sync_ns};
   }
 
-  std::uint32_t table_crc(std::uint8_t slot) override { return tables_.crc(slot); }
+  std::uint32_t table_crc(std::uint8_t bank) override { return tables_.crc(bank); }
 
   void pass() override {
     if (!pins_set_) bus_.node(0).set_inputs(moving_pins(++ticks_));

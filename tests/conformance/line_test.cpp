@@ -98,9 +98,9 @@ TEST_P(LineByScratchTable, MakesTheSameSteps) {
   for (int i = 0; i < 3; ++i) {
     for (const std::uint8_t address : {kVirtual, kReal}) {
       ASSERT_NO_FATAL_FAILURE(
-          master_.upload_table(address, BUSHD_SCRATCH_SLOT, kUnitNs, slower, kCruise + 9));
+          master_.upload_table(address, BUSHD_SCRATCH_BANK, kUnitNs, slower, kCruise + 9));
     }
-    begin({BUSHD_SCRATCH_SLOT, 0, kLongest, 0, kLongest, 0, nullptr}, kEntries);
+    begin({BUSHD_SCRATCH_BANK, 0, kLongest, 0, kLongest, 0, nullptr}, kEntries);
     pass_ticks(300);
     begin_line();
     pass_ticks(230);

@@ -57,10 +57,10 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   pass(real_->keeps_within_ns(ramp.size()));
   reboot();
   const bushd_tables after = master_.tables(kAddress);
-  for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
-    EXPECT_EQ(after.slot[slot].valid, slot == 0 || slot == 5);
-    EXPECT_EQ(after.slot[slot].crc, before.slot[slot].crc);
-    EXPECT_EQ(after.slot[slot].revision, before.slot[slot].revision);
+  for (std::size_t bank = 0; bank < BUSHD_TABLE_BANKS; ++bank) {
+    EXPECT_EQ(after.bank[bank].valid, bank == 0 || bank == 5);
+    EXPECT_EQ(after.bank[bank].crc, before.bank[bank].crc);
+    EXPECT_EQ(after.bank[bank].revision, before.bank[bank].revision);
   }
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.faults, 0);
@@ -161,7 +161,7 @@ TEST_P(Nvm, WhatIsTheSameIsNotWrittenAgain) {
   EXPECT_EQ(real_->nvm_writes(), written);
 }
 
-// Slot 8, which is never kept, whether the MCU has it or refuses it.
+// Bank 8, which is never kept, whether the MCU has it or refuses it.
 class NvmScratch : public Nvm {
  protected:
   void SetUp() override {
@@ -171,18 +171,18 @@ class NvmScratch : public Nvm {
     before_ = master_.tables(kAddress);
   }
 
-  // What was kept before is there after a reset, nothing was written, and slot 8 is empty.
+  // What was kept before is there after a reset, nothing was written, and bank 8 is empty.
   void expect_only_the_other_table_is_kept() {
     pass(real_->keeps_within_ns(kCodes));
     EXPECT_EQ(real_->nvm_writes(), written_);
     reboot();
     const bushd_tables after = master_.tables(kAddress);
-    for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
-      EXPECT_EQ(after.slot[slot].valid, slot == 0);
-      EXPECT_EQ(after.slot[slot].crc, before_.slot[slot].crc);
+    for (std::size_t bank = 0; bank < BUSHD_TABLE_BANKS; ++bank) {
+      EXPECT_EQ(after.bank[bank].valid, bank == 0);
+      EXPECT_EQ(after.bank[bank].crc, before_.bank[bank].crc);
     }
     EXPECT_EQ(master_.poll(kAddress).faults, 0);
-    EXPECT_NE(ask(BUSHD_MSG_TABLE_END, bushd_encode_table_end, {BUSHD_SCRATCH_SLOT, 0}), BUSHD_OK);
+    EXPECT_NE(ask(BUSHD_MSG_TABLE_END, bushd_encode_table_end, {BUSHD_SCRATCH_BANK, 0}), BUSHD_OK);
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
     ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
     run(3, 50);
@@ -198,7 +198,7 @@ BUSHD_FOR_TARGETS(NvmScratch, targets_with(BUSHD_CAN_SCRATCH));
 
 TEST_P(NvmScratch, ATableForLinesIsNotKeptAndLeavesTheOthersAlone) {
   ASSERT_NO_FATAL_FAILURE(
-      master_.upload_table(kAddress, BUSHD_SCRATCH_SLOT, 10'000, long_ramp(), 1100));
+      master_.upload_table(kAddress, BUSHD_SCRATCH_BANK, 10'000, long_ramp(), 1100));
   expect_only_the_other_table_is_kept();
 }
 
@@ -206,7 +206,7 @@ class DeniedNvmScratch : public NvmScratch {};
 BUSHD_FOR_TARGETS(DeniedNvmScratch, targets_without(BUSHD_CAN_SCRATCH));
 
 TEST_P(DeniedNvmScratch, ATableForLinesIsRefusedAndLeavesTheOthersAlone) {
-  const bushd_table_begin begin{BUSHD_SCRATCH_SLOT, 3, 0, 150, 10'000, 1};
+  const bushd_table_begin begin{BUSHD_SCRATCH_BANK, 3, 0, 150, 10'000, 1};
   EXPECT_EQ(ask(BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin), BUSHD_E_FORMAT);
   expect_only_the_other_table_is_kept();
 }

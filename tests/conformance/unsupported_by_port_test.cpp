@@ -52,7 +52,7 @@ const std::vector<Unsupported> kUnsupported = {
     {"LOCAL_keypad", BUSHD_CAN_KEYPAD, kByCapability, "RXD is not connected"},
     {"OUTPUTS", BUSHD_CAN_OUTPUTS, kByCapability,
      "`direction_line` of the bus has the level of DIR, and TXD is what it is"},
-    {"volatile_table_slot", BUSHD_CAN_SCRATCH, kByCapability, "no table is uploaded to a port"},
+    {"volatile_table_bank", BUSHD_CAN_SCRATCH, kByCapability, "no table is uploaded to a port"},
 };
 
 // Words of the protocol by capability.

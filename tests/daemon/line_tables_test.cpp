@@ -356,7 +356,7 @@ TEST_F(WaitingLine, EndsWithARefusal) {
   const auto line = begin();
   // Somebody else's table in its place: the next part is none of it.
   bushd_table_begin other{};
-  other.slot = BUSHD_SCRATCH_SLOT;
+  other.bank = BUSHD_SCRATCH_BANK;
   other.accel_count = 1;
   other.cruise = 100;
   other.time_unit_ns = 1000;

@@ -67,7 +67,7 @@ TEST(UseTable, ServesTheNextMoveAndIsKept) {
   EXPECT_EQ(table_of(lab, "m04"), "glacier@3");
   EXPECT_THAT(lab.kept(), ElementsAre("glacier"));
   EXPECT_TRUE(lab.all_ready());
-  for (int mcu : {0, 1}) EXPECT_EQ(lab.bus(0).mcu(mcu).core().tables.slot[0].revision, 3u);
+  for (int mcu : {0, 1}) EXPECT_EQ(lab.bus(0).mcu(mcu).core().tables.bank[0].revision, 3u);
   EXPECT_GE(milliseconds_of_move(lab, 1000), 4000);
   EXPECT_EQ(lab.shaft_steps("m01"), 2000);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
@@ -168,7 +168,7 @@ TEST(UseTable, McuThatIsOfflineGetsItWhenItComes) {
   EXPECT_THAT(used.reason, HasSubstr("not online, they get it when they come: hall:1 hall:2"));
   lab.plug(0);
   lab.connect();
-  for (int mcu : {0, 1}) EXPECT_EQ(lab.bus(0).mcu(mcu).core().tables.slot[0].revision, 3u);
+  for (int mcu : {0, 1}) EXPECT_EQ(lab.bus(0).mcu(mcu).core().tables.bank[0].revision, 3u);
 }
 
 TEST(UseTable, McuThatIsLostWhileItGetsTheTableLeavesAllWithTheOldOne) {
@@ -231,7 +231,7 @@ TEST(ReloadTables, ChangedTableServesTheNextMove) {
   // Another revision is another table, also with the same codes: the MCU is to tell which one it
   // has.
   EXPECT_THAT(lab.wait(reload).reason, HasSubstr("group axes has glacier@4"));
-  EXPECT_EQ(lab.bus(0).mcu(0).core().tables.slot[0].revision, 4u);
+  EXPECT_EQ(lab.bus(0).mcu(0).core().tables.bank[0].revision, 4u);
   EXPECT_EQ(table_of(lab, "m01"), "glacier@4");
 }
 
@@ -266,7 +266,7 @@ TEST(ReloadTables, GroupsWithTheSameTableShareItInTheMcus) {
   std::string changed = kGlacier;
   lab.write_file("glacier.toml", changed.replace(changed.find("revision = 3"), 12, "revision = 5"));
   ASSERT_EQ(lab.wait(lab.reload()).result, "done");
-  EXPECT_EQ(core.tables.slot[0].revision, 5u);
+  EXPECT_EQ(core.tables.bank[0].revision, 5u);
   EXPECT_EQ(core.tables.valid, 1);
 }
 

@@ -11,14 +11,14 @@ bushd_status table_data_again(const Bytes& payload, Bytes* again) {
   std::vector<uint16_t> codes;
   for (size_t i = 0; i < m.count; ++i) codes.push_back(bushd_get_u16(m.codes + 2 * i));
   again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(bushd_encode_table_data(m.slot, m.offset, m.count, codes.data(), again->data()));
+  again->resize(bushd_encode_table_data(m.bank, m.offset, m.count, codes.data(), again->data()));
   return status;
 }
 
 Bytes any_table_data() {
   const auto count = between<uint8_t>(1, BUSHD_TABLE_DATA_MAX_CODES);
   Bytes payload = random_bytes(4u + 2u * count);
-  payload[0] = between<uint8_t>(0, BUSHD_SCRATCH_SLOT);
+  payload[0] = between<uint8_t>(0, BUSHD_SCRATCH_BANK);
   payload[3] = count;
   return payload;
 }
@@ -42,7 +42,7 @@ Kinds setup_kinds() {
       {"identify",
        {bytes_with(5, [](Bytes* p) { (*p)[2] |= 1; }),
         codec(bushd_decode_identify, bushd_encode_identify),
-        {{"no slot", set8(2, 0)}}}},
+        {{"no window", set8(2, 0)}}}},
       {"identity",
        {bytes_with(BUSHD_IDENTITY_SIZE,
                    [](Bytes* p) {
@@ -74,15 +74,15 @@ Kinds setup_kinds() {
                      for (const size_t at : {1u, 5u, 7u}) (*p)[at] |= 1;
                    }),
         codec(bushd_decode_table_begin, bushd_encode_table_begin),
-        {{"slot 9", set8(0, 9)},
+        {{"bank 9", set8(0, 9)},
          {"no codes", set16(1, 0)},
          {"cruise 0", set16(5, 0)},
          {"unit 0", set32(7, 0)}}}},
-      {"table_data", {any_table_data, table_data_again, {{"slot 9", set8(0, 9)}}}},
+      {"table_data", {any_table_data, table_data_again, {{"bank 9", set8(0, 9)}}}},
       {"table_end",
        {bytes_with(5, [](Bytes* p) { (*p)[0] = between<uint8_t>(0, 8); }),
         codec(bushd_decode_table_end, bushd_encode_table_end),
-        {{"slot 9", set8(0, 9)}}}},
+        {{"bank 9", set8(0, 9)}}}},
       {"tables",
        {[] { return random_bytes(BUSHD_TABLES_SIZE); },
         codec(bushd_decode_tables, bushd_encode_tables),
@@ -94,7 +94,7 @@ Kinds setup_kinds() {
                      (*p)[1] = between<uint8_t>(0, 7);
                    }),
         codec(bushd_decode_assign, bushd_encode_assign),
-        {{"motor 16", set8(0, 16)}, {"slot 8", set8(1, 8)}}}},
+        {{"motor 16", set8(0, 16)}, {"bank 8", set8(1, 8)}}}},
       {"control",
        {bytes_with(2,
                    [](Bytes* p) {

@@ -184,7 +184,7 @@ TEST(MessagePoll, RefusesToAskNobody) {
   EXPECT_EQ(bushd_decode_poll(&nobody, 1, &message), BUSHD_E_FORMAT);
 }
 
-TEST(MessagePoll, TellsEachAddressItsSlot) {
+TEST(MessagePoll, TellsEachAddressItsWindow) {
   const std::vector<bushd_poll_entry> entries{{7, 50}, {1, 700}, {255, 65535}};
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_poll(entries.data(), 3, payload.data()));
@@ -216,31 +216,31 @@ TEST(MessageIdentity, OfAnotherVersionTellsThatVersionAndNothingElse) {
   });
 }
 
-// MCUs that chose the same slot must be able to get apart: another salt, other slots.
-TEST(IdentifySlot, AnySaltSpreadsTheMcusOverTheSlots) {
-  constexpr uint8_t kSlots = 16;
+// MCUs that chose the same window must be able to get apart: another salt, other windows.
+TEST(IdentifyWindow, AnySaltSpreadsTheMcusOverTheWindows) {
+  constexpr uint8_t kWindows = 16;
   for (uint16_t salt = 0; salt < 50; ++salt) {
-    std::vector<int> in_slot(kSlots);
-    for (int mcu = 0; mcu < 16 * kSlots; ++mcu) {
+    std::vector<int> in_window(kWindows);
+    for (int mcu = 0; mcu < 16 * kWindows; ++mcu) {
       const uint8_t id[BUSHD_UNIQUE_ID_SIZE] = {'b', 'u', 's', 'h',
                                                 0,   0,   1,   static_cast<uint8_t>(mcu)};
-      const uint8_t slot = bushd_identify_slot(id, salt, kSlots);
-      ASSERT_LT(slot, kSlots);
-      ++in_slot[slot];
+      const uint8_t window = bushd_identify_window(id, salt, kWindows);
+      ASSERT_LT(window, kWindows);
+      ++in_window[window];
     }
-    for (const int mcus : in_slot) EXPECT_LT(mcus, 3 * 16) << "salt " << salt;
+    for (const int mcus : in_window) EXPECT_LT(mcus, 3 * 16) << "salt " << salt;
   }
 }
 
-TEST(IdentifySlot, TwoMcusAreApartAfterFewSalts) {
+TEST(IdentifyWindow, TwoMcusAreApartAfterFewSalts) {
   holds("some of 20 salts parts two ids", [] {
     const Bytes one = random_bytes(BUSHD_UNIQUE_ID_SIZE);
     const Bytes other = random_bytes(BUSHD_UNIQUE_ID_SIZE);
     RC_PRE(one != other);
     bool apart = false;
     for (uint16_t salt = 0; salt < 20; ++salt) {
-      apart = apart || bushd_identify_slot(one.data(), salt, 8) !=
-                           bushd_identify_slot(other.data(), salt, 8);
+      apart = apart || bushd_identify_window(one.data(), salt, 8) !=
+                           bushd_identify_window(other.data(), salt, 8);
     }
     RC_ASSERT(apart);
   });

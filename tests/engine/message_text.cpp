@@ -44,7 +44,7 @@ void append(std::string* list, const std::string& element) {
 }
 
 void put(const bushd_identify& m, Fields& f) {
-  f.add("salt", m.salt).add("slots", m.slots).add("slot_units", m.slot_units);
+  f.add("salt", m.salt).add("windows", m.windows).add("window_units", m.window_units);
 }
 void put(const bushd_identity& m, Fields& f) {
   f.add("protocol_version", m.protocol_version).add("motors", m.motors);
@@ -62,27 +62,27 @@ void put(const bushd_configure& m, Fields& f) {
       .add("comm_timeout_ticks", m.comm_timeout_ticks);
 }
 void put(const bushd_table_begin& m, Fields& f) {
-  f.add("slot", m.slot).add("accel_count", m.accel_count).add("decel_count", m.decel_count);
+  f.add("bank", m.bank).add("accel_count", m.accel_count).add("decel_count", m.decel_count);
   f.add("cruise", m.cruise).add("time_unit_ns", m.time_unit_ns).add("revision", m.revision);
 }
 void put(const bushd_table_data& m, Fields& f) {
-  f.add("slot", m.slot).add("offset", m.offset).add("count", m.count);
+  f.add("bank", m.bank).add("offset", m.offset).add("count", m.count);
   f.add_list("codes", m.codes, m.count, 2);
 }
 void put(const bushd_table_end& m, Fields& f) {
-  f.add("slot", m.slot).add("crc", m.crc);
+  f.add("bank", m.bank).add("crc", m.crc);
 }
 void put(const bushd_tables& m, Fields& f) {
   unsigned valid = 0;
   std::string held;
-  for (size_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    if (m.slot[i].valid) valid |= 1u << i;
-    append(&held, parts({m.slot[i].crc, m.slot[i].revision}));
+  for (size_t i = 0; i < BUSHD_TABLE_BANKS; ++i) {
+    if (m.bank[i].valid) valid |= 1u << i;
+    append(&held, parts({m.bank[i].crc, m.bank[i].revision}));
   }
   f.add("valid", valid).add_text("held", held);
 }
 void put(const bushd_assign& m, Fields& f) {
-  f.add("motor", m.motor).add("slot", m.slot);
+  f.add("motor", m.motor).add("bank", m.bank);
 }
 void put(const bushd_control& m, Fields& f) {
   f.add("actions", m.actions);
@@ -165,7 +165,7 @@ void put_entries(const uint8_t* entries, uint8_t count, Fields& f) {
   std::string text;
   for (uint8_t i = 0; i < count; ++i) {
     const bushd_table_run_entry entry = bushd_next_table_run_entry(&entries);
-    append(&text, parts({entry.motor, entry.slot, entry.direction, entry.steps,
+    append(&text, parts({entry.motor, entry.bank, entry.direction, entry.steps,
                          static_cast<int64_t>(entry.shortest_delay)}));
   }
   f.add_text("entries", text);
@@ -175,7 +175,7 @@ void put(const bushd_table_run& m, Fields& f) {
   put_entries(m.entries, m.count, f);
 }
 void put_line(const bushd_line_part& line, Fields& f) {
-  f.add("slot", line.slot).add("shortest_delay", line.shortest_delay).add("longest", line.longest);
+  f.add("bank", line.bank).add("shortest_delay", line.shortest_delay).add("longest", line.longest);
   f.add("from", line.from).add("steps", line.steps);
   std::string text;
   const uint8_t* at = line.entries;

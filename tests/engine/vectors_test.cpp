@@ -236,11 +236,11 @@ TEST(Vectors, TableChecksums) {
   }
 }
 
-TEST(Vectors, IdentifySlots) {
-  for (const Row& row : read_csv("identify_slots.csv")) {
-    EXPECT_EQ(bushd_identify_slot(bytes_of(row.at("unique_id")).data(),
-                                  number<uint16_t>(row, "salt"), number<uint8_t>(row, "slots")),
-              number<int>(row, "slot"))
+TEST(Vectors, IdentifyWindows) {
+  for (const Row& row : read_csv("identify_windows.csv")) {
+    EXPECT_EQ(bushd_identify_window(bytes_of(row.at("unique_id")).data(),
+                                    number<uint16_t>(row, "salt"), number<uint8_t>(row, "windows")),
+              number<int>(row, "window"))
         << row.at("unique_id") << " salt " << row.at("salt");
   }
 }

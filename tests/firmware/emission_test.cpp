@@ -228,7 +228,7 @@ TEST(Emission, TableRunsMakeTheSameStepsInEachTickInEveryMode) {
   for (const bushd_format format : {BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE}) {
     expect_same_steps(format, [&](Rig& rig) {
       const bushd_table_run_entry entry = {
-          .motor = 0, .slot = 0, .direction = -1, .steps = 90, .shortest_delay = 0};
+          .motor = 0, .bank = 0, .direction = -1, .steps = 90, .shortest_delay = 0};
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_table_run(0, rig.first_open(), &entry, 1, payload.data()));
       ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, payload), BUSHD_OK);

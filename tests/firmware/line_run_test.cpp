@@ -82,7 +82,7 @@ TEST_P(LineRun, RulesOfAStartHold) {
   EXPECT_EQ(start(rig, with([](Frame& f) { --f.first; })), BUSHD_E_LATE);
   EXPECT_EQ(start(rig, with([](Frame& f) { f.first += 1000; })), BUSHD_E_CAPACITY);
   EXPECT_EQ(start(rig, with([](Frame& f) { f.epoch = 1; })), BUSHD_E_EPOCH);
-  EXPECT_EQ(start(rig, with([](Frame& f) { f.slot = 3; })), BUSHD_E_NO_TABLE) << "no such table";
+  EXPECT_EQ(start(rig, with([](Frame& f) { f.bank = 3; })), BUSHD_E_NO_TABLE) << "no such table";
   EXPECT_EQ(start(rig, with([](Frame& f) { f.motors.push_back({4, 1}); })), BUSHD_E_FORMAT);
   EXPECT_EQ(start(rig, with([](Frame& f) {
                     f.longest = INT32_MAX;

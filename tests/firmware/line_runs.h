@@ -37,7 +37,7 @@ inline std::vector<Wide> times_of(const Reference& run, std::uint32_t increment,
   return times;
 }
 
-// Of an MCU with four motors; the run is of `law`, in slot 0, as are their tables.
+// Of an MCU with four motors; the run is of `law`, in bank 0, as are their tables.
 class OfLines : public Streams {
  protected:
   OfLines() : Streams({.queue_ticks = 256}) {}
@@ -49,7 +49,7 @@ class OfLines : public Streams {
     std::uint32_t from = 0;
     std::uint32_t steps = 0;  // 0: all
     std::uint16_t shortest_delay = 0;
-    std::uint8_t slot = 0;
+    std::uint8_t bank = 0;
     std::uint8_t epoch = 0;
   };
   static Bytes frame(const Frame& of) {
@@ -61,7 +61,7 @@ class OfLines : public Streams {
     bushd_line_run message{};
     message.epoch = of.epoch;
     message.first_tick = of.first;
-    message.line = {.slot = of.slot,
+    message.line = {.bank = of.bank,
                     .shortest_delay = of.shortest_delay,
                     .longest = of.longest,
                     .from = of.from,

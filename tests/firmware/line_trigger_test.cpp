@@ -134,7 +134,7 @@ TEST_P(LineTrigger, IsForMotorsAtRestWithTablesAndFreeWays) {
   };
   EXPECT_EQ(arm_with([](Arming& a) { a.line.motors.push_back({4, 1}); }), BUSHD_E_FORMAT);
   EXPECT_EQ(arm_with([](Arming& a) { a.delay_us = 49; }), BUSHD_E_FORMAT);
-  EXPECT_EQ(arm_with([](Arming& a) { a.line.slot = 3; }), BUSHD_E_NO_TABLE);
+  EXPECT_EQ(arm_with([](Arming& a) { a.line.bank = 3; }), BUSHD_E_NO_TABLE);
   EXPECT_EQ(arm_with([](Arming& a) {
               a.line.longest = INT32_MAX;
               a.line.shortest_delay = UINT16_MAX;

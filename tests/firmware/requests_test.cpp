@@ -1,4 +1,4 @@
-// Answers in their slots, identities and addresses, masters that disturb each other, and what a
+// Answers in their windows, identities and addresses, masters that disturb each other, and what a
 // report tells of the bus's health.
 #include <algorithm>
 
@@ -14,8 +14,8 @@ Bytes poll_of(const std::vector<bushd_poll_entry>& entries) {
   return payload;
 }
 
-Bytes identify_of(std::uint16_t salt, std::uint8_t slots, std::uint16_t units) {
-  const bushd_identify message = {salt, slots, units};
+Bytes identify_of(std::uint16_t salt, std::uint8_t windows, std::uint16_t units) {
+  const bushd_identify message = {salt, windows, units};
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_identify(&message, payload.data()));
   return payload;
@@ -27,7 +27,7 @@ Bytes address_of(std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE> id, std::uint8_t
   return payload;
 }
 
-TEST(Requests, PollIsAnsweredInTheSlotThatItNames) {
+TEST(Requests, PollIsAnsweredInTheWindowThatItNames) {
   Rig rig({.address = 7});
   rig.frame(0, BUSHD_MSG_POLL, poll_of({{3, 50}, {7, 1234}, {9, 5000}}));
   const auto got = rig.answer();
@@ -44,7 +44,7 @@ TEST(Requests, PollIsAnsweredInTheSlotThatItNames) {
   EXPECT_EQ(rig.poll().rejected_frames, 2);
 }
 
-TEST(Requests, IdentityComesInTheSlotOfUniqueIdAndSalt) {
+TEST(Requests, IdentityComesInTheWindowOfUniqueIdAndSalt) {
   Rig rig({.address = 7});
   const auto id = Rig::unique_id();
   for (const auto address : std::initializer_list<std::uint8_t>{0, 7}) {
@@ -52,22 +52,22 @@ TEST(Requests, IdentityComesInTheSlotOfUniqueIdAndSalt) {
       rig.frame(address, BUSHD_MSG_IDENTIFY, identify_of(salt, 16, 200));
       const auto got = rig.answer();
       ASSERT_TRUE(got);
-      EXPECT_EQ(got->delay_ns, bushd_identify_slot(id.data(), salt, 16) * 2'000'000u);
+      EXPECT_EQ(got->delay_ns, bushd_identify_window(id.data(), salt, 16) * 2'000'000u);
       EXPECT_EQ(got->payload[0], BUSHD_PROTOCOL_VERSION);
     }
   }
   rig.frame(0, BUSHD_MSG_IDENTIFY, identify_of(5, 1, 60000));
-  EXPECT_EQ(rig.answer()->delay_ns, 0u) << "one slot: at once";
+  EXPECT_EQ(rig.answer()->delay_ns, 0u) << "one window: at once";
   rig.frame(8, BUSHD_MSG_IDENTIFY, identify_of(5, 1, 0));
   EXPECT_FALSE(rig.answer());
 }
 
 // No port can wait for minutes, and no 32 bits of ns can tell it.
-TEST(Requests, SlotSecondsAwayIsNotAnswered) {
+TEST(Requests, WindowSecondsAwayIsNotAnswered) {
   Rig rig;
   const auto id = Rig::unique_id();
   std::uint16_t salt = 0;
-  while (bushd_identify_slot(id.data(), salt, 255) < 100) ++salt;
+  while (bushd_identify_window(id.data(), salt, 255) < 100) ++salt;
   rig.frame(0, BUSHD_MSG_IDENTIFY, identify_of(salt, 255, 65535));
   EXPECT_FALSE(rig.answer());
   EXPECT_EQ(rig.poll().last_rejection, BUSHD_E_FORMAT);

@@ -320,9 +320,9 @@ void Rig::sync_to(std::uint32_t tick) {
   EXPECT_EQ(this->tick(), tick);
 }
 
-bushd_status Rig::begin(std::uint8_t slot, const Law& law, bool symmetric, std::uint32_t revision) {
+bushd_status Rig::begin(std::uint8_t bank, const Law& law, bool symmetric, std::uint32_t revision) {
   const bushd_table_begin message = {
-      .slot = slot,
+      .bank = bank,
       .accel_count = static_cast<std::uint16_t>(law.accel.size()),
       .decel_count = static_cast<std::uint16_t>(symmetric ? 0 : law.decel.size()),
       .cruise = law.cruise,
@@ -333,46 +333,46 @@ bushd_status Rig::begin(std::uint8_t slot, const Law& law, bool symmetric, std::
   bushd_put_u16(&head[2], message.decel_count);
   bushd_put_u16(&head[4], message.cruise);
   bushd_put_u32(&head[6], message.time_unit_ns);
-  table_head_[slot] = head;
+  table_head_[bank] = head;
   return request(BUSHD_MSG_TABLE_BEGIN, payload_of([&](std::uint8_t* p) {
                    return bushd_encode_table_begin(&message, p);
                  }));
 }
 
-bushd_status Rig::data(std::uint8_t slot, std::uint16_t offset,
+bushd_status Rig::data(std::uint8_t bank, std::uint16_t offset,
                        const std::vector<std::uint16_t>& codes) {
   return request(BUSHD_MSG_TABLE_DATA, payload_of([&](std::uint8_t* p) {
                    return bushd_encode_table_data(
-                       slot, offset, static_cast<std::uint8_t>(codes.size()), codes.data(), p);
+                       bank, offset, static_cast<std::uint8_t>(codes.size()), codes.data(), p);
                  }));
 }
 
-bushd_status Rig::end(std::uint8_t slot, const std::vector<std::uint16_t>& codes) {
-  Bytes bytes = table_head_[slot];
+bushd_status Rig::end(std::uint8_t bank, const std::vector<std::uint16_t>& codes) {
+  Bytes bytes = table_head_[bank];
   for (const std::uint16_t code : codes) {
     bytes.push_back(static_cast<std::uint8_t>(code));
     bytes.push_back(static_cast<std::uint8_t>(code >> 8));
   }
-  const bushd_table_end message = {slot, crc32(bytes)};
+  const bushd_table_end message = {bank, crc32(bytes)};
   return request(BUSHD_MSG_TABLE_END,
                  payload_of([&](std::uint8_t* p) { return bushd_encode_table_end(&message, p); }));
 }
 
-bushd_status Rig::upload(std::uint8_t slot, const Law& law) {
-  if (const bushd_status status = begin(slot, law); status != BUSHD_OK) return status;
+bushd_status Rig::upload(std::uint8_t bank, const Law& law) {
+  if (const bushd_status status = begin(bank, law); status != BUSHD_OK) return status;
   const std::vector<std::uint16_t> codes = codes_of(law);
   for (std::size_t at = 0; at < codes.size(); at += BUSHD_TABLE_DATA_MAX_CODES) {
     const auto first = codes.begin() + static_cast<std::ptrdiff_t>(at);
     const auto size = std::min<std::size_t>(codes.size() - at, BUSHD_TABLE_DATA_MAX_CODES);
-    const bushd_status status = data(slot, static_cast<std::uint16_t>(at),
+    const bushd_status status = data(bank, static_cast<std::uint16_t>(at),
                                      {first, first + static_cast<std::ptrdiff_t>(size)});
     if (status != BUSHD_OK) return status;
   }
-  return end(slot, codes);
+  return end(bank, codes);
 }
 
-bushd_status Rig::assign(std::uint8_t motor, std::uint8_t slot) {
-  return request(BUSHD_MSG_ASSIGN, {motor, slot});
+bushd_status Rig::assign(std::uint8_t motor, std::uint8_t bank) {
+  return request(BUSHD_MSG_ASSIGN, {motor, bank});
 }
 
 bushd_tables Rig::tables() {

@@ -118,13 +118,13 @@ class Rig {
   // Two SYNC frames: afterwards the MCU is in step and the tick being emitted is `tick`.
   void sync_to(std::uint32_t tick);
   void sync(const bushd_sync& message);
-  bushd_status begin(std::uint8_t slot, const Law& law, bool symmetric = false,
+  bushd_status begin(std::uint8_t bank, const Law& law, bool symmetric = false,
                      std::uint32_t revision = 0);
-  bushd_status data(std::uint8_t slot, std::uint16_t offset,
+  bushd_status data(std::uint8_t bank, std::uint16_t offset,
                     const std::vector<std::uint16_t>& codes);
-  bushd_status end(std::uint8_t slot, const std::vector<std::uint16_t>& codes);
-  bushd_status upload(std::uint8_t slot, const Law& law);
-  bushd_status assign(std::uint8_t motor, std::uint8_t slot);
+  bushd_status end(std::uint8_t bank, const std::vector<std::uint16_t>& codes);
+  bushd_status upload(std::uint8_t bank, const Law& law);
+  bushd_status assign(std::uint8_t motor, std::uint8_t bank);
   bushd_status control(std::uint8_t actions);
   bushd_status clear(std::uint8_t faults);
   bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
@@ -222,7 +222,7 @@ class Rig {
   bushd_format format_ = BUSHD_FORMAT_COARSE;
   std::uint8_t sequence_ = 0;
   std::vector<std::pair<Bytes, std::uint32_t>> sent_;
-  std::array<Bytes, 256> table_head_;  // what TABLE_BEGIN said, by slot, as a checksum has it
+  std::array<Bytes, 256> table_head_;  // what TABLE_BEGIN said, by bank, as a checksum has it
   Bytes last_sent_;
   bool enabled_ = true;
   bushd_set_outputs levels_{};

@@ -1,4 +1,4 @@
-// The table slot that is not kept over resets: lines go by it, and nothing else knows of it.
+// The table bank that is not kept over resets: lines go by it, and nothing else knows of it.
 #include <vector>
 
 #include "firmware/line_runs.h"
@@ -10,7 +10,7 @@ using ScratchTable = OfLines;
 INSTANTIATE_TEST_SUITE_P(Formats, ScratchTable,
                          testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
-constexpr std::uint8_t kScratch = BUSHD_SCRATCH_SLOT;
+constexpr std::uint8_t kScratch = BUSHD_SCRATCH_BANK;
 const std::vector<LineMotor> kMotors = {{0, 333}, {1, -118}, {3, 332}};
 
 // Slower than the motors' own, and with unequal sides.
@@ -28,7 +28,7 @@ TEST_P(ScratchTable, LinesGoByItExactToASlot) {
     slower.cruise = static_cast<std::uint16_t>(slower.cruise + i);
     ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
     const Frame line{
-        .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .slot = kScratch};
+        .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch};
     ASSERT_EQ(start(rig, line), BUSHD_OK);
     expect_slots(rig, Reference::move(slower, 333), line);
   }
@@ -43,8 +43,8 @@ TEST_P(ScratchTable, IsNoMotorsTable) {
   EXPECT_EQ(rig.assign(0, kScratch), BUSHD_E_FORMAT);
   for (std::uint8_t m = 0; m < 4; ++m) EXPECT_EQ(rig.mcu().motor[m].table, 0);
   const bushd_tables held = rig.tables();
-  for (std::uint8_t slot = 1; slot < BUSHD_TABLE_SLOTS; ++slot) {
-    EXPECT_FALSE(held.slot[slot].valid);
+  for (std::uint8_t bank = 1; bank < BUSHD_TABLE_BANKS; ++bank) {
+    EXPECT_FALSE(held.bank[bank].valid);
   }
 }
 
@@ -52,7 +52,7 @@ TEST_P(ScratchTable, NoLineGoesByOneThatHasNotComeWhole) {
   const Law slower = envelope_law();
   const auto refused = [&] {
     return start(
-        rig, {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .slot = kScratch});
+        rig, {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch});
   };
   EXPECT_EQ(refused(), BUSHD_E_NO_TABLE);
   EXPECT_EQ(rig.data(kScratch, 0, slower.accel), BUSHD_E_STATE);
@@ -75,14 +75,14 @@ TEST_P(ScratchTable, MakesRoomForTablesThatAreKept) {
   ASSERT_EQ(rig.upload(1, kept), BUSHD_OK);
   EXPECT_GT(rig.mcu().tables.codes_used, used);
   ASSERT_EQ(rig.assign(0, 1), BUSHD_OK);
-  Frame line{.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .slot = kScratch};
+  Frame line{.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch};
   EXPECT_EQ(start(rig, line), BUSHD_E_NO_TABLE) << "discarded";
   ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
   line.first = rig.first_open() + 3;
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   expect_slots(rig, Reference::move(slower, 333), line);
   // And both others are what they were.
-  line = {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .slot = 1};
+  line = {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = 1};
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   expect_slots(rig, Reference::move(kept, 333), line);
   line = {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333};
@@ -105,10 +105,10 @@ TEST_P(ScratchTable, IsTakenAtRestOnly) {
   const Law slower = envelope_law();
   ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
   const Frame line{
-      .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .slot = kScratch};
+      .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch};
   ASSERT_EQ(start(rig, line), BUSHD_OK);
-  for (const std::uint8_t slot : {kScratch, std::uint8_t{0}, std::uint8_t{5}}) {
-    EXPECT_EQ(rig.begin(slot, slower), BUSHD_E_STATE) << int{slot};
+  for (const std::uint8_t bank : {kScratch, std::uint8_t{0}, std::uint8_t{5}}) {
+    EXPECT_EQ(rig.begin(bank, slower), BUSHD_E_STATE) << int{bank};
   }
   EXPECT_EQ(rig.end(kScratch, codes_of(slower)), BUSHD_OK) << "the acknowledgement was lost";
   expect_slots(rig, Reference::move(slower, 333), line);
@@ -133,7 +133,7 @@ TEST_P(ScratchTable, IsForgottenWithTheOthersAndAtAReset) {
   const std::uint16_t used = rig.mcu().tables.codes_used;
   rig.restart_with_nvm();
   EXPECT_EQ(rig.mcu().tables.codes_used, used);
-  EXPECT_TRUE(rig.tables().slot[0].valid);
+  EXPECT_TRUE(rig.tables().bank[0].valid);
   EXPECT_EQ(bushd_mcu_checked_table(&rig.mcu(), kScratch), nullptr);
 }
 
@@ -155,7 +155,7 @@ TEST_P(ScratchTable, IsNoPartOfWhatAPortKeeps) {
   EXPECT_EQ(kept(), before);
 }
 
-TEST_P(ScratchTable, IsNoSlotOfAnMcuWithoutIt) {
+TEST_P(ScratchTable, IsNoBankOfAnMcuWithoutIt) {
   Rig none({.disabled_capabilities = BUSHD_CAN_SCRATCH});
   none.make_ready(law, format);
   EXPECT_EQ(none.identify().capabilities & BUSHD_CAN_SCRATCH, 0u);
@@ -164,7 +164,7 @@ TEST_P(ScratchTable, IsNoSlotOfAnMcuWithoutIt) {
   EXPECT_EQ(none.end(kScratch, codes_of(law)), BUSHD_E_FORMAT);
   EXPECT_EQ(
       start(none,
-            {.first = none.first_open() + 3, .motors = kMotors, .longest = 333, .slot = kScratch}),
+            {.first = none.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch}),
       BUSHD_E_NO_TABLE);
   EXPECT_NE(rig.identify().capabilities & BUSHD_CAN_SCRATCH, 0u);
 }

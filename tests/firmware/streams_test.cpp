@@ -156,7 +156,7 @@ TEST_P(Streams, FormatTableMotorAndPowerAreChecked) {
   EXPECT_EQ(rig.take(ticks), BUSHD_E_FORMAT);
   Ticks both = ones(kReplace | kStart, start, 2, 0);
   EXPECT_EQ(rig.take(both), BUSHD_E_FORMAT);
-  // Sending slot 0 again takes the table from all motors.
+  // Sending bank 0 again takes the table from all motors.
   ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
   ASSERT_EQ(rig.assign(1, 0), BUSHD_OK);
   ticks.mask = 1;

@@ -63,7 +63,7 @@ TEST_F(TableUpload, PiecesOfNoTableAreRefused) {
   EXPECT_EQ(rig.data(3, 1, {197}), BUSHD_E_STATE) << "a hole";
   EXPECT_EQ(rig.data(3, 0, std::vector<std::uint16_t>(11, 200)), BUSHD_E_STATE)
       << "more than announced";
-  EXPECT_EQ(rig.data(4, 0, {200}), BUSHD_E_STATE) << "another slot";
+  EXPECT_EQ(rig.data(4, 0, {200}), BUSHD_E_STATE) << "another bank";
   EXPECT_EQ(rig.data(3, 0, {200, 197, 194}), BUSHD_OK);
   EXPECT_EQ(rig.end(3, {200, 197, 194}), BUSHD_E_STATE) << "incomplete";
   EXPECT_EQ(rig.data(3, 4, {1}), BUSHD_E_STATE) << "a hole";
@@ -110,7 +110,7 @@ TEST_F(TableUpload, BadTablesAreNamedAndUseless) {
   Law no_cruise = flat_law(200, 1, 1);
   no_cruise.cruise = 0;
   EXPECT_EQ(rig.begin(1, no_cruise), BUSHD_E_FORMAT);
-  EXPECT_EQ(rig.begin(9, flat_law(200, 1, 1)), BUSHD_E_FORMAT) << "slots 0..8";
+  EXPECT_EQ(rig.begin(9, flat_law(200, 1, 1)), BUSHD_E_FORMAT) << "banks 0..8";
 }
 
 TEST_F(TableUpload, AssignNeedsAConfiguredMcuAndATableSlowEnough) {
@@ -144,7 +144,7 @@ TEST_F(TableUpload, MemoryIsFilledToTheLastCodeAndNoFurther) {
   ASSERT_EQ(rig.assign(1, 1), BUSHD_OK);
   expect_runs_down_by(rig, 0, flat_law(250, 60, 39));
   expect_runs_down_by(rig, 1, flat_law(250, 40, 11));
-  // What the slot held before is given up even if the new table does not fit.
+  // What the bank held before is given up even if the new table does not fit.
   EXPECT_EQ(rig.begin(0, flat_law(250, 70, 30)), BUSHD_E_CAPACITY);
   const Plan plan = plan_move(flat_law(250, 60, 39), 5, Rig::kTickNs, BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100, 0)), BUSHD_E_NO_TABLE);
@@ -241,19 +241,19 @@ TEST_F(TableUpload, WhatIsHeldIsTold) {
   const Law flat = flat_law(240, 8, 0);
   ASSERT_EQ(rig.begin(5, flat, true, 0xCAFE1234), BUSHD_OK);
   ASSERT_EQ(rig.data(5, 0, flat.accel), BUSHD_OK);
-  EXPECT_FALSE(rig.tables().slot[5].valid) << "not yet checked";
+  EXPECT_FALSE(rig.tables().bank[5].valid) << "not yet checked";
   ASSERT_EQ(rig.end(5, flat.accel), BUSHD_OK);
   const bushd_tables tables = rig.tables();
-  for (std::uint8_t i = 0; i < BUSHD_TABLE_SLOTS; ++i) {
-    EXPECT_EQ(tables.slot[i].valid, i == 2 || i == 5) << int{i};
+  for (std::uint8_t i = 0; i < BUSHD_TABLE_BANKS; ++i) {
+    EXPECT_EQ(tables.bank[i].valid, i == 2 || i == 5) << int{i};
   }
-  EXPECT_EQ(tables.slot[5].revision, 0xCAFE1234);
+  EXPECT_EQ(tables.bank[5].revision, 0xCAFE1234);
   Bytes whole = {8, 0, 0, 0, 25, 0, 0x40, 0x9C, 0, 0};
   for (const std::uint16_t code : flat.accel) {
     whole.push_back(static_cast<std::uint8_t>(code));
     whole.push_back(static_cast<std::uint8_t>(code >> 8));
   }
-  EXPECT_EQ(tables.slot[5].crc, crc32(whole));
+  EXPECT_EQ(tables.bank[5].crc, crc32(whole));
 }
 
 // The checksum covers all that a table holds, not its codes alone.
@@ -282,7 +282,7 @@ TEST_F(TableUpload, AllAreForgottenAtOnceAndTheirMemoryIsFree) {
   EXPECT_EQ(rig.control(BUSHD_CONTROL_FORGET_TABLES), BUSHD_E_STATE) << "a motor moves";
   rig.pass_until_rest();
   EXPECT_EQ(rig.control(BUSHD_CONTROL_FORGET_TABLES), BUSHD_OK);
-  EXPECT_FALSE(rig.tables().slot[0].valid);
+  EXPECT_FALSE(rig.tables().bank[0].valid);
   EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_E_NO_TABLE);
   EXPECT_EQ(rig.upload(1, law), BUSHD_OK);
   ASSERT_EQ(rig.assign(0, 1), BUSHD_OK);
@@ -299,7 +299,7 @@ TEST_F(TableUpload, IsNotEndedWhileAMotorMoves) {
   const Plan plan = plan_move(law, 4, Rig::kTickNs, BUSHD_FORMAT_FINE);
   ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
   EXPECT_EQ(rig.end(1, codes_of(law)), BUSHD_E_STATE);
-  EXPECT_FALSE(rig.tables().slot[1].valid);
+  EXPECT_FALSE(rig.tables().bank[1].valid);
   rig.pass_until_rest();
   EXPECT_EQ(rig.end(1, codes_of(law)), BUSHD_OK);
 }

@@ -182,8 +182,8 @@ TEST_P(Trigger, WhatWaitsForItTakesNothingElse) {
 }
 
 TEST_P(Trigger, IsForMotorsAtRestWithTheirTablesInAnMcuThatIsReady) {
-  const auto arm_one = [this](std::uint8_t motor, std::uint8_t slot, std::uint32_t steps) {
-    return rig.arm(5, BUSHD_EDGE_RISING, 50, {{motor, slot, 1, steps, 0}});
+  const auto arm_one = [this](std::uint8_t motor, std::uint8_t bank, std::uint32_t steps) {
+    return rig.arm(5, BUSHD_EDGE_RISING, 50, {{motor, bank, 1, steps, 0}});
   };
   EXPECT_EQ(arm_one(4, 0, 5), BUSHD_E_FORMAT) << "four motors";
   EXPECT_EQ(arm_one(1, 1, 5), BUSHD_E_NO_TABLE);

@@ -70,7 +70,7 @@ void send_table_run(Programmed& mcu, Input& input) {
   for (std::uint8_t i = 0; i < count; ++i) {
     const std::uint8_t how = input.u8();
     entries[i] = {.motor = i,
-                  .slot = static_cast<std::uint8_t>(how % BUSHD_TABLE_SLOTS),
+                  .bank = static_cast<std::uint8_t>(how % BUSHD_TABLE_BANKS),
                   .direction = static_cast<std::int8_t>((how & 0x80) != 0 ? 1 : -1),
                   .steps = (how & 0x40) != 0 ? 0xFFFFu * input.u16() : input.u8(),
                   .shortest_delay = (how & 0x20) != 0 ? input.u16() : std::uint16_t{0}};
@@ -100,9 +100,9 @@ void send_sync(Programmed& mcu, Input& input) {
 }
 
 void send_table_end(Programmed& mcu, Input& input) {
-  bushd_table_end end = {.slot = static_cast<std::uint8_t>(input.u8() % (BUSHD_SCRATCH_SLOT + 1)),
+  bushd_table_end end = {.bank = static_cast<std::uint8_t>(input.u8() % (BUSHD_SCRATCH_BANK + 1)),
                          .crc = 0};
-  end.crc = mcu.table_crc(end.slot);
+  end.crc = mcu.table_crc(end.bank);
   Payload payload;
   payload.size = bushd_encode_table_end(&end, payload.bytes.data());
   mcu.frame(mcu.sight().address, BUSHD_MSG_TABLE_END, payload.view());

@@ -41,7 +41,7 @@ class Programmed {
 
   virtual Sight sight() = 0;
   // Of the table that is there; 0: none.
-  virtual std::uint32_t table_crc(std::uint8_t slot) = 0;
+  virtual std::uint32_t table_crc(std::uint8_t bank) = 0;
 
   virtual void begin() = 0;  // the first boot; before all else
   virtual void pass() = 0;   // of a tick

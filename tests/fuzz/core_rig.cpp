@@ -20,9 +20,9 @@ Sight CoreRig::sight() {
           clock.master,        clock.sync_id, clock.sync_tick,   clock.sync_ns};
 }
 
-std::uint32_t CoreRig::table_crc(std::uint8_t slot) {
+std::uint32_t CoreRig::table_crc(std::uint8_t bank) {
   const bushd_table& table =
-      slot == BUSHD_SCRATCH_SLOT ? scratch_.front().entry.table : mcu_.tables.slot[slot].table;
+      bank == BUSHD_SCRATCH_BANK ? scratch_.front().entry.table : mcu_.tables.bank[bank].table;
   return table.accel.count != 0 ? bushd_table_crc32(&table) : 0;
 }
 
@@ -263,7 +263,7 @@ void CoreRig::count_pulses(const bushd_slot_buffer& slot_buffer) {
 void CoreRig::check_motor(const bushd_mcu_motor& motor) const {
   const std::uint32_t queue_ticks = configuration_.queue_ticks;
   BUSHD_REQUIRE(motor.remainder > -256 && motor.remainder < 256);
-  BUSHD_REQUIRE(motor.table < static_cast<int>(BUSHD_TABLE_SLOTS));
+  BUSHD_REQUIRE(motor.table < static_cast<int>(BUSHD_TABLE_BANKS));
   // The table that it must be able to run down.
   if (motor.delay != 0 || motor.mode != BUSHD_MCU_STREAM) {
     BUSHD_REQUIRE(motor.table >= 0 && (mcu_.tables.valid >> motor.table & 1) != 0);

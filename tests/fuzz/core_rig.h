@@ -30,7 +30,7 @@ class CoreRig : public Programmed {
   explicit CoreRig(const CoreConfiguration& configuration);
 
   Sight sight() override;
-  std::uint32_t table_crc(std::uint8_t slot) override;
+  std::uint32_t table_crc(std::uint8_t bank) override;
   void begin() override;
   void pass() override;
   // As it is here, the core gets bytes at once.

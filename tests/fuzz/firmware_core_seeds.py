@@ -42,14 +42,14 @@ def sync(mark, later_share=0, later_ticks=0):
     return struct.pack("<BBHB", 5, 4 * mark, later_share, later_ticks & 0xFF)
 
 
-def table_end(slot):
-    return bytes([6, slot])
+def table_end(bank):
+    return bytes([6, bank])
 
 
 def table_run(first, *entries, epoch=0):
-    """Entries: (slot, direction, steps < 256), for the motors from 0 on."""
+    """Entries: (bank, direction, steps < 256), for the motors from 0 on."""
     return (bytes([8, epoch, first, len(entries) - 1])
-            + b"".join(bytes([slot | (0x80 if direction > 0 else 0), steps]) for slot, direction, steps in entries))
+            + b"".join(bytes([bank | (0x80 if direction > 0 else 0), steps]) for bank, direction, steps in entries))
 
 
 def pins(motors, system=0, current=0):
@@ -93,14 +93,14 @@ def in_step():
     return frame(SYNC, first, True) + passes(4) + sync(1) + passes(2) + sync(1)
 
 
-def table(slot=0, codes=(250, 200, 150, 100), cruise=100, unit_ns=4000):
-    return (frame(TABLE_BEGIN, struct.pack("<BHHHII", slot, len(codes), 0, cruise, unit_ns, 1))
-            + frame(TABLE_DATA, struct.pack(f"<BHB{len(codes)}H", slot, 0, len(codes), *codes))
-            + table_end(slot))
+def table(bank=0, codes=(250, 200, 150, 100), cruise=100, unit_ns=4000):
+    return (frame(TABLE_BEGIN, struct.pack("<BHHHII", bank, len(codes), 0, cruise, unit_ns, 1))
+            + frame(TABLE_DATA, struct.pack(f"<BHB{len(codes)}H", bank, 0, len(codes), *codes))
+            + table_end(bank))
 
 
-def assign(*motors, slot=0):
-    return b"".join(frame(ASSIGN, bytes([m, slot])) for m in motors)
+def assign(*motors, bank=0):
+    return b"".join(frame(ASSIGN, bytes([m, bank])) for m in motors)
 
 
 def inputs(positive=0, negative=0, cuts=0, inverted=0, debounce=1, system_inverted=0, emergency=0, overcurrent=0,
@@ -237,7 +237,7 @@ SEEDS_AVR = {
 
 # Many codes: the walk compares 32 bytes at a time.
 SEEDS_LM3S6965 = {
-    "kept-written": ready(1, b"".join(table(slot, CODES, 350) for slot in range(1, 4))) + rest(1024) + RESET + frame(TABLES),
+    "kept-written": ready(1, b"".join(table(bank, CODES, 350) for bank in range(1, 4))) + rest(1024) + RESET + frame(TABLES),
     "kept-changed": ready(1) + rest(896) + table(1, CODES, 350) + rest(160) + inputs(positive=3) + rest(640) + RESET,
 }
 

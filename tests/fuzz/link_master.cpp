@@ -208,7 +208,7 @@ class Bus {
 
  private:
   struct Awaited {
-    std::vector<std::uint8_t> addresses;  // who has not answered yet, by slot
+    std::vector<std::uint8_t> addresses;  // who has not answered yet, by window
     std::uint8_t type;
     std::uint8_t sequence;
     std::int64_t sent_us;
@@ -278,7 +278,7 @@ class Bus {
     }
     BUSHD_REQUIRE(by_begin.size() == poll.count);
     std::vector<std::uint8_t> addresses;
-    for (const auto& slot : by_begin) addresses.push_back(slot.second);
+    for (const auto& window : by_begin) addresses.push_back(window.second);
     return addresses;
   }
 

@@ -39,9 +39,9 @@ bool inside(Bytes payload, const std::uint8_t* at, std::size_t size) {
 void decode_for_mcu(Bytes payload) {
   bushd_identify identify;
   if (decoded(payload, &identify, bushd_decode_identify, bushd_encode_identify)) {
-    BUSHD_REQUIRE(identify.slots >= 1);
+    BUSHD_REQUIRE(identify.windows >= 1);
     const std::uint8_t id[BUSHD_UNIQUE_ID_SIZE] = {1, 2, 3, 4, 5, 6, 7, 8};
-    BUSHD_REQUIRE(bushd_identify_slot(id, identify.salt, identify.slots) < identify.slots);
+    BUSHD_REQUIRE(bushd_identify_window(id, identify.salt, identify.windows) < identify.windows);
   }
   bushd_set_address address;
   if (decoded(payload, &address, bushd_decode_set_address, bushd_encode_set_address)) {
@@ -55,7 +55,7 @@ void decode_for_mcu(Bytes payload) {
   }
   bushd_table_begin begin;
   if (decoded(payload, &begin, bushd_decode_table_begin, bushd_encode_table_begin)) {
-    BUSHD_REQUIRE(begin.slot <= BUSHD_SCRATCH_SLOT && begin.accel_count >= 1);
+    BUSHD_REQUIRE(begin.bank <= BUSHD_SCRATCH_BANK && begin.accel_count >= 1);
     BUSHD_REQUIRE(begin.cruise >= 1 && begin.time_unit_ns >= 1);
   }
   bushd_table_data data;
@@ -64,21 +64,21 @@ void decode_for_mcu(Bytes payload) {
     for (std::size_t i = 0; i < message->count; ++i) {
       codes[i] = bushd_get_u16(message->codes + 2 * i);
     }
-    return bushd_encode_table_data(message->slot, message->offset, message->count, codes.data(),
+    return bushd_encode_table_data(message->bank, message->offset, message->count, codes.data(),
                                    out);
   };
   if (decoded(payload, &data, bushd_decode_table_data, encode_data)) {
-    BUSHD_REQUIRE(data.slot <= BUSHD_SCRATCH_SLOT && data.count >= 1);
+    BUSHD_REQUIRE(data.bank <= BUSHD_SCRATCH_BANK && data.count >= 1);
     BUSHD_REQUIRE(data.count <= BUSHD_TABLE_DATA_MAX_CODES);
     BUSHD_REQUIRE(inside(payload, data.codes, 2u * data.count));
   }
   bushd_table_end end;
   if (decoded(payload, &end, bushd_decode_table_end, bushd_encode_table_end)) {
-    BUSHD_REQUIRE(end.slot <= BUSHD_SCRATCH_SLOT);
+    BUSHD_REQUIRE(end.bank <= BUSHD_SCRATCH_BANK);
   }
   bushd_assign assign;
   if (decoded(payload, &assign, bushd_decode_assign, bushd_encode_assign)) {
-    BUSHD_REQUIRE(assign.motor < BUSHD_MOTORS_PER_MCU && assign.slot < BUSHD_TABLE_SLOTS);
+    BUSHD_REQUIRE(assign.motor < BUSHD_MOTORS_PER_MCU && assign.bank < BUSHD_TABLE_BANKS);
   }
   bushd_control control;
   if (decoded(payload, &control, bushd_decode_control, bushd_encode_control)) {
@@ -245,7 +245,7 @@ void decode_table_run(Bytes payload) {
     for (std::uint8_t i = 0; i < message->count; ++i) {
       entries[i] = bushd_next_table_run_entry(&at);
       BUSHD_REQUIRE(entries[i].steps >= 1 && entries[i].steps <= INT32_MAX);
-      BUSHD_REQUIRE(entries[i].slot < BUSHD_TABLE_SLOTS);
+      BUSHD_REQUIRE(entries[i].bank < BUSHD_TABLE_BANKS);
       BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
     }
     return bushd_encode_table_run(message->epoch, message->first_tick, entries.data(),
@@ -259,7 +259,7 @@ void decode_lines(Bytes payload) {
   std::array<bushd_line_entry, BUSHD_MOTORS_PER_MCU> entries;
   const auto check = [&](const bushd_line_part& line) {
     BUSHD_REQUIRE(line.count >= 1 && line.count <= BUSHD_MOTORS_PER_MCU);
-    BUSHD_REQUIRE(line.slot <= BUSHD_SCRATCH_SLOT && line.longest <= INT32_MAX && line.steps >= 1);
+    BUSHD_REQUIRE(line.bank <= BUSHD_SCRATCH_BANK && line.longest <= INT32_MAX && line.steps >= 1);
     BUSHD_REQUIRE(line.from <= line.longest && line.steps <= line.longest - line.from);
     const std::uint8_t* at = line.entries;
     for (std::uint8_t i = 0; i < line.count; ++i) {

@@ -182,7 +182,7 @@ class FrameMaster {
   std::size_t valid_tables(std::uint8_t address) {
     const bushd_tables told = tables(address);
     return static_cast<std::size_t>(
-        std::count_if(std::begin(told.slot), std::end(told.slot), [](auto& t) { return t.valid; }));
+        std::count_if(std::begin(told.bank), std::end(told.bank), [](auto& t) { return t.valid; }));
   }
 
   // A SYNC to all; returns its sync id.
@@ -226,17 +226,17 @@ class FrameMaster {
     sync({0, 0, true, report.sync_id, report.sync_tick, report.sync_ns});
   }
 
-  void upload_table(std::uint8_t address, std::uint8_t slot, std::uint32_t time_unit_ns,
+  void upload_table(std::uint8_t address, std::uint8_t bank, std::uint32_t time_unit_ns,
                     const std::vector<std::uint16_t>& accel, std::uint16_t cruise) {
     const bushd_table_begin begin{
-        slot, static_cast<std::uint16_t>(accel.size()), 0, cruise, time_unit_ns, 1};
+        bank, static_cast<std::uint16_t>(accel.size()), 0, cruise, time_unit_ns, 1};
     ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin),
               BUSHD_OK);
     std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
     for (std::size_t at = 0; at < accel.size(); at += BUSHD_TABLE_DATA_MAX_CODES) {
       const auto count = static_cast<std::uint8_t>(
           std::min<std::size_t>(BUSHD_TABLE_DATA_MAX_CODES, accel.size() - at));
-      const std::size_t size = bushd_encode_table_data(slot, static_cast<std::uint16_t>(at), count,
+      const std::size_t size = bushd_encode_table_data(bank, static_cast<std::uint16_t>(at), count,
                                                        accel.data() + at, payload.data());
       ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_DATA, {payload.data(), size}), BUSHD_OK);
     }
@@ -245,17 +245,17 @@ class FrameMaster {
     table.accel.count = table.decel.count = static_cast<std::uint16_t>(accel.size());
     table.cruise = cruise;
     table.time_unit_ns = time_unit_ns;
-    const bushd_table_end end{slot, bushd_table_crc32(&table)};
+    const bushd_table_end end{bank, bushd_table_crc32(&table)};
     ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_END, bushd_encode_table_end, end), BUSHD_OK);
   }
 
-  void assign(std::uint8_t address, std::uint8_t motor, std::uint8_t slot) {
-    ASSERT_EQ(acknowledged(address, BUSHD_MSG_ASSIGN, bushd_encode_assign, {motor, slot}),
+  void assign(std::uint8_t address, std::uint8_t motor, std::uint8_t bank) {
+    ASSERT_EQ(acknowledged(address, BUSHD_MSG_ASSIGN, bushd_encode_assign, {motor, bank}),
               BUSHD_OK);
   }
-  void assign_all(std::uint8_t address, std::uint8_t slot) {
+  void assign_all(std::uint8_t address, std::uint8_t bank) {
     for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-      ASSERT_NO_FATAL_FAILURE(assign(address, m, slot));
+      ASSERT_NO_FATAL_FAILURE(assign(address, m, bank));
     }
   }
 

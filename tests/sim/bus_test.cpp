@@ -129,8 +129,8 @@ TEST(Bus, TwoMcusOfOneAddressCollide) {
   EXPECT_EQ(between_mcus, 1);
 }
 
-// Reply slots of one broadcast, as the master lays them out: no collision, one answer each.
-TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirSlots) {
+// Reply windows of one broadcast, as the master lays them out: no collision, one answer each.
+TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirWindows) {
   const TimeNs asked_ns = bus.now_ns();
   const std::array<bushd_poll_entry, 3> entries = {{{2, 500}, {9, 900}, {1, 1300}}};
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
@@ -156,7 +156,8 @@ TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirSlots) {
   }
 }
 
-// The same address twice, told apart by the slots that their unique ids choose, and one moved away.
+// The same address twice, told apart by the windows that their unique ids choose, and one moved
+// away.
 TEST(Bus, McusOfOneAddressAreFoundAndParted) {
   Bus bus(kBaud);
   bus.add_mcu({.address = 5});

@@ -36,7 +36,7 @@ class McuAlone : public testing::Test {
   }
   void reboot() { reboot(boot_ns_); }
 
-  // By the table in slot 0.
+  // By the table in bank 0.
   void run(std::uint8_t motor, std::uint32_t steps) {
     const bushd_table_run_entry entry{motor, 0, 1, steps, 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);

@@ -33,11 +33,11 @@ struct Rig {
     bushd_virtual_init(&port, &config);
   }
 
-  void identify(std::int64_t end_ns, std::uint16_t slot_units = 0) {
+  void identify(std::int64_t end_ns, std::uint16_t window_units = 0) {
     std::uint8_t wire[BUSHD_FRAME_MAX_WIRE];
-    // Of two slots the second one.
-    bushd_identify message = {0, 2, slot_units};
-    while (bushd_identify_slot(port.config.mcu.unique_id, message.salt, 2) != 1) ++message.salt;
+    // Of two windows the second one.
+    bushd_identify message = {0, 2, window_units};
+    while (bushd_identify_window(port.config.mcu.unique_id, message.salt, 2) != 1) ++message.salt;
     std::uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
     const std::size_t size = bushd_frame_encode(1, BUSHD_MSG_IDENTIFY, 3, payload,
                                                 bushd_encode_identify(&message, payload), wire);
@@ -124,7 +124,7 @@ TEST(VirtualPort, AnswersOneTurnaroundAfterTheRequest) {
   EXPECT_FALSE(rig.sent.empty());
 }
 
-TEST(VirtualPort, AnswersInItsSlotIfThatIsLaterThanTheTurnaround) {
+TEST(VirtualPort, AnswersInItsWindowIfThatIsLaterThanTheTurnaround) {
   Rig rig;
   rig.identify(1'000'000, 1);
   EXPECT_EQ(rig.sent_at_ns, 1'020'000);

@@ -1,8 +1,8 @@
 """The vectors as C arrays, for firmware builds."""
 
 from answers import line_answers, move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes
-from chosen import FRAMES, IDENTIFY_SLOTS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS
-from definitions import frame, identify_slot
+from chosen import FRAMES, IDENTIFY_WINDOWS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS
+from definitions import frame, identify_window
 from messages import LAYOUTS, payload_of
 
 
@@ -30,7 +30,7 @@ def c_encoder(index, message, fields):
     lines = [head]
     if message == "table_data":
         lines.append(f"  static const uint16_t codes[] = {{{', '.join(map(str, fields['codes']))}}};")
-        lines.append(f"  return bushd_encode_table_data({fields['slot']}, {fields['offset']}, {fields['count']}, codes, "
+        lines.append(f"  return bushd_encode_table_data({fields['bank']}, {fields['offset']}, {fields['count']}, codes, "
                      "payload);")
     elif message == "poll":
         entries = ", ".join(f"{{{address}, {begin}}}" for address, begin in fields["entries"])
@@ -42,8 +42,8 @@ def c_encoder(index, message, fields):
         lines.append(f"  return bushd_encode_table_ticks({fields['epoch']}, {fields['flags']}, "
                      f"UINT32_C({fields['first_tick']}), {fields['count']}, entries, {len(fields['entries'])}, payload);")
     elif message == "table_run":
-        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {shortest_delay}}}"
-                            for motor, slot, direction, steps, shortest_delay in fields["entries"])
+        entries = ", ".join(f"{{{motor}, {bank}, {direction}, {steps}, {shortest_delay}}}"
+                            for motor, bank, direction, steps, shortest_delay in fields["entries"])
         lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
         lines.append(f"  return bushd_encode_table_run({fields['epoch']}, UINT32_C({fields['first_tick']}), entries, "
                      f"{len(fields['entries'])}, payload);")
@@ -58,12 +58,12 @@ def c_encoder(index, message, fields):
                 lines.append(f"  message.{name} = {fields[name]}u;")
         if "edge" in fields:
             lines.append(f"  message.edge = (bushd_edge){fields['edge']};")
-        for name in ("slot", "shortest_delay", "longest", "from", "steps"):
+        for name in ("bank", "shortest_delay", "longest", "from", "steps"):
             lines.append(f"  message.line.{name} = {fields[name]}u;")
         lines.append(f"  return bushd_encode_{message}(&message, entries, {len(fields['entries'])}, payload);")
     elif message == "trigger":
-        entries = ", ".join(f"{{{motor}, {slot}, {direction}, {steps}, {shortest_delay}}}"
-                            for motor, slot, direction, steps, shortest_delay in fields["entries"])
+        entries = ", ".join(f"{{{motor}, {bank}, {direction}, {steps}, {shortest_delay}}}"
+                            for motor, bank, direction, steps, shortest_delay in fields["entries"])
         name = "entries" if entries else "NULL"
         if entries:
             lines.append(f"  static const bushd_table_run_entry entries[] = {{{entries}}};")
@@ -89,9 +89,9 @@ def c_encoder(index, message, fields):
                 lines += [f"  message.unique_id[{i}] = {byte};" for i, byte in enumerate(value)]
             elif message == "tables":
                 for i, held in enumerate(fields["held"] if name == "held" else []):
-                    lines.append(f"  message.slot[{i}].valid = {'true' if fields['valid'] >> i & 1 else 'false'};")
-                    lines.append(f"  message.slot[{i}].crc = UINT32_C({held[0]});")
-                    lines.append(f"  message.slot[{i}].revision = UINT32_C({held[1]});")
+                    lines.append(f"  message.bank[{i}].valid = {'true' if fields['valid'] >> i & 1 else 'false'};")
+                    lines.append(f"  message.bank[{i}].crc = UINT32_C({held[0]});")
+                    lines.append(f"  message.bank[{i}].revision = UINT32_C({held[1]});")
             elif message == "emergency" and name == "mode":
                 lines.append(f"  message.mode = {'BUSHD_STOP_IMMEDIATE' if value else 'BUSHD_STOP_RAMP'};")
             elif name in ("follows", "enable_after_watchdog"):
@@ -157,9 +157,9 @@ def c_header():
         rows.append(f"    {{{', '.join(f'{n}u' for n in line)}, kLineMade_{i}, kLineFractions_{i}, kLinePositions_{i}}},")
     out += ["static const line_vector kLines[] = {", *rows, "};", ""]
 
-    rows = [f"    {{{{{', '.join(map(str, bytes.fromhex(unique_id)))}}}, {salt}, {slots}, "
-            f"{identify_slot(bytes.fromhex(unique_id), salt, slots)}}}," for unique_id, salt, slots in IDENTIFY_SLOTS]
-    out += ["static const identify_slot_vector kIdentifySlots[] = {", *rows, "};", ""]
+    rows = [f"    {{{{{', '.join(map(str, bytes.fromhex(unique_id)))}}}, {salt}, {windows}, "
+            f"{identify_window(bytes.fromhex(unique_id), salt, windows)}}}," for unique_id, salt, windows in IDENTIFY_WINDOWS]
+    out += ["static const identify_window_vector kIdentifyWindows[] = {", *rows, "};", ""]
 
     rows = []
     for i, (slot_count, crossing, values) in enumerate(SLOTS):

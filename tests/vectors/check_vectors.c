@@ -62,12 +62,12 @@ typedef struct line_vector {
   const uint64_t* positions;  // at that fraction, 1/256 step
 } line_vector;
 
-typedef struct identify_slot_vector {
+typedef struct identify_window_vector {
   uint8_t unique_id[BUSHD_UNIQUE_ID_SIZE];
   uint16_t salt;
-  uint8_t slots;
-  uint8_t slot;
-} identify_slot_vector;
+  uint8_t windows;
+  uint8_t window;
+} identify_window_vector;
 
 typedef struct slots_vector {
   uint16_t slot_count;
@@ -191,8 +191,8 @@ static bool check_line_follower(const line_vector* vector) {
   return made == vector->made[vector->last - vector->first];
 }
 
-static bool check_identify_slot(const identify_slot_vector* vector) {
-  return bushd_identify_slot(vector->unique_id, vector->salt, vector->slots) == vector->slot;
+static bool check_identify_window(const identify_window_vector* vector) {
+  return bushd_identify_window(vector->unique_id, vector->salt, vector->windows) == vector->window;
 }
 
 static bool check_slots(const slots_vector* vector) {
@@ -249,7 +249,7 @@ unsigned bushd_check_vectors(unsigned* checked, void (*report)(const char* kind,
   CHECK_ALL("table", kTableCrcs, check_crc)
   CHECK_ALL("line", kLines, check_line)
   CHECK_ALL("line_follower", kLines, check_line_follower)
-  CHECK_ALL("identify slot", kIdentifySlots, check_identify_slot)
+  CHECK_ALL("identify window", kIdentifyWindows, check_identify_window)
   CHECK_ALL("slots", kSlots, check_slots)
   CHECK_ALL("frame", kFrames, check_frame)
   return failed;

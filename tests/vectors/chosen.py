@@ -72,8 +72,8 @@ LINES = [
     (1, 2147483647, 1073741822, 1073741825), (2147483647, 2147483647, 2147483640, 2147483647),
 ]
 
-# (unique id, salt, slots)
-IDENTIFY_SLOTS = [
+# (unique id, salt, windows)
+IDENTIFY_WINDOWS = [
     ("0000000000000000", 0, 1), ("0000000000000000", 0, 16), ("0000000000000001", 0, 16), ("0000000000000000", 1, 16),
     ("62757368643a0001", 4660, 8), ("62757368643a0002", 4660, 8), ("ffffffffffffffff", 65535, 255),
     ("0102030405060708", 513, 100),
@@ -82,16 +82,16 @@ IDENTIFY_SLOTS = [
 ID = [98, 117, 115, 104, 0, 255, 1, 2]
 
 FRAMES = [
-    (1, 7, "identify", {"salt": 0, "slots": 1, "slot_units": 0}),
-    (0, 7, "identify", {"salt": 4660, "slots": 16, "slot_units": 120}),
+    (1, 7, "identify", {"salt": 0, "windows": 1, "window_units": 0}),
+    (0, 7, "identify", {"salt": 4660, "windows": 16, "window_units": 120}),
     (0, 255, "poll", {"count": 1, "entries": [[2, 50]]}),
     (0, 1, "poll", {"count": 3, "entries": [[1, 50], [2, 260], [255, 65535]]}),
     (1, 1, "configure", {"tick_ns": 2560000, "format": 1, "comm_timeout_ticks": 400}),
-    (3, 2, "table_begin", {"slot": 2, "accel_count": 238, "decel_count": 0, "cruise": 10, "time_unit_ns": 40000,
+    (3, 2, "table_begin", {"bank": 2, "accel_count": 238, "decel_count": 0, "cruise": 10, "time_unit_ns": 40000,
                            "revision": 7}),
-    (3, 3, "table_data", {"slot": 2, "offset": 120, "count": 4, "codes": [250, 256, 1, 65535]}),
-    (3, 4, "table_end", {"slot": 2, "crc": 0xCBF43926}),
-    (1, 5, "assign", {"motor": 15, "slot": 7}),
+    (3, 3, "table_data", {"bank": 2, "offset": 120, "count": 4, "codes": [250, 256, 1, 65535]}),
+    (3, 4, "table_end", {"bank": 2, "crc": 0xCBF43926}),
+    (1, 5, "assign", {"motor": 15, "bank": 7}),
     (1, 6, "control", {"actions": 5}),
     (1, 6, "control", {"actions": 12, "faults": 0x86}),
     (1, 7, "set_position", {"motor": 0, "position_steps": -310}),
@@ -118,14 +118,14 @@ FRAMES = [
                                         [2, 1, 1, 3, 0, 0, 0, 0, 0, 0, 0]]}),
     (1, 13, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 14, "table_run", {"epoch": 5, "first_tick": 2000, "entries": [[1, 0, -1, 1, 513], [15, 7, 1, 2147483647, 0]]}),
-    (1, 26, "line_run", {"epoch": 5, "first_tick": 2000, "slot": 3, "shortest_delay": 0, "longest": 700, "from": 0, "steps": 700,
+    (1, 26, "line_run", {"epoch": 5, "first_tick": 2000, "bank": 3, "shortest_delay": 0, "longest": 700, "from": 0, "steps": 700,
                          "entries": [[0, 1, 700], [2, -1, 211]]}),
     # The rest of one after a pause, with a shortest delay.
-    (1, 27, "line_run", {"epoch": 255, "first_tick": 4294967295, "slot": 7, "shortest_delay": 513, "longest": 2147483647,
+    (1, 27, "line_run", {"epoch": 255, "first_tick": 4294967295, "bank": 7, "shortest_delay": 513, "longest": 2147483647,
                          "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
-    (1, 28, "line_trigger", {"number": 1, "edge": 2, "delay_us": 50, "slot": 3, "shortest_delay": 0, "longest": 700, "from": 0,
+    (1, 28, "line_trigger", {"number": 1, "edge": 2, "delay_us": 50, "bank": 3, "shortest_delay": 0, "longest": 700, "from": 0,
                              "steps": 700, "entries": [[0, 1, 700], [2, -1, 211]]}),
-    (1, 29, "line_trigger", {"number": 255, "edge": 1, "delay_us": 1650000, "slot": 7, "shortest_delay": 513,
+    (1, 29, "line_trigger", {"number": 255, "edge": 1, "delay_us": 1650000, "bank": 7, "shortest_delay": 513,
                              "longest": 2147483647, "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
     (1, 21, "trigger", {"number": 1, "edge": 2, "delay_us": 50, "entries": [[0, 2, 1, 200, 0]]}),
     (1, 22, "trigger", {"number": 255, "edge": 1, "delay_us": 1650000,

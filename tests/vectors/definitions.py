@@ -108,14 +108,14 @@ def line_position(increment, longest, run_steps):
     return (256 * min(2 * share * run_steps, ruled)).__floor__()
 
 
-def identify_slot(unique_id, salt, slots):
+def identify_window(unique_id, salt, windows):
     mask = 0xFFFFFFFF
     value = 2166136261
     for byte in unique_id + salt.to_bytes(2, "little"):
         value = (value ^ byte) * 16777619 & mask
     value = (value ^ value >> 16) * 0x85EBCA6B & mask
     value = (value ^ value >> 13) * 0xC2B2AE35 & mask
-    return (value ^ value >> 16) % slots
+    return (value ^ value >> 16) % windows
 
 
 def cobs(raw):

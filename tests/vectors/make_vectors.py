@@ -18,8 +18,8 @@ sys.dont_write_bytecode = True  # no caches in the source tree
 
 from answers import line_answers, move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes  # noqa: E402
 from c_header import c_header  # noqa: E402
-from chosen import FRAMES, IDENTIFY_SLOTS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS  # noqa: E402
-from definitions import frame, identify_slot  # noqa: E402
+from chosen import FRAMES, IDENTIFY_WINDOWS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS  # noqa: E402
+from definitions import frame, identify_window  # noqa: E402
 from messages import LAYOUTS, payload_of  # noqa: E402
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -56,8 +56,8 @@ def csv_files():
            for r in RUN_STATES])
     write("lines.csv", ["increment", "longest", "first", "last", "made", "fractions", "positions"],
           [[*line, *map(join, line_answers(*line))] for line in LINES])
-    write("identify_slots.csv", ["unique_id", "salt", "slots", "slot"],
-          [[*one, identify_slot(bytes.fromhex(one[0]), *one[1:])] for one in IDENTIFY_SLOTS])
+    write("identify_windows.csv", ["unique_id", "salt", "windows", "window"],
+          [[*one, identify_window(bytes.fromhex(one[0]), *one[1:])] for one in IDENTIFY_WINDOWS])
     slots = []
     for slot_count, crossing, values in SLOTS:
         lists, remainder = slot_lists(slot_count, crossing, values)

@@ -2,13 +2,13 @@
 
 # A payload field: (name, bytes; negative: signed).
 LAYOUTS = {
-    "identify": (0x01, [("salt", 2), ("slots", 1), ("slot_units", 2)]),
+    "identify": (0x01, [("salt", 2), ("windows", 1), ("window_units", 2)]),
     "configure": (0x02, [("tick_ns", 4), ("format", 1), ("comm_timeout_ticks", 2)]),
-    "table_begin": (0x03, [("slot", 1), ("accel_count", 2), ("decel_count", 2), ("cruise", 2), ("time_unit_ns", 4),
+    "table_begin": (0x03, [("bank", 1), ("accel_count", 2), ("decel_count", 2), ("cruise", 2), ("time_unit_ns", 4),
                            ("revision", 4)]),
-    "table_data": (0x04, [("slot", 1), ("offset", 2), ("count", 1), ("codes", [2])]),
-    "table_end": (0x05, [("slot", 1), ("crc", 4)]),
-    "assign": (0x06, [("motor", 1), ("slot", 1)]),
+    "table_data": (0x04, [("bank", 1), ("offset", 2), ("count", 1), ("codes", [2])]),
+    "table_end": (0x05, [("bank", 1), ("crc", 4)]),
+    "assign": (0x06, [("motor", 1), ("bank", 1)]),
     "control": (0x07, [("actions", 1), ("faults", "optional")]),
     "set_position": (0x08, [("motor", 1), ("position_steps", -4)]),
     "poll": (0x09, [("count", 1), ("entries", [1, 2])]),
@@ -17,9 +17,9 @@ LAYOUTS = {
                      ("displacements", [1])]),
     "table_ticks": (0x0C, [("epoch", 1), ("flags", 1), ("first_tick", 4), ("count", 2), ("entries", "run_state")]),
     "table_run": (0x0D, [("epoch", 1), ("first_tick", 4), ("entries", "table_run")]),
-    "line_run": (0x18, [("epoch", 1), ("first_tick", 4), ("slot", 1), ("shortest_delay", 2), ("longest", 4), ("from", 4),
+    "line_run": (0x18, [("epoch", 1), ("first_tick", 4), ("bank", 1), ("shortest_delay", 2), ("longest", 4), ("from", 4),
                         ("steps", 4), ("entries", "line")]),
-    "line_trigger": (0x1B, [("number", 1), ("edge", 1), ("delay_us", 4), ("slot", 1), ("shortest_delay", 2), ("longest", 4),
+    "line_trigger": (0x1B, [("number", 1), ("edge", 1), ("delay_us", 4), ("bank", 1), ("shortest_delay", 2), ("longest", 4),
                             ("from", 4), ("steps", 4), ("entries", "line")]),
     "trigger": (0x15, [("number", 1), ("edge", 1), ("delay_us", 4), ("entries", "table_run")]),
     "position_compare": (0x16, [("motor", 1), ("arrivals", 1), ("position_steps", -4), ("delay_us", 4), ("width_us", 4)]),
@@ -75,8 +75,8 @@ def run_state_bytes(fields, motor, direction, cruises, since, since_ns, lead, ac
     return bytes([head]) + out
 
 
-def table_run_bytes(_, motor, slot, direction, steps, shortest_delay):
-    head = bytes([motor | slot << 4 | (0x80 if direction > 0 else 0)])
+def table_run_bytes(_, motor, bank, direction, steps, shortest_delay):
+    head = bytes([motor | bank << 4 | (0x80 if direction > 0 else 0)])
     if not shortest_delay:
         return head + steps.to_bytes(4, "little")
     return head + (steps | 1 << 31).to_bytes(4, "little") + shortest_delay.to_bytes(2, "little")

@@ -11,9 +11,9 @@ using bushd::fail;
 using bushd::Result;
 using std::chrono::microseconds;
 
-// An answer may begin so late after its slot's beginning, and the line must be let go.
-constexpr microseconds kSlotGuard{600};
-constexpr std::uint8_t kScanSlots = 64;
+// An answer may begin so late after the beginning of its window, and the line must be let go.
+constexpr microseconds kWindowGuard{600};
+constexpr std::uint8_t kScanWindows = 64;
 // With every further round the chance that two MCUs have hidden each other in all of them falls:
 // looked for until three rounds in a row have found nothing new.
 constexpr unsigned kMaxRounds = 16;
@@ -24,17 +24,18 @@ bool never(const BusLine::Answers&) {
 }
 
 Result<std::vector<Found>> identify(BusLine& line, std::uint8_t address, std::uint16_t salt,
-                                    std::uint8_t slots) {
-  const microseconds slot =
-      line.line_time(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + kSlotGuard;
-  const bushd_identify message = {.salt = salt,
-                                  .slots = slots,
-                                  .slot_units = static_cast<std::uint16_t>(std::min<std::int64_t>(
-                                      slot.count() * 1000 / BUSHD_REPLY_UNIT_NS + 1, UINT16_MAX))};
+                                    std::uint8_t windows) {
+  const microseconds window =
+      line.line_time(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + kWindowGuard;
+  const bushd_identify message = {
+      .salt = salt,
+      .windows = windows,
+      .window_units = static_cast<std::uint16_t>(
+          std::min<std::int64_t>(window.count() * 1000 / BUSHD_REPLY_UNIT_NS + 1, UINT16_MAX))};
   std::array<std::uint8_t, 16> payload{};
   const std::size_t size = bushd_encode_identify(&message, payload.data());
   const auto answers = line.ask(address, BUSHD_MSG_IDENTIFY, {payload.data(), size},
-                                BUSHD_IDENTITY_SIZE, slot * slots + kAnswerPatience, never);
+                                BUSHD_IDENTITY_SIZE, window * windows + kAnswerPatience, never);
   if (!answers) return fail(answers.error());
   std::vector<Found> found;
   for (const BusLine::Answer& answer : *answers) {
@@ -59,7 +60,7 @@ Result<std::vector<Found>> find_all(BusLine& line) {
   unsigned quiet = 0;
   for (unsigned round = 1; round <= kMaxRounds && quiet < kQuietRounds; ++round) {
     const auto heard = identify(line, BUSHD_ADDRESS_BROADCAST,
-                                static_cast<std::uint16_t>(round * 257), kScanSlots);
+                                static_cast<std::uint16_t>(round * 257), kScanWindows);
     if (!heard) return fail(heard.error());
     ++quiet;
     for (const Found& mcu : *heard) {

@@ -58,7 +58,7 @@ int latency_test(const LineOptions& options, std::uint8_t address, unsigned coun
     if (!found) return failed(found.error());
     address = found->front().address;
   }
-  const bushd_identify message = {.salt = 0, .slots = 1, .slot_units = 0};
+  const bushd_identify message = {.salt = 0, .windows = 1, .window_units = 0};
   std::array<std::uint8_t, 16> payload{};
   const std::size_t size = bushd_encode_identify(&message, payload.data());
   LatencyTest test{.port = options.port, .baud = options.baud, .asked = count, .latencies_us = {}};

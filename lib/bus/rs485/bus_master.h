@@ -154,12 +154,12 @@ class BusMaster {
   }
   virtual void begin_line_run(McuIndex, std::uint8_t, Tick, const LineRun&) {}
   // Of a table of the MCU that makes the same runs as this one.
-  virtual std::optional<std::uint8_t> slot_of(McuIndex, const bushd_table&) const {
+  virtual std::optional<std::uint8_t> bank_of(McuIndex, const bushd_table&) const {
     return std::nullopt;
   }
 
-  // A table that lines go by, into a slot that the MCU does not keep over resets, in place of what
-  // was there: from when it is there slot_of() finds it. It is sent in parts when nothing else is
+  // A table that lines go by, into a bank that the MCU does not keep over resets, in place of what
+  // was there: from when it is there bank_of() finds it. It is sent in parts when nothing else is
   // asked of the MCU, which is not busy() with it. The MCU takes it only while it rests: otherwise
   // the upload ends without it. Preconditions of upload(): can_upload, the MCU is online.
   virtual bool can_upload(McuIndex, const bushd_table&) const { return false; }

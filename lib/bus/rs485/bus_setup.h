@@ -38,8 +38,8 @@ enum class SetupKey {
 
 struct McuSetup {
   McuAddress address;
-  std::vector<TableRef> tables;  // by slot, at most BUSHD_TABLE_SLOTS
-  // Slot of its motor's table, by output; none: no motor there.
+  std::vector<TableRef> tables;  // by bank, at most BUSHD_TABLE_BANKS
+  // Bank of its motor's table, by output; none: no motor there.
   std::array<std::optional<std::uint8_t>, BUSHD_MOTORS_PER_MCU> table_of_motor{};
   fieldbus::EmissionSetup emission{};
   bushd_set_outputs outputs{.step_low = 0, .direction_low = 0, .enabled = BUSHD_ENABLED_HIGH};

@@ -15,7 +15,7 @@ namespace {
 
 // Table runs go on without a word from here for as long: more than a busy PC needs to come back.
 constexpr std::int64_t kCommTimeoutUs = 1'000'000;
-constexpr unsigned kIdentifySlots = 8;
+constexpr unsigned kIdentifyWindows = 8;
 constexpr std::int64_t kReplyUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 // While one of these is latched the MCU refuses to raise EN.
 constexpr unsigned kFaultsWithoutEnable = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT;
@@ -133,24 +133,24 @@ void Connector::tell_local(McuIndex mcu) {
 bool Connector::send_due_identify(std::int64_t now_us) {
   for (const McuIndex i : mcus_.indices()) {
     if (mcus_[i].view.phase != McuPhase::kOffline || links_[i].retry_due_us > now_us) continue;
-    const unsigned slots = links_[i].identify_attempts++ % 2 == 0 ? 1 : kIdentifySlots;
-    const std::int64_t slot_us =
-        writer_.line_us(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + fieldbus::kSlotGuardUs;
+    const unsigned windows = links_[i].identify_attempts++ % 2 == 0 ? 1 : kIdentifyWindows;
+    const std::int64_t window_us =
+        writer_.line_us(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + fieldbus::kWindowGuardUs;
     const bushd_identify identify = {
         .salt = ++salt_,
-        .slots = static_cast<std::uint8_t>(slots),
-        .slot_units = static_cast<std::uint16_t>(slot_us * 1000 / BUSHD_REPLY_UNIT_NS + 1)};
+        .windows = static_cast<std::uint8_t>(windows),
+        .window_units = static_cast<std::uint16_t>(window_us * 1000 / BUSHD_REPLY_UNIT_NS + 1)};
     std::array<std::uint8_t, 8> payload;
     const std::size_t size = bushd_encode_identify(&identify, payload.data());
     identities_.clear();
-    // Slots are counted in whole units, so each may last one longer.
+    // Windows are counted in whole units, so each may last one longer.
     transactions_.ask(now_us, {.mcu = i,
                                .address = mcus_[i].setup.address,
                                .type = BUSHD_MSG_IDENTIFY,
                                .payload = {payload.data(), size},
                                .reply_payload = BUSHD_IDENTITY_SIZE,
-                               .reply_slots = slots,
-                               .reply_slots_us = slots * (slot_us + kReplyUnitUs)});
+                               .reply_windows = windows,
+                               .reply_windows_us = windows * (window_us + kReplyUnitUs)});
     return true;
   }
   return false;
@@ -217,7 +217,7 @@ void Connector::identify_ended(std::int64_t now_us, McuIndex mcu) {
       "; unplug one, or stop bushd and give one another address: 'bushctl address PORT "
       "UNIQUE_ID NEW --baud B'";
   links_[mcu].retry_due_us = now_us + kRefusedRetryUs;
-  links_[mcu].identify_attempts = 1;  // in slots again
+  links_[mcu].identify_attempts = 1;  // in windows again
 }
 
 // An IDENTIFY without an answer costs the line a time-out: the more MCUs are offline, the rarer.
@@ -285,11 +285,11 @@ void Connector::write_setup(McuIndex mcu) {
 
 bool Connector::holds_its_tables(McuIndex mcu, const bushd_tables& held) const {
   const std::vector<TableRef>& wanted = mcus_[mcu].setup.tables;
-  for (std::size_t slot = 0; slot < BUSHD_TABLE_SLOTS; ++slot) {
-    const bushd_table_held& there = held.slot[slot];
-    if (there.valid != (slot < wanted.size())) return false;
+  for (std::size_t bank = 0; bank < BUSHD_TABLE_BANKS; ++bank) {
+    const bushd_table_held& there = held.bank[bank];
+    if (there.valid != (bank < wanted.size())) return false;
     if (!there.valid) continue;
-    const TableRef& ref = wanted[slot];
+    const TableRef& ref = wanted[bank];
     if (there.crc != bushd_table_crc32(ref.table) || there.revision != ref.revision) return false;
   }
   return true;
@@ -303,12 +303,12 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
   if (!queue.done(BUSHD_MSG_TABLES)) return;
   if (!holds_its_tables(mcu, held)) {
     queue.control({.actions = BUSHD_CONTROL_FORGET_TABLES, .faults = 0});
-    for (std::uint8_t slot = 0; slot < record.setup.tables.size(); ++slot) {
-      queue.upload_table(slot, record.setup.tables[slot]);
+    for (std::uint8_t bank = 0; bank < record.setup.tables.size(); ++bank) {
+      queue.upload_table(bank, record.setup.tables[bank]);
     }
   }
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if (const auto slot = record.setup.table_of_motor[m]) queue.assign(m, *slot);
+    if (const auto bank = record.setup.table_of_motor[m]) queue.assign(m, *bank);
   }
   tell_local(mcu);
   add_control(mcu, first_actions(mcu, may_clear));

@@ -1,7 +1,7 @@
 // From no answer to a configured MCU in step with its tables in place, and back.
 //
-// An MCU that is looked for is asked once directly and once in reply slots, by turns: two MCUs that
-// have the same address talk over each other, but rarely choose the same slot.
+// An MCU that is looked for is asked once directly and once in reply windows, by turns: two MCUs
+// that have the same address talk over each other, but rarely choose the same window.
 #pragma once
 
 #include <cstdint>

@@ -210,7 +210,7 @@ void Rs485Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, c
 
 bool Rs485Master::can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                                bool alone) const {
-  return makes_lines(mcu) && slot_of(mcu, table) &&
+  return makes_lines(mcu) && bank_of(mcu, table) &&
          keeps_up_with(mcu, table, shortest_delay, alone);
 }
 
@@ -222,14 +222,14 @@ bool Rs485Master::keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_de
                            alone ? BUSHD_SLOW_LINE_DELAY_NS : BUSHD_SHARED_LINE_DELAY_NS);
 }
 
-std::optional<std::uint8_t> Rs485Master::slot_of(McuIndex mcu, const bushd_table& table) const {
+std::optional<std::uint8_t> Rs485Master::bank_of(McuIndex mcu, const bushd_table& table) const {
   const std::vector<TableRef>& tables = mcus_[mcu].setup.tables;
-  for (std::size_t slot = 0; slot < tables.size(); ++slot) {
-    if (makes_the_same_runs(*tables[slot].table, table)) return static_cast<std::uint8_t>(slot);
+  for (std::size_t bank = 0; bank < tables.size(); ++bank) {
+    if (makes_the_same_runs(*tables[bank].table, table)) return static_cast<std::uint8_t>(bank);
   }
   const bushd_table* scratch = connector_.scratch(mcu).table();
   if (scratch == nullptr || !makes_the_same_runs(*scratch, table)) return std::nullopt;
-  return BUSHD_SCRATCH_SLOT;
+  return BUSHD_SCRATCH_BANK;
 }
 
 bool Rs485Master::can_upload(McuIndex mcu, const bushd_table& table) const {

@@ -104,7 +104,7 @@ class Rs485Master final : public BusMaster,
   bool keeps_up_with(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                      bool alone) const override;
   void begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) override;
-  std::optional<std::uint8_t> slot_of(McuIndex mcu, const bushd_table& table) const override;
+  std::optional<std::uint8_t> bank_of(McuIndex mcu, const bushd_table& table) const override;
   bool can_upload(McuIndex mcu, const bushd_table& table) const override;
   void upload(McuIndex mcu, const bushd_table& table) override {
     connector_.scratch(mcu).upload(table);

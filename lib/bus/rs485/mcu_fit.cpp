@@ -30,9 +30,9 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
   const auto room = fieldbus::max_steps_per_tick(setup.emission, identity, tick_ns);
   if (!room) return fail(room.error());
   for (std::size_t output = 0; output < setup.table_of_motor.size(); ++output) {
-    const auto slot = setup.table_of_motor[output];
-    if (!slot) continue;
-    const bushd_table* table = setup.tables[*slot].table;
+    const auto bank = setup.table_of_motor[output];
+    if (!bank) continue;
+    const bushd_table* table = setup.tables[*bank].table;
     const std::uint32_t steps = bushd_table_max_steps_per_tick(table, tick_ns);
     if (steps <= *room) continue;
     return fail("has room for " + std::to_string(*room) +
@@ -68,9 +68,9 @@ Result<void> check_dir_setup(const McuSetup& setup) {
                 std::to_string(longest_us) + " or less, or let it begin more slowly");
   };
   for (std::size_t output = 0; output < setup.table_of_motor.size(); ++output) {
-    const auto slot = setup.table_of_motor[output];
-    if (!slot) continue;
-    const std::uint32_t longest_us = fieldbus::longest_dir_setup_us(*setup.tables[*slot].table);
+    const auto bank = setup.table_of_motor[output];
+    if (!bank) continue;
+    const std::uint32_t longest_us = fieldbus::longest_dir_setup_us(*setup.tables[*bank].table);
     if (settings.dir_setup_us > longest_us) {
       return refusal(output, " begins by its table sooner than that allows", longest_us);
     }

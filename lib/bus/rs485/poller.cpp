@@ -9,9 +9,9 @@
 namespace bushd::link {
 namespace {
 
-using fieldbus::kFirstSlotUs;
+using fieldbus::kFirstWindowUs;
 using fieldbus::kPollPeriodUs;
-using fieldbus::kSlotGuardUs;
+using fieldbus::kWindowGuardUs;
 
 // Nothing else is sent meanwhile; queues that have run low must not wait for longer.
 constexpr std::int64_t kMaxCycleUs = 60'000;
@@ -56,11 +56,11 @@ std::int64_t Poller::cycle_us() const {
   for (const McuRecord& mcu : mcus_) {
     if (mcu.view.phase == McuPhase::kOffline) continue;
     ++entries;
-    const std::int64_t with_us = answers_us + reply_us(mcu) + kSlotGuardUs;
+    const std::int64_t with_us = answers_us + reply_us(mcu) + kWindowGuardUs;
     if (answers_us == 0 || with_us <= kMaxCycleUs) answers_us = with_us;
   }
   constexpr std::size_t kEntryBytes = 3;
-  return writer_.line_us(2 + entries * kEntryBytes + BUSHD_FRAME_OVERHEAD) + kFirstSlotUs +
+  return writer_.line_us(2 + entries * kEntryBytes + BUSHD_FRAME_OVERHEAD) + kFirstWindowUs +
          answers_us;
 }
 
@@ -69,8 +69,8 @@ bool Poller::send_wanted(std::int64_t now_us) {
     return false;
   }
   std::vector<bushd_poll_entry> entries;
-  std::vector<Transactions::ReplySlot> slots;
-  std::int64_t begin_us = kFirstSlotUs;
+  std::vector<Transactions::ReplyWindow> windows;
+  std::int64_t begin_us = kFirstWindowUs;
   for (const McuIndex i : choose(now_us)) {
     const McuRecord& mcu = mcus_[i];
     const std::int64_t end_us = begin_us + reply_us(mcu);
@@ -78,16 +78,16 @@ bool Poller::send_wanted(std::int64_t now_us) {
     if (full && !entries.empty()) break;
     const auto units = static_cast<std::uint16_t>((begin_us + kUnitUs - 1) / kUnitUs);
     entries.push_back({mcu.setup.address.value, units});
-    slots.push_back({.mcu = i, .address = mcu.setup.address, .end_us = end_us});
-    begin_us = end_us + kSlotGuardUs;
+    windows.push_back({.mcu = i, .address = mcu.setup.address, .end_us = end_us});
+    begin_us = end_us + kWindowGuardUs;
   }
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
   const std::size_t size =
       bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data());
-  transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, slots, kSlotGuardUs);
-  for (const Transactions::ReplySlot& slot : slots) {
-    mcus_[slot.mcu].poll_wanted = false;
-    polled_[slot.mcu].due_us = now_us + kPollPeriodUs;
+  transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, windows, kWindowGuardUs);
+  for (const Transactions::ReplyWindow& window : windows) {
+    mcus_[window.mcu].poll_wanted = false;
+    polled_[window.mcu].due_us = now_us + kPollPeriodUs;
   }
   return true;
 }

@@ -1,6 +1,6 @@
-// Polls: one request for the reports of many MCUs, each in a slot of its own, so that the adapter's
-// latency is paid once. Whoever missed its last reply answers first: if it misses this one too, the
-// one after it ends the waiting.
+// Polls: one request for the reports of many MCUs, each in a window of its own, so that the
+// adapter's latency is paid once. Whoever missed its last reply answers first: if it misses this
+// one too, the one after it ends the waiting.
 #pragma once
 
 #include <cstdint>

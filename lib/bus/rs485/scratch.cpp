@@ -19,7 +19,7 @@ void Scratch::upload(const bushd_table& table) {
   table_.accel.count = table.accel.count;
   table_.decel.code = codes_.data() + (symmetric ? 0 : accel.size());
   table_.decel.count = table.decel.count;
-  requests_.upload_table(BUSHD_SCRATCH_SLOT, {.table = &table_, .revision = 0});
+  requests_.upload_table(BUSHD_SCRATCH_BANK, {.table = &table_, .revision = 0});
 }
 
 void Scratch::clear() {

@@ -1,4 +1,4 @@
-// The volatile table slot of one MCU (BUSHD_SCRATCH_SLOT): what is in it, and
+// The volatile table bank of one MCU (BUSHD_SCRATCH_BANK): what is in it, and
 // the requests that put another one there.
 #pragma once
 
@@ -15,7 +15,7 @@ class Scratch {
  public:
   // From now on this table is being uploaded, in place of what was there. It is copied.
   void upload(const bushd_table& table);
-  // What is in the slot is not known.
+  // What is in the bank is not known.
   void clear();
 
   bool under_way() const { return !requests_.empty(); }

@@ -75,7 +75,7 @@ void SetupQueue::ask_for_tables() {
   requests_.push_back({.type = BUSHD_MSG_TABLES, .payload = {}});
 }
 
-void SetupQueue::upload_table(std::uint8_t slot, const TableRef& ref) {
+void SetupQueue::upload_table(std::uint8_t bank, const TableRef& ref) {
   const bushd_table& table = *ref.table;
   const bool symmetric = table.decel.code == table.accel.code;
   std::vector<std::uint16_t> codes(table.accel.code, table.accel.code + table.accel.count);
@@ -83,7 +83,7 @@ void SetupQueue::upload_table(std::uint8_t slot, const TableRef& ref) {
     codes.insert(codes.end(), table.decel.code, table.decel.code + table.decel.count);
   }
   const bushd_table_begin begin = {
-      .slot = slot,
+      .bank = bank,
       .accel_count = static_cast<std::uint16_t>(table.accel.count),
       .decel_count = static_cast<std::uint16_t>(symmetric ? 0 : table.decel.count),
       .cruise = table.cruise,
@@ -94,15 +94,15 @@ void SetupQueue::upload_table(std::uint8_t slot, const TableRef& ref) {
     const auto count = static_cast<std::uint8_t>(
         std::min<std::size_t>(codes.size() - at, BUSHD_TABLE_DATA_MAX_CODES));
     add(BUSHD_MSG_TABLE_DATA, [&](std::uint8_t* p) {
-      return bushd_encode_table_data(slot, static_cast<std::uint16_t>(at), count, &codes[at], p);
+      return bushd_encode_table_data(bank, static_cast<std::uint16_t>(at), count, &codes[at], p);
     });
   }
-  const bushd_table_end end = {.slot = slot, .crc = bushd_table_crc32(&table)};
+  const bushd_table_end end = {.bank = bank, .crc = bushd_table_crc32(&table)};
   add(BUSHD_MSG_TABLE_END, [&](std::uint8_t* p) { return bushd_encode_table_end(&end, p); });
 }
 
-void SetupQueue::assign(std::uint8_t motor, std::uint8_t slot) {
-  const bushd_assign message = {motor, slot};
+void SetupQueue::assign(std::uint8_t motor, std::uint8_t bank) {
+  const bushd_assign message = {motor, bank};
   add(BUSHD_MSG_ASSIGN, [&](std::uint8_t* p) { return bushd_encode_assign(&message, p); });
 }
 

@@ -42,8 +42,8 @@ class SetupQueue {
   void local(const bushd_local& message);
   // Which tables it has.
   void ask_for_tables();
-  void upload_table(std::uint8_t slot, const TableRef& ref);
-  void assign(std::uint8_t motor, std::uint8_t slot);
+  void upload_table(std::uint8_t bank, const TableRef& ref);
+  void assign(std::uint8_t motor, std::uint8_t bank);
 
   void control(const bushd_control& message);
   // What was asked before an emergency stop must not clear it.

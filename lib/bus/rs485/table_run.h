@@ -15,10 +15,10 @@ struct TableRun {
 };
 
 // A motor's part of a run that all motors of its line follow, on whatever MCU. All but the last two
-// are the same for all that begin at one tick on an MCU, the numbers of slots aside for all of the
+// are the same for all that begin at one tick on an MCU, the numbers of banks aside for all of the
 // line (engine/message_line.h).
 struct LineRun {
-  std::uint8_t slot;           // of the run's table
+  std::uint8_t bank;           // of the run's table
   bushd_delay shortest_delay;  // a code (engine/table.h)
   std::uint32_t longest;
   std::uint32_t from;
@@ -32,7 +32,7 @@ using McuRun = std::variant<TableRun, LineRun>;
 
 // What the motors of an MCU have in common of a line's run.
 inline bushd_line_part line_part_of(const LineRun& run) {
-  return {.slot = run.slot,
+  return {.bank = run.bank,
           .shortest_delay = static_cast<std::uint16_t>(run.shortest_delay),
           .longest = run.longest,
           .from = run.from,
@@ -41,10 +41,10 @@ inline bushd_line_part line_part_of(const LineRun& run) {
           .entries = nullptr};
 }
 
-// `slot`: of the table that the motor has.
-inline bushd_table_run_entry entry_of(std::uint8_t motor, std::uint8_t slot, TableRun run) {
+// `bank`: of the table that the motor has.
+inline bushd_table_run_entry entry_of(std::uint8_t motor, std::uint8_t bank, TableRun run) {
   return {.motor = motor,
-          .slot = slot,
+          .bank = bank,
           .direction = static_cast<std::int8_t>(run.steps < 0 ? -1 : 1),
           .steps = static_cast<std::uint32_t>(std::abs(std::int64_t{run.steps})),
           .shortest_delay = run.shortest_delay};

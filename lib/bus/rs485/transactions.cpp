@@ -17,22 +17,22 @@ void Transactions::ask(std::int64_t now_us, const Request& request) {
       writer_.send(now_us, request.address, request.type, request.payload);
   const std::int64_t end_us =
       writer_.free_us() + writer_.line_us(request.reply_payload + BUSHD_FRAME_OVERHEAD + 1);
-  const std::int64_t quiet_us = end_us + request.reply_slots_us;
+  const std::int64_t quiet_us = end_us + request.reply_windows_us;
   open_ = Open{.type = request.type,
                .sequence = sequence,
                .awaited = {{.mcu = request.mcu, .address = request.address, .expected_us = end_us}},
                .sent_us = writer_.free_us(),
                .quiet_us = quiet_us,
                .timeout_us = quiet_us + patience_us_,
-               .several = request.reply_slots > 1};
+               .several = request.reply_windows > 1};
 }
 
 void Transactions::ask_all(std::int64_t now_us, std::uint8_t type,
-                           std::span<const std::uint8_t> payload, std::span<const ReplySlot> slots,
-                           std::int64_t late_us) {
+                           std::span<const std::uint8_t> payload,
+                           std::span<const ReplyWindow> windows, std::int64_t late_us) {
   const std::uint8_t sequence = writer_.send(now_us, kBroadcast, type, payload);
   const std::int64_t sent_us = writer_.free_us();
-  const std::int64_t quiet_us = sent_us + slots.back().end_us + late_us;
+  const std::int64_t quiet_us = sent_us + windows.back().end_us + late_us;
   open_ = Open{.type = type,
                .sequence = sequence,
                .awaited = {},
@@ -40,9 +40,9 @@ void Transactions::ask_all(std::int64_t now_us, std::uint8_t type,
                .quiet_us = quiet_us,
                .timeout_us = quiet_us + patience_us_,
                .several = false};
-  for (const ReplySlot& slot : slots) {
+  for (const ReplyWindow& window : windows) {
     open_->awaited.push_back(
-        {.mcu = slot.mcu, .address = slot.address, .expected_us = sent_us + slot.end_us});
+        {.mcu = window.mcu, .address = window.address, .expected_us = sent_us + window.end_us});
   }
 }
 
@@ -83,7 +83,7 @@ void Transactions::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
                          .line_us = from->expected_us - open_->sent_us,
                          .in_time = now_us <= open_->timeout_us};
   if (!listener_.answered(now_us, answer)) ++health_.crc_errors;
-  // Answers come in the order of their slots: after the last one nobody is waited for.
+  // Answers come in the order of their windows: after the last one nobody is waited for.
   if (open_ && !open_->several && mcu == open_->awaited.back().mcu) finish(now_us);
 }
 
@@ -114,7 +114,7 @@ void Transactions::be_more_patient() {
   patience_us_ = std::min(2 * patience_us_, kMaxPatienceUs);
 }
 
-// In which of several slots an answer came is not known here.
+// In which of several windows an answer came is not known here.
 void Transactions::note_latency(std::int64_t now_us, const Awaited& from) {
   if (open_->several) return;
   const std::int64_t latency_us = std::max<std::int64_t>(now_us - from.expected_us, 0);

@@ -57,23 +57,23 @@ class Transactions {
     std::uint8_t type;
     std::span<const std::uint8_t> payload;
     std::size_t reply_payload;  // bytes
-    // Answers come in one of so many slots, which together last so long. With more than one several
-    // MCUs may answer.
-    unsigned reply_slots = 1;
-    std::int64_t reply_slots_us = 0;
+    // Answers come in one of so many windows, which together last so long. With more than one
+    // several MCUs may answer.
+    unsigned reply_windows = 1;
+    std::int64_t reply_windows_us = 0;
   };
   // Precondition of both: !open().
   void ask(std::int64_t now_us, const Request& request);
 
-  struct ReplySlot {
+  struct ReplyWindow {
     McuIndex mcu;
     McuAddress address;
     std::int64_t end_us;  // of its answer, from the request's end
   };
-  // A broadcast that each of these answers in a slot of its own, in this order. An MCU may begin
-  // later than its slot by up to `late_us`.
+  // A broadcast that each of these answers in a window of its own, in this order. An MCU may begin
+  // later than its window by up to `late_us`.
   void ask_all(std::int64_t now_us, std::uint8_t type, std::span<const std::uint8_t> payload,
-               std::span<const ReplySlot> slots, std::int64_t late_us);
+               std::span<const ReplyWindow> windows, std::int64_t late_us);
 
   void receive(std::int64_t now_us, std::span<const std::uint8_t> bytes);
   // Ends the transaction whose answers are overdue.

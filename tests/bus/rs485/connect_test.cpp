@@ -373,7 +373,7 @@ TEST(Connect, OnePollTwentyTimesASecondAsksAll) {
 }
 
 // It is asked for its report first, so the answers after it end the waiting.
-TEST(Connect, McuThatDoesNotAnswerCostsItsSlotAndNotTheCycle) {
+TEST(Connect, McuThatDoesNotAnswerCostsItsWindowAndNotTheCycle) {
   FakeBus bus(4);
   bus.connect();
   bus.run_for(500'000);
@@ -387,8 +387,8 @@ TEST(Connect, McuThatDoesNotAnswerCostsItsSlotAndNotTheCycle) {
   EXPECT_GE(first, 30) << "of some 40, as every ninth is answered";
   EXPECT_GE(polls_by_address(bus)[1], 35);
   EXPECT_TRUE(bus.online(2));
-  // Four slots of 84 bytes at 500 kbaud with their guards take 10.2 ms. Nothing is waited for then,
-  // where the least patience is 10 ms.
+  // Four windows of 84 bytes at 500 kbaud with their guards take 10.2 ms. Nothing is waited for
+  // then, where the least patience is 10 ms.
   const auto polls = bus.heard_of(BUSHD_MSG_POLL).size();
   ASSERT_TRUE(bus.run_until([&] { return bus.heard_of(BUSHD_MSG_POLL).size() > polls; }));
   const std::int64_t from_us = bus.now_us;
@@ -485,7 +485,7 @@ TEST(Connect, AdapterLatencyIsMeasured) {
   bus.connect();
   bus.run_for(2'000'000);
   const link::Latency& latency = bus.master->bus_health().latency;
-  EXPECT_NEAR(static_cast<double>(latency.recent_us), 3'000, 600) << "a slot may begin late";
+  EXPECT_NEAR(static_cast<double>(latency.recent_us), 3'000, 600) << "a window may begin late";
   EXPECT_GT(latency.count[3], 40u) << "2 to 4 ms";
   EXPECT_EQ(latency.count[5] + latency.count[6] + latency.count[7], 0u);
   FakeBus quick;

@@ -35,14 +35,14 @@ class Connecting : public testing::Test,
   std::string detail() const { return mcus[kFirst].view.detail; }
   bushd_report& report() { return mcus[kFirst].view.report; }
 
-  // How many slots the IDENTIFY has that is sent now; none: none is sent.
+  // How many windows the IDENTIFY has that is sent now; none: none is sent.
   std::optional<int> identify(std::int64_t us) {
     if (!connector.send_due_identify(us)) return std::nullopt;
     bushd_identify message{};
     const auto sent = take_sent(writer);
     bushd_decode_identify(sent[0].payload.data(), sent[0].payload.size(), &message);
     transactions.abandon();
-    return message.slots;
+    return message.windows;
   }
   void find(const bushd_identity& identity = fitting()) {
     identify(0);
@@ -76,7 +76,7 @@ class Connecting : public testing::Test,
   std::string story;
 };
 
-TEST_F(Connecting, AskedDirectlyAndInSlotsByTurns) {
+TEST_F(Connecting, AskedDirectlyAndInWindowsByTurns) {
   EXPECT_EQ(identify(0), 1);
   connector.not_found(0, kFirst);
   EXPECT_EQ(identify(499'999), std::nullopt);
@@ -114,7 +114,7 @@ TEST_F(Connecting, TwoAtOneAddressAreBothNamed) {
   connector.identity(other);
   connector.identify_ended(0, kFirst);
   EXPECT_THAT(detail(), testing::AllOf(HasSubstr("ab00"), HasSubstr("cd00")));
-  EXPECT_EQ(identify(2'000'000), 8) << "in slots again";
+  EXPECT_EQ(identify(2'000'000), 8) << "in windows again";
 }
 
 // Drivers that come on are settled by a step there and back: no daemon that ends begins that.
@@ -149,7 +149,7 @@ TEST_F(Connecting, SetupEndsOnlineOnceItIsInStepAndDriversAreOn) {
 }
 
 TEST_F(Connecting, TablesThatAreThereAreNotSentAgain) {
-  held.slot[0] = {.valid = true, .crc = bushd_table_crc32(&small_table()), .revision = 1};
+  held.bank[0] = {.valid = true, .crc = bushd_table_crc32(&small_table()), .revision = 1};
   find();
   connector.follow_report(0, kFirst, false);
   EXPECT_THAT(setup_requests(), testing::Not(testing::Contains(BUSHD_MSG_TABLE_BEGIN)));

@@ -1,4 +1,4 @@
-// Whose turn it is, in which slots, and what becomes of those who do not answer.
+// Whose turn it is, in which windows, and what becomes of those who do not answer.
 #include "bus/rs485/poller.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ class Polling : public testing::Test {
  protected:
   explicit Polling(std::size_t count = 4) : mcus(online_mcus(count)) {}
 
-  // The addresses asked by the last poll, and when their slots begin.
+  // The addresses asked by the last poll, and when their windows begin.
   std::vector<int> asked() {
     std::vector<int> addresses;
     begins_us.clear();

@@ -1,4 +1,4 @@
-// What is uploaded into the volatile slot, request by request.
+// What is uploaded into the volatile bank, request by request.
 #include "bus/rs485/scratch.h"
 
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ TEST(Scratch, HasItsTableWhenAllPartsAreAcknowledged) {
     scratch.upload(codes.table);
   }  // it has a copy
   const bushd_table_begin begin = begin_of(scratch);
-  EXPECT_EQ(begin.slot, BUSHD_SCRATCH_SLOT);
+  EXPECT_EQ(begin.bank, BUSHD_SCRATCH_BANK);
   EXPECT_EQ(begin.accel_count, 200);
   EXPECT_EQ(begin.decel_count, 2);
   EXPECT_EQ(acknowledge_all(scratch), 4) << "begin, 202 codes, end";

@@ -131,11 +131,12 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
     case BUSHD_MSG_IDENTIFY: {
       bushd_identify identify;
       ASSERT_EQ(bushd_decode_identify(p.data(), p.size(), &identify), BUSHD_OK);
-      const std::uint8_t slot =
-          bushd_identify_slot(slave.identity.unique_id, identify.salt, identify.slots);
+      const std::uint8_t window =
+          bushd_identify_window(slave.identity.unique_id, identify.salt, identify.windows);
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_identity(&slave.identity, payload.data()));
-      return answer(slave, frame, sequence, payload, std::int64_t{slot} * identify.slot_units * 10);
+      return answer(slave, frame, sequence, payload,
+                    std::int64_t{window} * identify.window_units * 10);
     }
     case BUSHD_MSG_POLL: {
       bushd_poll poll;
@@ -177,7 +178,7 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
       return;
     case BUSHD_MSG_TABLES: {
       bushd_tables tables{};
-      for (const auto& [slot, held] : slave.held) tables.slot[slot] = held;
+      for (const auto& [bank, held] : slave.held) tables.bank[bank] = held;
       Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       payload.resize(bushd_encode_tables(&tables, payload.data()));
       return answer(slave, frame, sequence, payload);

@@ -330,7 +330,7 @@ TEST_F(Scheduling, TableRunIsGivenAsAWhole) {
 class LineRuns : public Scheduling {
  protected:
   static link::LineRun part(std::uint32_t increment, int direction) {
-    return {.slot = 3,
+    return {.bank = 3,
             .shortest_delay = 9,
             .longest = 700,
             .from = 100,
@@ -357,7 +357,7 @@ TEST_F(LineRuns, AreOneFrameForAllMotors) {
   ASSERT_EQ(bushd_decode_line_run(sent[0].payload.data(), sent[0].payload.size(), &message),
             BUSHD_OK);
   EXPECT_EQ(message.first_tick, 1040u);
-  EXPECT_EQ(message.line.slot, 3);
+  EXPECT_EQ(message.line.bank, 3);
   EXPECT_EQ(message.line.shortest_delay, 9);
   EXPECT_EQ(message.line.longest, 700u);
   EXPECT_EQ(message.line.from, 100u);

@@ -26,20 +26,20 @@ class Transacting : public testing::Test, protected Transactions::Listener {
     story += "o" + std::to_string(frame.type) + " ";
   }
 
-  void ask(unsigned reply_slots = 1, std::int64_t reply_slots_us = 0) {
+  void ask(unsigned reply_windows = 1, std::int64_t reply_windows_us = 0) {
     transactions.ask(now_us, {.mcu = kSecond,
                               .address = McuAddress{9},
                               .type = BUSHD_MSG_CONTROL,
                               .payload = {},
                               .reply_payload = 1,
-                              .reply_slots = reply_slots,
-                              .reply_slots_us = reply_slots_us});
+                              .reply_windows = reply_windows,
+                              .reply_windows_us = reply_windows_us});
     sequence = take_sent(writer).back().sequence;
   }
   void poll() {
-    const std::vector<Transactions::ReplySlot> slots = {{kSecond, McuAddress{9}, 3'000},
-                                                        {kFirst, McuAddress{4}, 6'000}};
-    transactions.ask_all(now_us, BUSHD_MSG_POLL, {}, slots, 600);
+    const std::vector<Transactions::ReplyWindow> windows = {{kSecond, McuAddress{9}, 3'000},
+                                                            {kFirst, McuAddress{4}, 6'000}};
+    transactions.ask_all(now_us, BUSHD_MSG_POLL, {}, windows, 600);
     sequence = take_sent(writer).back().sequence;
   }
   void hear(std::uint8_t address, std::uint8_t type, std::uint8_t with_sequence) {
@@ -110,7 +110,7 @@ TEST_F(Transacting, NobodyAnswersUntilTheTimeout) {
 }
 
 // Several MCUs may have one address: their answers are waited for until the end.
-TEST_F(Transacting, SeveralMayAnswerInSlots) {
+TEST_F(Transacting, SeveralMayAnswerInWindows) {
   ask(8, 20'000);
   const std::int64_t quiet_us = transactions.quiet_us();
   EXPECT_GE(quiet_us, now_us + 20'000);
@@ -121,7 +121,7 @@ TEST_F(Transacting, SeveralMayAnswerInSlots) {
   EXPECT_EQ(story, "a1 a1 e ");
   const auto& counts = transactions.health().latency.count;
   EXPECT_TRUE(std::all_of(counts.begin(), counts.end(), [](std::uint64_t n) { return n == 0; }))
-      << "in which slot they came is not known";
+      << "in which window they came is not known";
 }
 
 TEST_F(Transacting, SenselessPayloadIsAnErrorOfTheLine) {
@@ -224,7 +224,7 @@ TEST_F(Transacting, AnswerThatLayUnreadIsNotInTime) {
   EXPECT_FALSE(last.in_time);
 }
 
-TEST_F(Transacting, LineTimeOfAReportIsThatOfItsSlot) {
+TEST_F(Transacting, LineTimeOfAReportIsThatOfItsWindow) {
   poll();
   answer(4, BUSHD_MSG_POLL);
   EXPECT_EQ(last.line_us, 6'000);

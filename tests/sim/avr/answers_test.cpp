@@ -1,4 +1,4 @@
-// When the image for ATmega2560 answers: its reply must be over before another one's slot begins.
+// When the image for ATmega2560 answers: its reply must be over before another one's window begins.
 #include "sim/avr/avr_fixture.h"
 #include "sim/random.h"
 
@@ -28,7 +28,7 @@ TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
   }
 }
 
-// An answer that waits for its slot lies where frames are received.
+// An answer that waits for its window lies where frames are received.
 TEST_F(AvrAnswers, AreWholeWhateverPassesByBefore) {
   constexpr std::uint8_t kOther = 9;
   pass(kBootNs);

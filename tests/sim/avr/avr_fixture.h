@@ -24,7 +24,7 @@ class AvrAlone : public McuAlone {
     avr_ = add<AvrMcu>(options);
   }
 
-  // All motors may run the table in slot 0.
+  // All motors may run the table in bank 0.
   void make_ready() {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
     ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, {400, 300, 200}, 150));

@@ -28,16 +28,16 @@ TEST_F(AvrNvm, APowerCutLeavesAllOrAFault) {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kShortTickNs, BUSHD_FORMAT_FINE));
     const auto first = static_cast<std::uint16_t>(1000 + cut);
     ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, ramp(first, 100), 800));
-    const std::uint32_t sent_crc = master_.tables(kAddress).slot[0].crc;
+    const std::uint32_t sent_crc = master_.tables(kAddress).bank[0].crc;
     // Before, while or after its 200 bytes and the settings are written.
     pass(500'000'000 + static_cast<TimeNs>(random.below(1800)) * 1'000'000);
     reboot();
     const bushd_report report = master_.poll(kAddress);
     const bushd_tables found = master_.tables(kAddress);
-    if (report.faults == 0 && found.slot[0].valid) {
+    if (report.faults == 0 && found.bank[0].valid) {
       ++whole;
-      EXPECT_TRUE(found.slot[0].crc == sent_crc || found.slot[0].crc == kept_crc);
-      kept_crc = found.slot[0].crc;
+      EXPECT_TRUE(found.bank[0].crc == sent_crc || found.bank[0].crc == kept_crc);
+      kept_crc = found.bank[0].crc;
     } else if (report.faults != 0) {
       ++broken;
       EXPECT_EQ(report.faults, BUSHD_FAULT_EEPROM);

@@ -16,16 +16,16 @@ class QemuNvm : public QemuAlone {
               BUSHD_OK);
   }
   // Another table than that of any other number.
-  void upload(std::uint8_t slot, std::uint16_t number, std::size_t codes) {
+  void upload(std::uint8_t bank, std::uint16_t number, std::size_t codes) {
     std::vector<std::uint16_t> ramp;
     while (ramp.size() < codes) {
       ramp.push_back(static_cast<std::uint16_t>(60'000 + number - ramp.size()));
     }
-    master_.upload_table(kAddress, slot, 10'000, ramp, 1000);
+    master_.upload_table(kAddress, bank, 10'000, ramp, 1000);
   }
   std::uint32_t table_crc() {
     const bushd_tables told = master_.tables(kAddress);
-    return told.slot[0].valid ? told.slot[0].crc : 0;
+    return told.bank[0].valid ? told.bank[0].crc : 0;
   }
 };
 
@@ -55,7 +55,7 @@ TEST_F(QemuNvm, APowerCutLeavesTheNewOnesOrThoseOfBefore) {
 // A change of anything is a writing of all: 24 of 96 pages. The fifth begins anew.
 TEST_F(QemuNvm, RoomIsFoundAgainAfterAReset) {
   ASSERT_NO_FATAL_FAILURE(configure(640'000));
-  for (const std::uint8_t slot : Bytes{0, 1}) ASSERT_NO_FATAL_FAILURE(upload(slot, 0, 6000));
+  for (const std::uint8_t bank : Bytes{0, 1}) ASSERT_NO_FATAL_FAILURE(upload(bank, 0, 6000));
   const std::uint32_t sent = table_crc();
   for (std::uint8_t round = 1; round < 7; ++round) {
     SCOPED_TRACE(int{round});

@@ -72,9 +72,9 @@ class Port {
 
   int fd() const { return fd_; }
 
-  // One slot: answered at once.
+  // One window: answered at once.
   void ask_who(std::uint8_t address) const {
-    const bushd_identify message{.salt = 0, .slots = 1, .slot_units = 0};
+    const bushd_identify message{.salt = 0, .windows = 1, .window_units = 0};
     std::uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];
     const std::size_t payload_size = bushd_encode_identify(&message, payload);
     std::uint8_t wire[BUSHD_FRAME_MAX_WIRE];
