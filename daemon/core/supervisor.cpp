@@ -166,7 +166,7 @@ void Supervisor::watch_for_other_masters(std::int64_t now_us) {
     if (now) {
       outputs_.log(LogLevel::kError, {},
                    "bus " + bus.config.name +
-                       ": another master talks on the line; no moves are taken "
+                       ": another master talks on the bus; no moves are taken "
                        "until it is silent");
     } else {
       outputs_.log(LogLevel::kInfo, {}, "bus " + bus.config.name + ": the other master is silent");

@@ -47,7 +47,7 @@ Result<void> Interlocks::may_move_by(const Mcu& mcu) const {
   const Bus& bus = installation_.bus_of(mcu);
   if (bus.two_masters) {
     return fail("another master talks on bus " + bus.config.name +
-                ": end it, or take it off the line");
+                ": end it, or take it off the bus");
   }
   return {};
 }

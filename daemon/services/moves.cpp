@@ -398,7 +398,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
               outputs_.log(LogLevel::kError, id,
                            motor.name() + ": " + *motor.uncertain_reason() +
                                (mismatch.stopped ? "; it is stopped"
-                                                 : "; it is left to the other master on the line, "
+                                                 : "; it is left to the other master on the bus, "
                                                    "only an emergency stop reaches it"));
             },
             [&](const motion::event::Turn&) {

@@ -33,7 +33,7 @@ std::string detail_of(const Mcu& mcu, bool two_masters) {
   if (view.phase != link::McuPhase::kOnline) return view.detail;
   if (view.outdated_us > 0) return "has not reported since this daemon stood still";
   if (view.report.faults != 0) return motion::fault_text(view.report);
-  if (two_masters) return "another master talks on the line";
+  if (two_masters) return "another master talks on the bus";
   if ((view.report.flags & BUSHD_FLAG_ENABLED) == 0) {
     return mcu.asleep ? "drivers disabled at rest" : "drivers disabled";
   }

@@ -4,7 +4,7 @@
 //
 // Who calls what:
 // - bushd_mcu_boot: once after reset
-// - bushd_mcu_receive: for every byte on the line
+// - bushd_mcu_receive: for every byte on the bus
 // - bushd_mcu_swap: at every tick boundary; the slot buffer that it returns is emitted during the
 //   tick that begins
 // - bushd_mcu_prepare: after every swap and before the next one; computes the slot buffer of the

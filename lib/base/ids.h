@@ -22,7 +22,7 @@ using McuId = Id<struct McuTag>;
 using GroupId = Id<struct GroupTag>;
 using MotorId = Id<struct MotorTag>;
 
-// Number of an MCU on the line, 1..255.
+// Number of an MCU on the bus, 1..255.
 struct McuAddress {
   std::uint8_t value = 0;
   auto operator<=>(const McuAddress&) const = default;

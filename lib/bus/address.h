@@ -1,4 +1,4 @@
-// Who is meant on the line.
+// Who is meant on the bus.
 #pragma once
 
 #include "base/ids.h"

@@ -243,7 +243,7 @@ Result<void> check_line(const Loading& loading, std::size_t index) {
   if (load <= fieldbus::kMaxLineLoad) return {};
   return fail(loading.buses[index].error(
       "tick_us",
-      fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the line at {} baud; "
+      fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the bus at {} baud; "
                   "allowed: {:.0f} %. {}",
                   bus.tick_us, load * 100, bus.baud, fieldbus::kMaxLineLoad * 100,
                   line_remedy(bus, motors))));

@@ -1,4 +1,4 @@
-// Framing: raw frame = address, type, sequence, payload, CRC-32 (low byte first); on the line it is
+// Framing: raw frame = address, type, sequence, payload, CRC-32 (low byte first); on the bus it is
 // COBS encoded and ended by a zero byte. A raw frame has at most 254 bytes, so COBS costs exactly
 // one byte. CRC-32/ISO-HDLC: polynomial 0x04C11DB7, reflected, start 0xFFFFFFFF, inverted at the
 // end; check value 0xCBF43926.

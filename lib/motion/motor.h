@@ -83,7 +83,7 @@ struct Report {
   Tick tick;                  // of_mcu.tick, unwrapped
   bool requests_open;         // the MCU has not yet answered all that it was asked
   bool emergency_stop_open;   // commanded, and not yet known to be obeyed everywhere
-  bool other_master = false;  // talks on the line, and may have moved it
+  bool other_master = false;  // talks on the bus, and may have moved it
 };
 
 // What its position is worth.

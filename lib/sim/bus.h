@@ -42,7 +42,7 @@ class Bus : private Mcu::Driver {
   // A byte for the master: called when its stop bit has ended. May call master_send.
   std::function<void(std::uint8_t byte, TimeNs end_ns)> on_master_byte;
 
-  // A second master on the line, behind an adapter of its own: it talks as the first one does,
+  // A second master on the bus, behind an adapter of its own: it talks as the first one does,
   // without listening, and each hears the other. Call after the MCUs have been added.
   void add_second_master();
   void second_master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns);
@@ -70,7 +70,7 @@ class Bus : private Mcu::Driver {
 
   // From now until then this MCU alone hears nothing: disturbances are not the same everywhere.
   void deafen(std::size_t mcu, TimeNs until_ns);
-  // The master falls silent now: the byte on the line breaks off, those behind it are dropped.
+  // The master falls silent now: the byte on the bus breaks off, those behind it are dropped.
   void break_off_master() { line_.silence(kMaster, now_ns_); }
 
   std::size_t mcu_count() const { return mcus_.size(); }

@@ -47,14 +47,14 @@ class Line {
   // Returns the end of the last one. Precondition: at_ns is not before the last byte taken.
   TimeNs send(std::size_t talker, std::span<const std::uint8_t> bytes, TimeNs at_ns);
 
-  // The talker falls silent at now_ns: the byte on the line is broken off (and so corrupted), those
+  // The talker falls silent at now_ns: the byte on the bus is broken off (and so corrupted), those
   // behind it are dropped.
   void silence(std::size_t talker, TimeNs now_ns);
 
   // End of the byte that ends next, kNever if there is none. O(1).
   TimeNs next_end_ns() const { return next_end_ns_; }
 
-  // Takes that byte off the line. Of bytes that end together, that of the lower talker comes first.
+  // Takes that byte off the bus. Of bytes that end together, that of the lower talker comes first.
   // Precondition: there is one. O(talkers).
   LineByte take();
 

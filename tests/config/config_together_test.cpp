@@ -56,7 +56,7 @@ TEST(ConfigTogether, LineThatCannotCarryItsTicksIsRefusedWithLoadAndRemedy) {
   EXPECT_EQ(config.error().line, 5);
   EXPECT_EQ(config.error().key, "bus[0].tick_us");
   EXPECT_THAT(config.error().message,
-              HasSubstr("% of the line at 230400 baud; allowed: 85 %. Use baud = "));
+              HasSubstr("% of the bus at 230400 baud; allowed: 85 %. Use baud = "));
   EXPECT_THAT(config.error().message, HasSubstr("or more, or tick_us = "));
 }
 

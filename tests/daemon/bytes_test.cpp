@@ -1,4 +1,4 @@
-// Bytes on the line for each step of a move, by the way it is sent: what the daemon's core hands
+// Bytes on the bus for each step of a move, by the way it is sent: what the daemon's core hands
 // over for it, the delimiters that take the line included, polls and SYNCs not. The shipped table
 // bushd2-constant, ticks of 2.56 ms, one motor on a line that loses nothing.
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The same lab with trouble on the line: what is lost is repaired, what cannot be repaired is told,
+// The same lab with trouble on the bus: what is lost is repaired, what cannot be repaired is told,
 // and no step goes unaccounted for.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

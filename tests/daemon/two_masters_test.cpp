@@ -62,7 +62,7 @@ TEST(TwoMasters, WhatTheOtherOneHasChangedIsSetUpAgain) {
     other.sync(78);
     other.forget_tables();
     lab.run_for(0.2);
-    ASSERT_EQ(lab.state_of("hall:1").detail, "another master talks on the line");
+    ASSERT_EQ(lab.state_of("hall:1").detail, "another master talks on the bus");
     ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:1").detail.empty(); }, 10));
     ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
     EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {500})).result, "reached");

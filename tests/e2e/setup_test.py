@@ -87,8 +87,8 @@ class Doctor(EndToEndTest):
         found = self.doctor()
         bad = self.bad(found)
         # A busy machine may hear answers late, which says nothing of the lab.
-        if "answers come" in bad.get("line", {"seen": ""})["seen"]:
-            del bad["line"]
+        if "answers come" in bad.get("bus", {"seen": ""})["seen"]:
+            del bad["bus"]
         self.assertEqual(bad, {})
         seen = {finding["check"]: finding["seen"] for finding in found}
         self.assertIn("8 motors on 2 MCUs and 1 bus", seen["configuration"])
@@ -130,10 +130,10 @@ class Doctor(EndToEndTest):
         config.write_text(good)
         self.bushsim.end()
         self.wait_until("the port to be gone", lambda: not self.file("port").exists())
-        self.wait_until("the health to tell it", lambda: "line" in self.bad(self.doctor()))
+        self.wait_until("the health to tell it", lambda: "bus" in self.bad(self.doctor()))
         found = self.bad(self.doctor())
         self.assertIn("is not there", found["port"]["seen"])
-        self.assertIn("the port is not open", found["line"]["seen"])
+        self.assertIn("the port is not open", found["bus"]["seen"])
         self.assertIn("is offline", found["mcu"]["seen"])
 
     def test_another_program_on_the_port(self):

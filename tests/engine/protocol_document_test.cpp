@@ -1,6 +1,6 @@
 // docs/protocol.md is normative, so what it prints in hexadecimal must be what the code does. In
 // its blocks marked `frame` and `exchange` lines begin with
-// - wire HEX: a frame on the line
+// - wire HEX: a frame on the bus
 // - raw HEX: the same without COBS and delimiter
 // - master HEX: sent to an MCU
 // - mcu HEX: which must answer just that, at once or

@@ -1,4 +1,4 @@
-// What each MCU hears on the line, read by another pair of ears than its firmware's: of the frames
+// What each MCU hears on the bus, read by another pair of ears than its firmware's: of the frames
 // that mean something to all motors or clocks at once, or make it report.
 #pragma once
 

@@ -47,7 +47,7 @@ class Witness {
 
   void daemon_ends(TimeNs now_ns);     // it has been asked to, and begins nothing any more
   void daemon_started(TimeNs now_ns);  // what clients had asked of the one before is void
-  // A second daemon talks on the line: it may take MCUs over, and with them what they move.
+  // A second daemon talks on the bus: it may take MCUs over, and with them what they move.
   void second_daemon(TimeNs now_ns) {
     second_ns_ = now_ns;
     beginnings_.other_daemon();

@@ -96,7 +96,7 @@ class Rig {
   // A reset by a port that keeps what it may.
   void restart_with_nvm();
   void feed(std::span<const std::uint8_t> bytes);
-  // A frame on the line, without looking at what comes back.
+  // A frame on the bus, without looking at what comes back.
   void frame(std::uint8_t address, std::uint8_t type, const Bytes& payload);
   void frame(std::uint8_t type, const Bytes& payload) { frame(options_.address, type, payload); }
   // The only answer since the last call, if any.

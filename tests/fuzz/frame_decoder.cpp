@@ -76,7 +76,7 @@ class Line {
     BUSHD_REQUIRE(frame.sequence == expected.raw[2]);
     BUSHD_REQUIRE(frame.payload_size == expected.size - BUSHD_FRAME_HEADER - BUSHD_FRAME_CRC);
     BUSHD_REQUIRE(std::memcmp(frame.payload, &expected.raw[3], frame.payload_size) == 0);
-    // There is one way only to put a frame on the line.
+    // There is one way only to put a frame on the bus.
     std::array<std::uint8_t, BUSHD_FRAME_MAX_WIRE> wire;
     const std::size_t wire_size = bushd_frame_encode(
         frame.address, frame.type, frame.sequence, frame.payload, frame.payload_size, wire.data());

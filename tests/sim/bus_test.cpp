@@ -100,7 +100,7 @@ TEST_F(TwoMcus, TwoTalkersAtOnceCollideAndAreReported) {
   bus.on_collision = [&](TimeNs, std::uint8_t first, std::uint8_t second) {
     collisions.push_back({first, second});
   };
-  // Two requests without a pause: the second is on the line while the first is being answered.
+  // Two requests without a pause: the second is on the bus while the first is being answered.
   Bytes both = FrameMaster::wire(1, BUSHD_MSG_TABLES, 1, {});
   const Bytes second = FrameMaster::wire(2, BUSHD_MSG_TABLES, 2, {});
   both.insert(both.end(), second.begin(), second.end());

@@ -1,12 +1,12 @@
-// Who is on a line, whatever their addresses.
+// Who is on a bus, whatever their addresses.
 #pragma once
 
 #include <chrono>
 #include <vector>
 
 #include "base/result.h"
-#include "bus_line.h"
-#include "line_report.h"
+#include "raw_bus.h"
+#include "raw_bus_report.h"
 
 namespace bushctl {
 
@@ -14,6 +14,6 @@ namespace bushctl {
 inline constexpr std::chrono::microseconds kAnswerPatience{60'000};
 
 // Asks in rounds, until several in a row have found nothing new.
-bushd::Result<std::vector<Found>> find_all(BusLine& line);
+bushd::Result<std::vector<Found>> find_all(RawBus& line);
 
 }  // namespace bushctl

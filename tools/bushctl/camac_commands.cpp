@@ -240,7 +240,7 @@ int load(Client& client, const CamacOptions& options, int station, int page,
   return kFailed;
 }
 
-int run_camac(const CommandLine& line, const CamacOptions& options) {
+int run_camac(const CommandLine& commands, const CamacOptions& options) {
   const auto& words = options.words;
   const bool loads = words.front() == "load" && words.size() == 4;
   const bool dumps = words.front() == "dump" && words.size() == 2;
@@ -257,7 +257,7 @@ int run_camac(const CommandLine& line, const CamacOptions& options) {
   const auto numbers = numbers_of(given, most);
   if (!numbers) return wrong_usage(numbers.error());
   const std::vector<int>& n = *numbers;
-  return with_client(line.connection(), [&](Client& client) {
+  return with_client(commands.connection(), [&](Client& client) {
     if (loads) return load(client, options, n[0], n[1], words[3]);
     if (dumps) return dump(client, options, n[0]);
     const auto data = static_cast<std::uint32_t>(n.size() > 3 ? n[3] : 0);
@@ -267,9 +267,9 @@ int run_camac(const CommandLine& line, const CamacOptions& options) {
 
 }  // namespace
 
-void add_camac_commands(CommandLine& line) {
+void add_camac_commands(CommandLine& commands) {
   const auto options = std::make_shared<CamacOptions>();
-  line.add("camac", "Make a cycle of a CAMAC crate, or read and write a module's memory")
+  commands.add("camac", "Make a cycle of a CAMAC crate, or read and write a module's memory")
       .footer(
           "bushctl camac N A F [DATA]               one cycle; numbers are decimal, or "
           "hexadecimal\n"
@@ -287,7 +287,7 @@ void add_camac_commands(CommandLine& line) {
       .number("--f-start", &options->f_start_hz, 1u, 100u, "f_start_hz of the module, for --page")
       .number("--steps", &options->steps, 0u, 65535u, "Number of steps to load; 0: as it is")
       .flag("--json", &options->json, "Print JSON")
-      .run([&line, options] { return run_camac(line, *options); });
+      .run([&commands, options] { return run_camac(commands, *options); });
 }
 
 }  // namespace bushctl

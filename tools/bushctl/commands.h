@@ -19,33 +19,33 @@ enum Exit : int {
 };
 
 // status, where, watch, health
-void add_view_commands(CommandLine& line);
+void add_view_commands(CommandLine& commands);
 // move, arm, disarm, stop, estop, home, set, compare
-void add_motion_commands(CommandLine& line);
+void add_motion_commands(CommandLine& commands);
 // follow
-void add_follow_command(CommandLine& line);
+void add_follow_command(CommandLine& commands);
 // enable, disable, clear
-void add_driver_commands(CommandLine& line);
+void add_driver_commands(CommandLine& commands);
 // confirm, history
-void add_history_commands(CommandLine& line);
+void add_history_commands(CommandLine& commands);
 // path
-void add_path_commands(CommandLine& line);
+void add_path_commands(CommandLine& commands);
 // jog
-void add_jog_commands(CommandLine& line);
+void add_jog_commands(CommandLine& commands);
 // pause, resume, hold, release
-void add_pause_commands(CommandLine& line);
+void add_pause_commands(CommandLine& commands);
 // config
-void add_config_commands(CommandLine& line);
+void add_config_commands(CommandLine& commands);
 // table list, show, use, reload
-void add_table_commands(CommandLine& line);
+void add_table_commands(CommandLine& commands);
 // camac
-void add_camac_commands(CommandLine& line);
+void add_camac_commands(CommandLine& commands);
 // latency-test, scan, address: on a line that no daemon has
-void add_line_commands(CommandLine& line);
+void add_raw_bus_commands(CommandLine& commands);
 // setup
-void add_setup_command(CommandLine& line);
+void add_setup_command(CommandLine& commands);
 // doctor
-void add_doctor_command(CommandLine& line);
+void add_doctor_command(CommandLine& commands);
 
 // Where the service has its configuration.
 inline constexpr const char* kSystemConfig = "/etc/bushd/bushd.toml";
@@ -56,7 +56,7 @@ inline constexpr const char* kMotorsOrAll =
     "Motors; 'slit*' and @GROUP stand for several (default: all)";
 
 // What may follow these words (base/completion.h), with names that the daemon knows.
-int complete(CommandLine& line, const std::vector<std::string>& words);
+int complete(CommandLine& commands, const std::vector<std::string>& words);
 
 // Runs the action with a client that SIGINT and SIGTERM interrupt; without a daemon it says so.
 int with_client(const Connection& connection,

@@ -63,9 +63,10 @@ std::set<std::string> keys() {
 
 }  // namespace
 
-int complete(CommandLine& line, const std::vector<std::string>& words) {
-  bushd::Completion completion = line.complete(words);
-  const auto names = wants_keys(words) ? keys() : known_names(line.connection(), completion.value);
+int complete(CommandLine& commands, const std::vector<std::string>& words) {
+  bushd::Completion completion = commands.complete(words);
+  const auto names =
+      wants_keys(words) ? keys() : known_names(commands.connection(), completion.value);
   completion.value.clear();
   bushd::print_completion(completion, words.back(), {names.begin(), names.end()});
   return kDone;

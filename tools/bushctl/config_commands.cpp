@@ -83,9 +83,9 @@ int run(Client& client, const api::Configure& request, const ConfigOptions& opti
 
 }  // namespace
 
-void add_config_commands(CommandLine& line) {
+void add_config_commands(CommandLine& commands) {
   const auto options = std::make_shared<ConfigOptions>();
-  line.add("config", "Change settings of motors in operation")
+  commands.add("config", "Change settings of motors in operation")
       .footer(
           "bushctl config [NAME]                what they are, and what bushd.toml says\n"
           "bushctl config NAME KEY=VALUE...     changes them, at rest: offset=12.5, "
@@ -109,10 +109,10 @@ void add_config_commands(CommandLine& line) {
       .flag("--diff", &options->diff, "Show only what differs from bushd.toml")
       .flag("--save", &options->save, "Write what differs into bushd.toml")
       .flag("--json", &options->json, "Print JSON")
-      .run([&line, options] {
+      .run([&commands, options] {
         const auto request = parse_settings(options->words);
         if (!request) return wrong_usage(request.error());
-        return with_client(line.connection(),
+        return with_client(commands.connection(),
                            [&](Client& client) { return run(client, *request, *options); });
       });
 }

@@ -9,14 +9,14 @@
 
 namespace bushctl {
 
-void add_doctor_command(CommandLine& line) {
+void add_doctor_command(CommandLine& commands) {
   struct Options {
     std::string config;
     double watch_s = 2;
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("doctor", "Look for what goes wrong in labs, and say the remedies")
+  commands.add("doctor", "Look for what goes wrong in labs, and say the remedies")
       .footer(
           "Changes nothing, and works without a daemon. As root it also sees which programs of "
           "other users have a port open.\n"
@@ -25,10 +25,10 @@ void add_doctor_command(CommandLine& line) {
             "Configuration to examine (default: that of the daemon that runs, else that of the "
             "service)")
       .number<double>("--watch-s", &options->watch_s, 0.0, 3600.0,
-                      "How long errors on the lines are counted")
+                      "How long errors on the buses are counted")
       .flag("--json", &options->json, "Print JSON")
-      .run([&line, options] {
-        auto client = line.connection().options();
+      .run([&commands, options] {
+        auto client = commands.connection().options();
         client.interrupt_fd = signal_descriptor();
         const auto findings = doctor::diagnose(doctor::observe({.config_path = options->config,
                                                                 .client = std::move(client),

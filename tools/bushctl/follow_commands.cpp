@@ -115,9 +115,9 @@ int follow(Client& client, const FollowOptions& options, const bushd::csv::Numbe
 
 }  // namespace
 
-void add_follow_command(CommandLine& line) {
+void add_follow_command(CommandLine& commands) {
   const auto options = std::make_shared<FollowOptions>();
-  line.add("follow", "Let motors follow a file of times and positions")
+  commands.add("follow", "Let motors follow a file of times and positions")
       .footer(
           "FILE has a line 'time_s, NAME, ...' and rows of numbers: seconds, and positions in the "
           "motors' units. All motors are on one bus, and stand at the first row. All of it is "
@@ -132,7 +132,7 @@ void add_follow_command(CommandLine& line) {
       .flag("--wait", &options->wait, "Wait for the result")
       .flag("--dry-run", &options->dry_run, "Only check it, and say how long it takes")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
-      .run([&line, options] {
+      .run([&commands, options] {
         const auto stretch = parse_stretch(options->stretch);
         if (!stretch) return wrong_usage(stretch.error());
         const auto rows = read_rows(options->file);
@@ -143,7 +143,7 @@ void add_follow_command(CommandLine& line) {
         for (std::size_t m = 1; m < rows->columns.size(); ++m) {
           common.motors.push_back(rows->columns[m].name);
         }
-        return with_client(line.connection(),
+        return with_client(commands.connection(),
                            [&](Client& client) { return follow(client, *options, *rows, common); });
       });
 }

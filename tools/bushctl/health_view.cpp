@@ -38,7 +38,7 @@ std::vector<std::string> bus_lines(const Healths& health) {
               fmt::to_string(bus.stray_frames),
               fmt::format("{:.1f}", static_cast<double>(bus.recent_latency_us) / 1000),
               bushd::printable(bus.port_state) +
-                  (bus.two_masters ? "; another master talks on the line" : "")});
+                  (bus.two_masters ? "; another master talks on the bus" : "")});
   }
   return grid.lines();
 }

@@ -20,15 +20,16 @@ using nlohmann::ordered_json;
 
 constexpr std::uint32_t kMostPast = 1000;
 
-void add_confirm(CommandLine& line) {
+void add_confirm(CommandLine& commands) {
   const auto motors = std::make_shared<api::MotorNames>();
-  line.add("confirm", "Confirm that motors stand where they are shown")
+  commands.add("confirm", "Confirm that motors stand where they are shown")
       .footer(
           "Positions that are restored or uncertain ('bushctl where') are known then, and nothing "
           "moves. Where a motor stands elsewhere, use 'set' or 'home'.")
       .words("NAME", motors.get(), kMotors, Command::Needed::kYes)
-      .run([&line, motors] {
-        return send(line.connection(), api::Confirm{*motors}, Client::Until::kResult, Hope::kDone);
+      .run([&commands, motors] {
+        return send(commands.connection(), api::Confirm{*motors}, Client::Until::kResult,
+                    Hope::kDone);
       });
 }
 
@@ -91,26 +92,26 @@ int show_history(Client& client, const HistoryOptions& options) {
   return kDone;
 }
 
-void add_history(CommandLine& line) {
+void add_history(CommandLine& commands) {
   const auto options = std::make_shared<HistoryOptions>();
-  line.add("history", "Show what has moved a motor, the newest first")
+  commands.add("history", "Show what has moved a motor, the newest first")
       .footer(
           "Positions are in the motor's unit, as it was then; STEPS is where it stood in the end. "
           "Needs a state store ([state] in bushd.toml).")
       .option("NAME", &options->motor, "Motor")
       .number("--most", &options->most, 1u, kMostPast, "How many lines")
       .flag("--json", &options->json, "Print JSON")
-      .run([&line, options] {
-        return with_client(line.connection(),
+      .run([&commands, options] {
+        return with_client(commands.connection(),
                            [&](Client& client) { return show_history(client, *options); });
       });
 }
 
 }  // namespace
 
-void add_history_commands(CommandLine& line) {
-  add_confirm(line);
-  add_history(line);
+void add_history_commands(CommandLine& commands) {
+  add_confirm(commands);
+  add_history(commands);
 }
 
 }  // namespace bushctl

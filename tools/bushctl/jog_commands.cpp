@@ -108,9 +108,9 @@ int run(const Connection& connection, JogOptions options) {
 
 }  // namespace
 
-void add_jog_commands(CommandLine& line) {
+void add_jog_commands(CommandLine& commands) {
   const auto options = std::make_shared<JogOptions>();
-  line.add("jog", "Let a motor move on at a speed, until Ctrl-C")
+  commands.add("jog", "Let a motor move on at a speed, until Ctrl-C")
       .footer(
           "bushctl jog NAME SPEED    at this speed in the motor's unit per second, negative: the "
           "other way, 0: end the jog of whoever jogs it\n"
@@ -128,7 +128,7 @@ void add_jog_commands(CommandLine& line) {
                             "End so many steps after the stop event")
       .number<std::uint32_t>("--keepalive-ms", &options->keepalive_ms, 50, 10'000,
                              "Ramped down when nothing is heard of this program for so long")
-      .run([&line, options] { return run(line.connection(), *options); });
+      .run([&commands, options] { return run(commands.connection(), *options); });
 }
 
 }  // namespace bushctl

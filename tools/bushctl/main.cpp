@@ -10,25 +10,25 @@
 int main(int argc, char** argv) {
   bushd::expect_closed_output();
   try {
-    bushctl::CommandLine line(BUSHD_VERSION);
-    bushctl::add_view_commands(line);
-    bushctl::add_motion_commands(line);
-    bushctl::add_path_commands(line);
-    bushctl::add_follow_command(line);
-    bushctl::add_jog_commands(line);
-    bushctl::add_pause_commands(line);
-    bushctl::add_driver_commands(line);
-    bushctl::add_history_commands(line);
-    bushctl::add_config_commands(line);
-    bushctl::add_table_commands(line);
-    bushctl::add_camac_commands(line);
-    bushctl::add_line_commands(line);
-    bushctl::add_setup_command(line);
-    bushctl::add_doctor_command(line);
+    bushctl::CommandLine commands(BUSHD_VERSION);
+    bushctl::add_view_commands(commands);
+    bushctl::add_motion_commands(commands);
+    bushctl::add_path_commands(commands);
+    bushctl::add_follow_command(commands);
+    bushctl::add_jog_commands(commands);
+    bushctl::add_pause_commands(commands);
+    bushctl::add_driver_commands(commands);
+    bushctl::add_history_commands(commands);
+    bushctl::add_config_commands(commands);
+    bushctl::add_table_commands(commands);
+    bushctl::add_camac_commands(commands);
+    bushctl::add_raw_bus_commands(commands);
+    bushctl::add_setup_command(commands);
+    bushctl::add_doctor_command(commands);
     if (const auto words = bushd::completion_asked(argc, argv)) {
-      return bushd::finished_output(bushctl::complete(line, *words));
+      return bushd::finished_output(bushctl::complete(commands, *words));
     }
-    return bushd::finished_output(line.run(argc, argv));
+    return bushd::finished_output(commands.run(argc, argv));
   } catch (const std::exception& error) {
     fmt::print(stderr, "bushctl: {}\n", error.what());
     return bushctl::kFailed;

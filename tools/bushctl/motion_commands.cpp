@@ -45,7 +45,7 @@ int show_plan(const Connection& connection, Move move, bool as_json) {
   });
 }
 
-void add_move(CommandLine& line) {
+void add_move(CommandLine& commands) {
   struct Options {
     bool wait = false;
     bool steps = false;
@@ -57,14 +57,14 @@ void add_move(CommandLine& line) {
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
-  const auto carry_out = [&line, options](auto move) {
+  const auto carry_out = [&commands, options](auto move) {
     const auto speed = parse_speed(options->speed, numbers(options->steps));
     if (!speed) return wrong_usage(speed.error());
     move.speed = *speed;
-    if (options->dry_run) return show_plan(line.connection(), move, options->json);
-    return send(line.connection(), move, until(options->wait), Hope::kReached);
+    if (options->dry_run) return show_plan(commands.connection(), move, options->json);
+    return send(commands.connection(), move, until(options->wait), Hope::kReached);
   };
-  line.add("move", "Move motors; those on one bus start in the same tick")
+  commands.add("move", "Move motors; those on one bus start in the same tick")
       .footer(
           "bushctl move [--wait] NAME DISTANCE [NAME DISTANCE...]            by these distances\n"
           "bushctl move [--wait] NAME --to POSITION [NAME --to POSITION...]  to these positions\n"
@@ -89,7 +89,7 @@ void add_move(CommandLine& line) {
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
       .raw_words(&options->words, "NAME DISTANCE|NAME --to POSITION...")
-      .run([&line, carry_out, options] {
+      .run([&commands, carry_out, options] {
         const Numbers as = numbers(options->steps);
         const auto profile = parse_speed_profile(options->words, as, options->speed);
         if (!profile) return wrong_usage(profile.error());
@@ -97,10 +97,10 @@ void add_move(CommandLine& line) {
           return wrong_usage(bushd::Error{"--speed-at is for one motor, --line for several"});
         }
         if (!profile->empty() && options->dry_run) {
-          return show_plan(line.connection(), *profile, options->json, {});
+          return show_plan(commands.connection(), *profile, options->json, {});
         }
         if (!profile->empty()) {
-          return send_parts(line.connection(), *profile, until(options->wait), {});
+          return send_parts(commands.connection(), *profile, until(options->wait), {});
         }
         if (options->line) {
           auto move = parse_move_line(options->words, as, options->duration);
@@ -111,7 +111,7 @@ void add_move(CommandLine& line) {
       });
 }
 
-void add_arm(CommandLine& line) {
+void add_arm(CommandLine& commands) {
   struct Options {
     std::string edge = "rising";
     std::int64_t delay_us = 0;
@@ -124,7 +124,7 @@ void add_arm(CommandLine& line) {
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
-  const auto carry_out = [&line, options](auto arm) {
+  const auto carry_out = [&commands, options](auto arm) {
     if (!arm) return wrong_usage(arm.error());
     const auto speed = parse_speed(options->speed, numbers(options->steps));
     if (!speed) return wrong_usage(speed.error());
@@ -132,9 +132,9 @@ void add_arm(CommandLine& line) {
     arm->while_connected = options->while_connected;
     // Whose end disarms them has to stay.
     const bool waits = options->wait || options->while_connected;
-    return send(line.connection(), *arm, until(waits), Hope::kReached);
+    return send(commands.connection(), *arm, until(waits), Hope::kReached);
   };
-  line.add("arm", "Let moves wait for the trigger of their MCU")
+  commands.add("arm", "Let moves wait for the trigger of their MCU")
       .footer(
           "bushctl arm --delay-us US NAME DISTANCE [NAME DISTANCE...]\n"
           "bushctl arm --delay-us US --line NAME DISTANCE [NAME DISTANCE...], or NAME --to "
@@ -170,17 +170,18 @@ void add_arm(CommandLine& line) {
       });
 }
 
-void add_disarm(CommandLine& line) {
+void add_disarm(CommandLine& commands) {
   const auto motors = std::make_shared<api::MotorNames>();
-  line.add("disarm", "Cancel moves that wait for the trigger")
+  commands.add("disarm", "Cancel moves that wait for the trigger")
       .footer("What waits for the same trigger, or was armed together, is disarmed together.")
       .words("NAME", motors.get(), kMotorsOrAll, Command::Needed::kNo)
-      .run([&line, motors] {
-        return send(line.connection(), api::Disarm{*motors}, Client::Until::kResult, Hope::kDone);
+      .run([&commands, motors] {
+        return send(commands.connection(), api::Disarm{*motors}, Client::Until::kResult,
+                    Hope::kDone);
       });
 }
 
-void add_compare(CommandLine& line) {
+void add_compare(CommandLine& commands) {
   struct Options {
     std::string motor;
     std::string position;
@@ -188,7 +189,7 @@ void add_compare(CommandLine& line) {
     Pulse pulse;
   };
   const auto options = std::make_shared<Options>();
-  line.add("compare", "Make a pulse when a motor arrives at a position")
+  commands.add("compare", "Make a pulse when a motor arrives at a position")
       .option("NAME", &options->motor, "The motor; its MCU's position compare output pulses")
       .option("POSITION", &options->position, "Position in the motor's unit, or off")
       .flag("--steps", &options->steps, kSteps)
@@ -198,42 +199,42 @@ void add_compare(CommandLine& line) {
                             "Width of the pulse, at least a slot")
       .choice("--direction", &options->pulse.direction, {"both", "positive", "negative"},
               "Direction of arrival")
-      .run([&line, options] {
+      .run([&commands, options] {
         const auto request = parse_position_compare(options->motor, options->position,
                                                     numbers(options->steps), options->pulse);
         if (!request) return wrong_usage(request.error());
-        return send(line.connection(), *request, Client::Until::kResult, Hope::kDone);
+        return send(commands.connection(), *request, Client::Until::kResult, Hope::kDone);
       });
 }
 
-void add_stop(CommandLine& line) {
+void add_stop(CommandLine& commands) {
   struct Options {
     api::MotorNames motors;
     bool wait = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("stop", "Ramp motors down")
+  commands.add("stop", "Ramp motors down")
       .words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .flag("--wait", &options->wait, "Wait until the motors stand")
-      .run([&line, options] {
-        return send(line.connection(), api::Stop{options->motors}, until(options->wait),
+      .run([&commands, options] {
+        return send(commands.connection(), api::Stop{options->motors}, until(options->wait),
                     Hope::kDone);
       });
 }
 
-void add_estop(CommandLine& line) {
-  line.add("estop", "Stop all motors of all buses at once, until 'clear'")
+void add_estop(CommandLine& commands) {
+  commands.add("estop", "Stop all motors of all buses at once, until 'clear'")
       .footer(
           "The exit code is 0 only if all MCUs have confirmed it and stand. One that cannot be "
           "reached "
           "is named, and stopped as soon as it comes.")
-      .run([&line] {
-        return send(line.connection(), api::EmergencyStop{}, Client::Until::kResult,
+      .run([&commands] {
+        return send(commands.connection(), api::EmergencyStop{}, Client::Until::kResult,
                     Hope::kDoneEverywhere);
       });
 }
 
-void add_home(CommandLine& line) {
+void add_home(CommandLine& commands) {
   struct Options {
     api::MotorNames motors;
     std::string speed;
@@ -242,7 +243,7 @@ void add_home(CommandLine& line) {
     bool wait = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("home", "Home motors at their switches")
+  commands.add("home", "Home motors at their switches")
       .footer(
           "As the configuration's 'home' says. Those of one MCU are homed one after the other; "
           "with --all those of one 'order' are homed together, the lowest first, and one that is "
@@ -254,18 +255,18 @@ void add_home(CommandLine& line) {
       .option("--speed", &options->speed, kSpeed)
       .flag("--steps", &options->steps, "--speed is in steps per second")
       .flag("--wait", &options->wait, "Wait for the result")
-      .run([&line, options] {
+      .run([&commands, options] {
         const auto speed = parse_speed(options->speed, numbers(options->steps));
         if (!speed) return wrong_usage(speed.error());
         if (options->all != options->motors.empty()) {
           return wrong_usage(bushd::Error{.message = "home: name the motors, or use --all"});
         }
-        return send(line.connection(), api::Home{options->motors, *speed, options->all},
+        return send(commands.connection(), api::Home{options->motors, *speed, options->all},
                     until(options->wait), Hope::kReached);
       });
 }
 
-void add_set(CommandLine& line) {
+void add_set(CommandLine& commands) {
   struct Options {
     std::string motor;
     std::string position;
@@ -273,7 +274,7 @@ void add_set(CommandLine& line) {
     bool dial = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("set", "Say where a motor stands, without moving it")
+  commands.add("set", "Say where a motor stands, without moving it")
       .footer(
           "Of a motor with a unit, POSITION is its user position from now on: the offset changes. "
           "With --dial or --steps, and of a motor without a unit, the position itself is set, and "
@@ -282,26 +283,26 @@ void add_set(CommandLine& line) {
       .option("POSITION", &options->position, "New position")
       .flag("--dial", &options->dial, "POSITION is the dial's")
       .flag("--steps", &options->steps, kSteps)
-      .run([&line, options] {
+      .run([&commands, options] {
         const auto request =
             parse_set(options->motor, options->position, numbers(options->steps), options->dial);
         if (!request) return wrong_usage(request.error());
         // Over in a moment, and only the result tells whether the MCU did it.
-        return send(line.connection(), *request, Client::Until::kResult, Hope::kDone);
+        return send(commands.connection(), *request, Client::Until::kResult, Hope::kDone);
       });
 }
 
 }  // namespace
 
-void add_motion_commands(CommandLine& line) {
-  add_move(line);
-  add_arm(line);
-  add_disarm(line);
-  add_compare(line);
-  add_stop(line);
-  add_estop(line);
-  add_home(line);
-  add_set(line);
+void add_motion_commands(CommandLine& commands) {
+  add_move(commands);
+  add_arm(commands);
+  add_disarm(commands);
+  add_compare(commands);
+  add_stop(commands);
+  add_estop(commands);
+  add_home(commands);
+  add_set(commands);
 }
 
 }  // namespace bushctl

@@ -67,23 +67,23 @@ Command& describe(Command& command, const std::shared_ptr<PathOptions>& options)
 
 }  // namespace
 
-void add_path_commands(CommandLine& line) {
-  line.add_group("path", "Move motors along a path of points");
+void add_path_commands(CommandLine& commands) {
+  commands.add_group("path", "Move motors along a path of points");
   const auto checked = std::make_shared<PathOptions>();
-  Command check_command = line.add(
+  Command check_command = commands.add(
       "check",
       "Say how long a path takes, with --json also when each point is reached; moves nothing",
       "path");
   describe(check_command, checked)
       .flag("--json", &checked->json, "Print JSON")
-      .run([&line, checked] { return check(line.connection(), *checked); });
+      .run([&commands, checked] { return check(commands.connection(), *checked); });
   const auto made = std::make_shared<PathOptions>();
-  Command run_command = line.add("run", "Move along a path", "path");
+  Command run_command = commands.add("run", "Move along a path", "path");
   describe(run_command, made)
       .flag("--wait", &made->wait, "Wait for the result")
       .flag("--dry-run", &made->dry_run, "As 'path check'")
       .flag_with("--dry-run", "--json", &made->json, "With --dry-run: print JSON")
-      .run([&line, made] { return run(line.connection(), *made); });
+      .run([&commands, made] { return run(commands.connection(), *made); });
 }
 
 }  // namespace bushctl

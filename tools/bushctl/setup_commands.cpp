@@ -14,7 +14,7 @@
 #include "bus_scan.h"
 #include "commands.h"
 #include "config/config.h"
-#include "line_commands.h"
+#include "raw_bus_commands.h"
 #include "setup_text.h"
 #include "tables/store/atomic_file.h"
 
@@ -44,9 +44,9 @@ void say(const std::string& text) {
 // On this port, at the first of these rates at which somebody answers.
 Result<FoundBus> find_on(const std::string& port, std::span<const std::uint32_t> bauds) {
   for (const std::uint32_t baud : bauds) {
-    auto line = BusLine::open(port, baud);
-    if (!line) return fail(line.error());
-    auto mcus = find_all(*line);
+    auto bus = RawBus::open(port, baud);
+    if (!bus) return fail(bus.error());
+    auto mcus = find_all(*bus);
     if (!mcus) return fail(mcus.error());
     if (!mcus->empty()) return FoundBus{.port = port, .baud = baud, .mcus = std::move(*mcus)};
   }
@@ -121,9 +121,9 @@ int set_up(const SetupOptions& options) {
 
 }  // namespace
 
-void add_setup_command(CommandLine& line) {
+void add_setup_command(CommandLine& commands) {
   const auto options = std::make_shared<SetupOptions>();
-  line.add_local("setup", "Find MCUs on serial ports, and write a configuration to begin with")
+  commands.add_local("setup", "Find MCUs on serial ports, and write a configuration to begin with")
       .footer(
           "Without PORT all serial adapters are asked: a few bytes go out on each. The daemon must "
           "not use them at the same time.")

@@ -184,7 +184,7 @@ std::vector<std::string> nothing_found_lines(const std::vector<std::string>& por
         "built-in port is named: bushctl setup /dev/ttyS0");
   } else {
     out.emplace_back(
-        "no MCU was found: look at its power, at A and B of the line, at the 120 ohm at both ends "
+        "no MCU was found: look at its power, at A and B of the bus, at the 120 ohm at both ends "
         "and, with --baud, at its baud rate");
   }
   out.emplace_back(

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "line_report.h"
+#include "raw_bus_report.h"
 
 namespace bushctl {
 

@@ -153,62 +153,64 @@ int show_table(Client& client, const std::string& wanted, bool as_json) {
   return kDone;
 }
 
-void add_list(CommandLine& line) {
+void add_list(CommandLine& commands) {
   const auto json = std::make_shared<bool>(false);
-  line.add("list", "List the tables, and the table of each group", "table")
+  commands.add("list", "List the tables, and the table of each group", "table")
       .flag("--json", json.get(), "Print JSON")
-      .run([&line, json] {
-        return with_client(line.connection(),
+      .run([&commands, json] {
+        return with_client(commands.connection(),
                            [&](Client& client) { return list_tables(client, *json); });
       });
 }
 
-void add_show(CommandLine& line) {
+void add_show(CommandLine& commands) {
   struct Options {
     std::string table;
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  line.add("show", "Show a table", "table")
+  commands.add("show", "Show a table", "table")
       .option("TABLE", &options->table, "NAME, NAME@REVISION or NAME@TAG")
       .flag("--json", &options->json, "Print JSON")
-      .run([&line, options] {
-        return with_client(line.connection(), [&](Client& client) {
+      .run([&commands, options] {
+        return with_client(commands.connection(), [&](Client& client) {
           return show_table(client, options->table, options->json);
         });
       });
 }
 
-void add_use(CommandLine& line) {
+void add_use(CommandLine& commands) {
   const auto request = std::make_shared<api::UseTable>();
-  line.add("use", "Give a group another table", "table")
+  commands.add("use", "Give a group another table", "table")
       .footer(
           "TABLE is NAME, NAME@REVISION or NAME@TAG, as for bushtab. Motors that move keep their "
           "table; once those of the group's MCUs stand, the MCUs get the new one, and the next "
           "move is by it. It stays in service when the daemon is started again.")
       .option("GROUP", &request->group, "The group")
       .option("TABLE", &request->table, "Table of the group from the next move on")
-      .run([&line, request] {
-        return send(line.connection(), *request, Client::Until::kResult, Hope::kDone);
+      .run([&commands, request] {
+        return send(commands.connection(), *request, Client::Until::kResult, Hope::kDone);
       });
 }
 
-void add_reload(CommandLine& line) {
-  line.add("reload",
+void add_reload(CommandLine& commands) {
+  commands
+      .add("reload",
            "Reload the tables of all groups; an invalid one leaves the old one in service", "table")
-      .run([&line] {
-        return send(line.connection(), api::ReloadTables{}, Client::Until::kResult, Hope::kDone);
+      .run([&commands] {
+        return send(commands.connection(), api::ReloadTables{}, Client::Until::kResult,
+                    Hope::kDone);
       });
 }
 
 }  // namespace
 
-void add_table_commands(CommandLine& line) {
-  line.add_group("table", "Show and change which table each group moves by");
-  add_list(line);
-  add_show(line);
-  add_use(line);
-  add_reload(line);
+void add_table_commands(CommandLine& commands) {
+  commands.add_group("table", "Show and change which table each group moves by");
+  add_list(commands);
+  add_show(commands);
+  add_use(commands);
+  add_reload(commands);
 }
 
 }  // namespace bushctl

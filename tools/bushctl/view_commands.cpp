@@ -106,31 +106,31 @@ int watch_health(const Connection& connection, const HealthOptions& options) {
                                   .close = [&] { screen.reset(); }});
 }
 
-void add_status(CommandLine& line) {
+void add_status(CommandLine& commands) {
   const auto options = std::make_shared<StatusOptions>();
-  Command command = line.add("status", "Show motors and MCUs");
+  Command command = commands.add("status", "Show motors and MCUs");
   command.words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .flag("--json", &options->json, "Print JSON")
       .number("--wait-s", &options->wait_s, 0.01, 3600.0,
               "First wait so long at most until the daemon answers and all MCUs take moves");
-  add_timeout(command, &options->timeout_s).run([&line, options] {
+  add_timeout(command, &options->timeout_s).run([&commands, options] {
     if (options->wait_s > 0) {
-      const int code = wait_until_ready(line.connection(), milliseconds(options->wait_s));
+      const int code = wait_until_ready(commands.connection(), milliseconds(options->wait_s));
       if (code != kDone) return code;
     }
-    return with_client(line.connection(),
+    return with_client(commands.connection(),
                        [&](Client& client) { return show_status(client, *options); });
   });
 }
 
-void add_watch(CommandLine& line) {
+void add_watch(CommandLine& commands) {
   struct Options {
     bushd::api::MotorNames motors;
     std::uint32_t count = 0;
     double timeout_s = 4;
   };
   const auto options = std::make_shared<Options>();
-  Command command = line.add("watch", "Show a live table; in a pipe: lines of what changes");
+  Command command = commands.add("watch", "Show a live table; in a pipe: lines of what changes");
   command
       .footer(
           "Motors that move come first, then those at a limit or at an MCU that does not work, "
@@ -143,23 +143,23 @@ void add_watch(CommandLine& line) {
           "it is there again; in a pipe as long as --timeout-s.")
       .words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .number<std::uint32_t>("--count", &options->count, 1, kMany, "Exit after so many snapshots");
-  add_timeout(command, &options->timeout_s).run([&line, options] {
-    return watch(line.connection(), {.names = options->motors,
-                                     .timeout = milliseconds(options->timeout_s),
-                                     .count = options->count});
+  add_timeout(command, &options->timeout_s).run([&commands, options] {
+    return watch(commands.connection(), {.names = options->motors,
+                                         .timeout = milliseconds(options->timeout_s),
+                                         .count = options->count});
   });
 }
 
-void add_health(CommandLine& line) {
+void add_health(CommandLine& commands) {
   const auto options = std::make_shared<HealthOptions>();
-  Command command = line.add("health", "Show bus and MCU diagnostics");
+  Command command = commands.add("health", "Show bus and MCU diagnostics");
   command.flag("--json", &options->json, "Print JSON")
       .flag("--watch", &options->watch, "Print again every second")
       .number<std::uint32_t>("--count", &options->count, 1, kMany,
                              "With --watch: exit after so many");
-  add_timeout(command, &options->timeout_s).run([&line, options] {
-    if (options->watch) return watch_health(line.connection(), *options);
-    return with_client(line.connection(),
+  add_timeout(command, &options->timeout_s).run([&commands, options] {
+    if (options->watch) return watch_health(commands.connection(), *options);
+    return with_client(commands.connection(),
                        [&](Client& client) { return show_health(client, *options); });
   });
 }
@@ -178,18 +178,18 @@ int show_where(Client& client, const std::vector<std::string>& names,
   return kDone;
 }
 
-void add_where(CommandLine& line) {
+void add_where(CommandLine& commands) {
   struct Options {
     bushd::api::MotorNames motors;
     bool json = false;
     double timeout_s = 4;
   };
   const auto options = std::make_shared<Options>();
-  Command command = line.add("where", "Show where motors stand: user, dial and steps");
+  Command command = commands.add("where", "Show where motors stand: user, dial and steps");
   command.words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .flag("--json", &options->json, "As JSON");
-  add_timeout(command, &options->timeout_s).run([&line, options] {
-    return with_client(line.connection(), [&](Client& client) {
+  add_timeout(command, &options->timeout_s).run([&commands, options] {
+    return with_client(commands.connection(), [&](Client& client) {
       return show_where(client, options->motors, milliseconds(options->timeout_s), options->json);
     });
   });
@@ -197,11 +197,11 @@ void add_where(CommandLine& line) {
 
 }  // namespace
 
-void add_view_commands(CommandLine& line) {
-  add_status(line);
-  add_where(line);
-  add_watch(line);
-  add_health(line);
+void add_view_commands(CommandLine& commands) {
+  add_status(commands);
+  add_where(commands);
+  add_watch(commands);
+  add_health(commands);
 }
 
 }  // namespace bushctl

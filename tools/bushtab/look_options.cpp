@@ -112,7 +112,7 @@ void add_expand(CLI::App& app, const Places& places, const Run& run) {
   CLI::App* expand = app.add_subcommand(
       "expand", "Print a move as CSV tick,displacement: exactly what the daemon would send");
   expand->footer(
-      "Displacements of format coarse are the bytes on the line: bit 7 is 1 if the motor goes\n"
+      "Displacements of format coarse are the bytes on the bus: bit 7 is 1 if the motor goes\n"
       "forward, bits 6..0 count its steps in the tick: 130 is +2, 2 is -2. Those of format fine\n"
       "are signed, in 1/256 step: 512 is +2, -512 is -2.");
   constexpr std::int64_t kMaxSteps = std::numeric_limits<std::int32_t>::max();

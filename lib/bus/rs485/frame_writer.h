@@ -44,7 +44,7 @@ class FrameWriter {
   std::int64_t room_from_us() const { return free_us_ - kMaxBacklogUs + 1; }
 
  private:
-  // Bytes handed to the port but not yet on the line. What is due next is decided as late as that.
+  // Bytes handed to the port but not yet on the bus. What is due next is decided as late as that.
   static constexpr std::int64_t kMaxBacklogUs = 5'000;
 
   std::uint32_t baud_;

@@ -20,7 +20,7 @@ constexpr bool too_late(Tick at, Tick now) {
   return at < first_changeable(now);
 }
 
-// What an adapter holds back is late on the line, and its answer is later still: queues are deeper
+// What an adapter holds back is late on the bus, and its answer is later still: queues are deeper
 // by that, and changes are planned further ahead.
 class Horizon {
  public:
@@ -54,7 +54,7 @@ class Horizon {
   static constexpr std::int64_t kQueueUrgentUs = 120'000;
   // Two polls: one lost first frame can still be repaired.
   static constexpr std::int64_t kStartLeadUs = 100'000;
-  // What program and driver may take until a frame is on the line; what the line itself takes, and
+  // What program and driver may take until a frame is on the bus; what the bus itself takes, and
   // the adapter's latency, come on top.
   static constexpr std::int64_t kReplaceLeadUs = 10'000;
   // More than any adapter holds back. An answer that was read later still waited for this program,

@@ -8,7 +8,7 @@
 
 namespace bushd::link {
 
-// The place of an MCU in BusSetup::mcus. Not its address on the line, nor its place among the MCUs
+// The place of an MCU in BusSetup::mcus. Not its address on the bus, nor its place among the MCUs
 // of all buses: a type of its own.
 struct McuIndex {
   std::size_t value = 0;

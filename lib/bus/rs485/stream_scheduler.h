@@ -70,7 +70,7 @@ class StreamScheduler {
   // When the line will have carried these replacements, one for each MCU, if they are asked for
   // now.
   struct LineUse {
-    std::int64_t free_us;     // from when on the line is free for them
+    std::int64_t free_us;     // from when on the bus is free for them
     std::int64_t margin_us;   // as of send_critical
     std::int64_t confirm_us;  // until the answer to a poll that is still to be sent
   };

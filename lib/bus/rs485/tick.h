@@ -5,6 +5,6 @@
 
 namespace bushd::link {
 
-using Tick = std::int64_t;  // absolute, unwrapped from the 32 bits on the line
+using Tick = std::int64_t;  // absolute, unwrapped from the 32 bits on the bus
 
 }  // namespace bushd::link

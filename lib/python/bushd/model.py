@@ -137,7 +137,7 @@ class MovePlan:
     duration_s: float  # from the first tick to the end of the last one
     ticks: int
     frames: int | None  # to the MCUs, for the motion alone; None: too many to be counted
-    bytes: int | None  # of these frames on the line
+    bytes: int | None  # of these frames on the bus
     limited_by: str | None  # of a line: the motor that makes it take so long
     points_s: tuple[float, ...]  # of a path of at most 2048 points: when each of them is reached
     legs: tuple[PlannedLeg, ...]

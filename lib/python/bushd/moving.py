@@ -60,7 +60,7 @@ class Moving(Asking):
         unit: str | None = None,
         speed: float | None = None,
     ) -> model.MovePlan:
-        """What such a `move()` would be: how long, how fast, how much on the line. Nothing moves; of motors at rest."""
+        """What such a `move()` would be: how long, how fast, how much of the bus. Nothing moves; of motors at rest."""
         wanted = await self._amounts(motors, to, by, unit)
         return await self._planned([ask("MOVE", **way(**wanted.how, speed=speed), dry_run=True)])
 

@@ -1,4 +1,4 @@
-// The line's budget against what master and slaves really put on the line.
+// The budget of the bus against what master and slaves really put on it.
 #include <vector>
 
 #include "bus/line_budget.h"

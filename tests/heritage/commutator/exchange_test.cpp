@@ -94,7 +94,7 @@ TEST(Exchange, StepIsCancelledAsLongAsItsCodeIsHere) {
 TEST(Exchange, AnswerIsOverdueAfterTwiceTheDelayAnd100Ms) {
   Exchange exchange(kFast);
   exchange.step(0, 0, false, 250 * kUnitNs);
-  // Four bytes on the line, 40 us; twice 10 ms; 100 ms; each rounded up by a microsecond or two.
+  // Four bytes on the bus, 40 us; twice 10 ms; 100 ms; each rounded up by a microsecond or two.
   EXPECT_EQ(exchange.next_wake_us(), 40 + 1 + 2 * 10'001 + 100'000);
   EXPECT_FALSE(exchange.advance(exchange.next_wake_us() - 1).lost);
   const auto overdue = exchange.advance(exchange.next_wake_us());

@@ -280,16 +280,15 @@ TEST(Doctor, OfflineMcusHaveTheirReasonAndFaultsTheirs) {
 
 TEST(Doctor, NoiseAtOneMcuIsItsStubAndAtAllTheLine) {
   const auto one = with([](Observations& seen) { health(seen).mcus[1].crc_errors = 400; });
-  EXPECT_THAT(one, ElementsAre(AllOf(HasSubstr("warning line: hall:2: 400 frames"),
+  EXPECT_THAT(one, ElementsAre(AllOf(HasSubstr("warning bus: hall:2: 400 frames"),
                                      HasSubstr("this MCU's part"))));
   const auto all = with([](Observations& seen) {
     health(seen).mcus[0].timeouts = 3000;
     health(seen).mcus[1].crc_errors = 9000;
   });
-  EXPECT_THAT(all,
-              ElementsAre(AllOf(HasSubstr("error line: hall: all 2 MCUs hear a noisy line; the "
-                                          "worst, hall:2"),
-                                HasSubstr("120 ohm at both ends"))));
+  EXPECT_THAT(all, ElementsAre(AllOf(HasSubstr("error bus: hall: all 2 MCUs hear a noisy bus; the "
+                                               "worst, hall:2"),
+                                     HasSubstr("120 ohm at both ends"))));
   EXPECT_THAT(with([](Observations& seen) { health(seen).crc_errors = 500; }),
               ElementsAre(HasSubstr("the PC's end")));
   EXPECT_THAT(with([](Observations& seen) { health(seen).mcus[0].crc_errors = 3; }), IsEmpty());

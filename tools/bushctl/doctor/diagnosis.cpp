@@ -83,7 +83,7 @@ const char* word(Level level) {
 Findings diagnose(const Observations& seen) {
   Findings all;
   for (const auto check : {check_configuration, check_ports, check_lcm, check_clock, check_disk,
-                           check_sockets, check_daemon, check_mcus, check_lines, check_positions}) {
+                           check_sockets, check_daemon, check_mcus, check_buses, check_positions}) {
     Findings found = check(seen);
     all.insert(all.end(), found.begin(), found.end());
   }

@@ -36,7 +36,7 @@ Findings check_disk(const Observations& seen);
 Findings check_sockets(const Observations& seen);
 Findings check_daemon(const Observations& seen);
 Findings check_mcus(const Observations& seen);
-Findings check_lines(const Observations& seen);
+Findings check_buses(const Observations& seen);
 Findings check_positions(const Observations& seen);
 
 // Lines for a terminal, the last of which sums up. What is found of more than three is told once.

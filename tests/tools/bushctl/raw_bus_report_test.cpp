@@ -1,4 +1,4 @@
-#include "tools/bushctl/line_report.h"
+#include "tools/bushctl/raw_bus_report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

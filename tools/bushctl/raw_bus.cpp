@@ -1,4 +1,4 @@
-#include "bus_line.h"
+#include "raw_bus.h"
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -11,17 +11,17 @@ using bushd::fail;
 using bushd::Result;
 using std::chrono::microseconds;
 
-Result<BusLine> BusLine::open(const std::string& port, std::uint32_t baud) {
+Result<RawBus> RawBus::open(const std::string& port, std::uint32_t baud) {
   auto opened = bushd::serial::SerialPort::open(port, baud);
   if (!opened) return fail(opened.error());
-  return BusLine(std::move(*opened), baud);
+  return RawBus(std::move(*opened), baud);
 }
 
-microseconds BusLine::line_time(std::size_t bytes) const {
+microseconds RawBus::bus_time(std::size_t bytes) const {
   return microseconds(static_cast<std::int64_t>(bytes) * 10'000'000 / baud_ + 1);
 }
 
-Result<void> BusLine::read(Clock::time_point until) {
+Result<void> RawBus::read(Clock::time_point until) {
   const auto left = std::chrono::ceil<std::chrono::nanoseconds>(until - Clock::now()).count();
   const timespec wait = {.tv_sec = std::max<std::int64_t>(left, 0) / 1'000'000'000,
                          .tv_nsec = std::max<std::int64_t>(left, 0) % 1'000'000'000};
@@ -35,7 +35,7 @@ Result<void> BusLine::read(Clock::time_point until) {
   return port_.read(received_);
 }
 
-Result<std::vector<BusLine::Answer>> BusLine::ask(
+Result<std::vector<RawBus::Answer>> RawBus::ask(
     std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload,
     std::size_t reply_payload, microseconds within,
     const std::function<bool(const std::vector<Answer>&)>& enough) {
@@ -43,8 +43,8 @@ Result<std::vector<BusLine::Answer>> BusLine::ask(
   std::array<std::uint8_t, 1 + BUSHD_FRAME_MAX_WIRE> wire{};
   const std::size_t size =
       1 + bushd_frame_encode(address, type, ++tag_, payload.data(), payload.size(), &wire[1]);
-  const Clock::time_point sent = Clock::now() + line_time(size);
-  const microseconds reply_time = line_time(reply_payload + BUSHD_FRAME_OVERHEAD);
+  const Clock::time_point sent = Clock::now() + bus_time(size);
+  const microseconds reply_time = bus_time(reply_payload + BUSHD_FRAME_OVERHEAD);
   if (auto written = port_.write({wire.data(), size}); !written) return fail(written.error());
   std::vector<Answer> answers;
   const Clock::time_point end = sent + within;

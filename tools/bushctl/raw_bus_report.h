@@ -1,4 +1,4 @@
-// What was found out on a line, as people and programs read it.
+// What was found out on a bus, as people and programs read it.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace bushctl {
 
-// Latencies of answers: round trip without the line's own time.
+// Latencies of answers: round trip without the time of the bytes.
 struct LatencyTest {
   std::string port;
   std::uint32_t baud = 0;

@@ -16,7 +16,7 @@ namespace {
 namespace api = bushd::api;
 
 // Errors in answers. At the first a repair now and then, as a lamp that is switched on makes them;
-// at the second repairs take a noticeable part of the line.
+// at the second repairs take a noticeable part of the bus.
 constexpr double kNoisy = 1e-4;
 constexpr double kBad = 1e-2;
 constexpr std::uint64_t kFew = 3;  // errors that say nothing
@@ -81,17 +81,17 @@ void check_noise(const Bus& bus, Findings& out) {
   }
   if (noisy.size() > 1 && noisy.size() == bus.health.mcus.size()) {
     out.push_back(
-        {level_of(worst), "line",
-         fmt::format("{}: all {} MCUs hear a noisy line; the worst, {}", bus.health.bus,
+        {level_of(worst), "bus",
+         fmt::format("{}: all {} MCUs hear a noisy bus; the worst, {}", bus.health.bus,
                      noisy.size(),
                      noise_text(bus, **std::ranges::max_element(
                                          noisy, {}, [](auto* mcu) { return errors_of(*mcu); }))),
-         std::string("the line as a whole: ") + kEnds});
+         std::string("the bus as a whole: ") + kEnds});
     return;
   }
   for (const api::McuHealth* mcu : noisy) {
-    out.push_back({level_of(rate(errors_of(*mcu), each)), "line", noise_text(bus, *mcu),
-                   "this MCU's part of the line: its plug, stub (short) and transceiver; if it is "
+    out.push_back({level_of(rate(errors_of(*mcu), each)), "bus", noise_text(bus, *mcu),
+                   "this MCU's part of the bus: its plug, stub (short) and transceiver; if it is "
                    "at the end, the 120 ohm there"});
   }
 }
@@ -101,18 +101,18 @@ void check_reception(const Bus& bus, Findings& out) {
   const double errors = rate(health.crc_errors, bus.answers());
   if (errors >= kNoisy) {
     const std::uint64_t then = bus.before == nullptr ? 0 : bus.before->crc_errors;
-    out.push_back({level_of(errors), "line",
+    out.push_back({level_of(errors), "bus",
                    fmt::format("{}: {} answers reached the PC broken{}", health.bus,
                                health.crc_errors, bus.of_late(then, health.crc_errors)),
                    std::string("the PC's end: the adapter and its 120 ohm; then ") + kEnds});
   }
   if (health.two_masters) {
-    out.push_back({Level::kError, "line", health.bus + ": another master talks on the line",
-                   "end the other program on this line, bushd, bushctl or another one: on this PC "
+    out.push_back({Level::kError, "bus", health.bus + ": another master talks on the bus",
+                   "end the other program on this bus, bushd, bushctl or another one: on this PC "
                    "or another"});
   }
   if (health.recent_latency_us >= kSlowUs) {
-    out.push_back({Level::kWarning, "line",
+    out.push_back({Level::kWarning, "bus",
                    fmt::format("{}: answers come {:.1f} ms late", health.bus,
                                static_cast<double>(health.recent_latency_us) / 1000),
                    "the adapter's latency_timer should be 1 (udev rules of bushd's package); else "
@@ -135,7 +135,7 @@ void check_mcu(const api::McuHealth& mcu, Findings& out) {
                    fmt::format("{}: motors ran out of ticks {} times, {} ticks were sent and not "
                                "received",
                                mcu.mcu, mcu.ramp_downs, mcu.missed_ticks),
-                   "the line is noisy (above), or this PC stood still for 0.3 s: run less on it "
+                   "the bus is noisy (above), or this PC stood still for 0.3 s: run less on it "
                    "(docs/troubleshooting.md, A heavily loaded PC)",
                    mcu.mcu, "MCUs ran out of ticks"});
   }
@@ -143,7 +143,7 @@ void check_mcu(const api::McuHealth& mcu, Findings& out) {
 
 }  // namespace
 
-Findings check_lines(const Observations& seen) {
+Findings check_buses(const Observations& seen) {
   Findings out;
   if (!seen.daemon.unreachable.empty()) return out;
   const auto before_of = [&](const std::string& bus) -> const api::HealthSnapshot* {
@@ -157,7 +157,7 @@ Findings check_lines(const Observations& seen) {
     const Bus bus{health, before_of(health.bus), seen.daemon.watched_s};
     const std::size_t found = out.size();
     if (health.port_state != "open") {
-      out.push_back({Level::kError, "line",
+      out.push_back({Level::kError, "bus",
                      fmt::format("{}: the port is not open: {}", health.bus, health.port_state),
                      "see 'port' above; bushd tries it again twice a second"});
       continue;
@@ -166,8 +166,8 @@ Findings check_lines(const Observations& seen) {
     check_reception(bus, out);
     for (const api::McuHealth& mcu : health.mcus) check_mcu(mcu, out);
     if (out.size() > found) continue;
-    out.push_back({Level::kOk, "line",
-                   fmt::format("{}: {} answers, errors within what a line may have", health.bus,
+    out.push_back({Level::kOk, "bus",
+                   fmt::format("{}: {} answers, errors within what a bus may have", health.bus,
                                bus.answers()),
                    ""});
   }

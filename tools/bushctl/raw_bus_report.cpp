@@ -1,4 +1,4 @@
-#include "line_report.h"
+#include "raw_bus_report.h"
 
 #include <fmt/format.h>
 
@@ -78,7 +78,8 @@ std::string latency_advice(const LatencyTest& test) {
 
 std::vector<std::string> latency_lines(const LatencyTest& test) {
   std::vector<std::string> out = {fmt::format(
-      "{} at {} baud: {} requests, {} answers; round trip without the line's time: min {}, median "
+      "{} at {} baud: {} requests, {} answers; round trip without the time of the bytes: min {}, "
+      "median "
       "{}, 99 % {}, max {}",
       test.port, test.baud, test.asked, test.latencies_us.size(), ms(test.latencies_us.front()),
       ms(percentile(test, 50)), ms(percentile(test, 99)), ms(test.latencies_us.back()))};

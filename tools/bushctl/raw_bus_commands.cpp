@@ -1,4 +1,4 @@
-#include "line_commands.h"
+#include "raw_bus_commands.h"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,10 @@
 
 #include "base/printable.h"
 #include "bus/rs485/unique_id.h"
-#include "bus_line.h"
 #include "bus_scan.h"
 #include "commands.h"
-#include "line_report.h"
+#include "raw_bus.h"
+#include "raw_bus_report.h"
 
 namespace bushctl {
 namespace {
@@ -23,12 +23,12 @@ using bushd::Result;
 
 constexpr unsigned kTries = 3;
 
-bool one(const BusLine::Answers& answers) {
+bool one(const RawBus::Answers& answers) {
   return !answers.empty();
 }
 
-Result<std::vector<Found>> find_some(BusLine& line, const LineOptions& options) {
-  auto found = find_all(line);
+Result<std::vector<Found>> find_some(RawBus& bus, const RawBusOptions& options) {
+  auto found = find_all(bus);
   if (found && found->empty()) {
     return fail(fmt::format("{}: no MCU answers at {} baud; check baud rate, cables and power",
                             options.port, options.baud));
@@ -50,11 +50,11 @@ std::optional<std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE>> parse_id(const std
 
 }  // namespace
 
-int latency_test(const LineOptions& options, std::uint8_t address, unsigned count) {
-  auto line = BusLine::open(options.port, options.baud);
-  if (!line) return failed(line.error());
+int latency_test(const RawBusOptions& options, std::uint8_t address, unsigned count) {
+  auto bus = RawBus::open(options.port, options.baud);
+  if (!bus) return failed(bus.error());
   if (address == 0) {
-    const auto found = find_some(*line, options);
+    const auto found = find_some(*bus, options);
     if (!found) return failed(found.error());
     address = found->front().address;
   }
@@ -63,8 +63,8 @@ int latency_test(const LineOptions& options, std::uint8_t address, unsigned coun
   const std::size_t size = bushd_encode_identify(&message, payload.data());
   LatencyTest test{.port = options.port, .baud = options.baud, .asked = count, .latencies_us = {}};
   for (unsigned i = 0; i < count; ++i) {
-    const auto answers = line->ask(address, BUSHD_MSG_IDENTIFY, {payload.data(), size},
-                                   BUSHD_IDENTITY_SIZE, kAnswerPatience, one);
+    const auto answers = bus->ask(address, BUSHD_MSG_IDENTIFY, {payload.data(), size},
+                                  BUSHD_IDENTITY_SIZE, kAnswerPatience, one);
     if (!answers) return failed(answers.error());
     if (!answers->empty()) test.latencies_us.push_back(answers->front().latency_us);
   }
@@ -82,10 +82,10 @@ int latency_test(const LineOptions& options, std::uint8_t address, unsigned coun
   return kDone;
 }
 
-int scan(const LineOptions& options) {
-  auto line = BusLine::open(options.port, options.baud);
-  if (!line) return failed(line.error());
-  const auto found = find_some(*line, options);
+int scan(const RawBusOptions& options) {
+  auto bus = RawBus::open(options.port, options.baud);
+  if (!bus) return failed(bus.error());
+  const auto found = find_some(*bus, options);
   if (!found) return failed(found.error());
   if (options.json) {
     fmt::print("{}\n", scan_json(*found));
@@ -95,7 +95,7 @@ int scan(const LineOptions& options) {
   return kDone;
 }
 
-int set_address(const LineOptions& options, const std::string& unique_id, std::uint8_t address) {
+int set_address(const RawBusOptions& options, const std::string& unique_id, std::uint8_t address) {
   const auto id = parse_id(unique_id);
   if (!id) {
     fmt::print(stderr,
@@ -104,10 +104,10 @@ int set_address(const LineOptions& options, const std::string& unique_id, std::u
                unique_id, options.port, options.baud);
     return kUsage;
   }
-  auto line = BusLine::open(options.port, options.baud);
-  if (!line) return failed(line.error());
+  auto bus = RawBus::open(options.port, options.baud);
+  if (!bus) return failed(bus.error());
   // Two with one address would be worse than the wrong address.
-  const auto there = find_all(*line);
+  const auto there = find_all(*bus);
   if (!there) return failed(there.error());
   for (const Found& mcu : *there) {
     const bool itself = std::memcmp(mcu.identity.unique_id, id->data(), id->size()) == 0;
@@ -121,8 +121,8 @@ int set_address(const LineOptions& options, const std::string& unique_id, std::u
   std::array<std::uint8_t, 16> payload{};
   const std::size_t size = bushd_encode_set_address(&message, payload.data());
   for (unsigned i = 0; i < kTries; ++i) {
-    const auto answers = line->ask(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS,
-                                   {payload.data(), size}, 1, kAnswerPatience, one);
+    const auto answers = bus->ask(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS,
+                                  {payload.data(), size}, 1, kAnswerPatience, one);
     if (!answers) return failed(answers.error());
     bushd_acknowledgement reply;
     if (answers->empty() ||
