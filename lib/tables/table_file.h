@@ -27,7 +27,7 @@ Result<std::filesystem::path> find(std::string_view name,
                                    std::span<const std::filesystem::path> directories);
 
 // Where the tables that come with bushd lie: $BUSHD_TABLES_DIR if set, else the source tree of a
-// development build, then those of the installation that the program is in.
+// development build, then those that are installed with the program.
 std::vector<std::filesystem::path> shipped_directories();
 
 }  // namespace bushd::tables

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "installation.h"
+#include "made_config.h"
 #include "programs.h"
 #include "shutter_model.h"
 #include "times.h"

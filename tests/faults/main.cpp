@@ -15,7 +15,7 @@
 #include "base/parse_error.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
-#include "installation.h"
+#include "made_config.h"
 #include "summary.h"
 #include "world.h"
 

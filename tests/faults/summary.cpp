@@ -7,7 +7,7 @@
 
 #include "bare_world.h"
 #include "base/json_text.h"
-#include "installation.h"
+#include "made_config.h"
 
 namespace bushfaults {
 namespace {

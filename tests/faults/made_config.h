@@ -1,5 +1,5 @@
-// What the daemon is configured for: one bus with some MCUs, motors spread evenly over their
-// outputs, and the shipped tables dealt out among them.
+// The configuration that bushfaults makes for the daemon: one bus with some MCUs, motors spread
+// evenly over their outputs, and the shipped tables dealt out among them.
 #pragma once
 
 #include <cstdint>

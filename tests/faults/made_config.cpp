@@ -1,4 +1,4 @@
-#include "installation.h"
+#include "made_config.h"
 
 #include <fmt/core.h>
 
