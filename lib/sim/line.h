@@ -1,4 +1,4 @@
-// A half-duplex RS-485 line: who talks when, and what happens when two talk at once.
+// A half-duplex RS-485 pair: who talks when, and what happens when two talk at once.
 //
 // A byte takes 10 bit times (start, 8 data, stop). Bytes of one talker never overlap each other;
 // where those of two talkers do, all of them arrive corrupted: a pattern is put over them, always

@@ -163,7 +163,7 @@ void line_take(bushd_receiver* receiver) {
 }
 
 void line_transmit(const uint8_t* wire, size_t size, uint32_t delay_ns) {
-  // Reply slots are whole multiples of 10 us.
+  // Reply windows are whole multiples of 10 us.
   const uint32_t delay = delay_ns / 1000u * CYCLES_PER_US;
   const uint32_t due = last_delimiter + (delay > TURNAROUND_CYCLES ? delay : TURNAROUND_CYCLES);
   TIMSK3 = LINE_OTHER_INTERRUPTS;
