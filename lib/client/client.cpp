@@ -256,7 +256,7 @@ Result<api::Reply> Client::run(const api::Request& request, Until until,
   if (!packet) return fail(packet.error());
   waiting_ = {.number = number_};
   auto reply = await_reply({.packet = *packet}, until, meanwhile);
-  // Of a daemon that has forgotten it, the next request needs another session.
+  // The next request needs another session if the daemon has forgotten this one.
   const auto* refused = reply ? std::get_if<api::Refused>(&*reply) : nullptr;
   const bool forgotten = refused != nullptr && refused->reason.starts_with(api::kUnknownSession);
   if (!reply || forgotten) forget_session();

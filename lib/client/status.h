@@ -50,9 +50,9 @@ class StatusCollector {
   bool has_everything() const { return has_states() && has_health() && complete(descriptions_); }
   bool has_motors() const { return has_states() && complete(descriptions_); }
   bool has_health() const { return complete(healths_); }
-  // Of what is complete; the rest is empty.
+  // The status as far as it is complete; the rest is empty.
   Status status() const;
-  // Of what is there: MCUs with state and description, and buses.
+  // The status as far as it is there: MCUs with state and description, and buses.
   Status partial_status() const;
 
  private:

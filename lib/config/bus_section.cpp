@@ -29,7 +29,7 @@ Result<std::uint32_t> read_baud(const TomlReader& reader) {
                                                fmt::join(rates.begin(), rates.end(), ", "))));
 }
 
-// Of a bus of kind "rs485".
+// Reads the keys of a bus of kind "rs485".
 Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
   if (auto known = reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves",
                                 "frames", "emergency_stop"});
@@ -49,7 +49,7 @@ Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
   return {};
 }
 
-// Of a bus of kind "commutator".
+// Reads the keys of a bus of kind "commutator".
 Result<void> read_commutator(const TomlReader& reader, Bus* bus) {
   if (auto known =
           reader.only({"name", "kind", "port", "baud", "start_hz", "answer_ms", "emergency_stop"});

@@ -101,7 +101,7 @@ Result<void> check_emission(const Loading& loading, std::size_t index) {
   };
   const bushd_status status = fit(BUSHD_MIN_SLOTS);
   if (status == BUSHD_OK || fit(BUSHD_MAX_SLOTS) == BUSHD_OK) return {};
-  // Of the longest slots, in a tick that is shortened to follow the bus.
+  // The longest slots, in a tick that is shortened to follow the bus.
   const std::uint32_t tick_us = (bus.tick_ns() - bus.tick_ns() / BUSHD_TICK_SLEW_DIVISOR) / 1000;
   const std::uint32_t half_slot_us = tick_us / (2 * BUSHD_MIN_SLOTS);
   Error error = mcu.emission.step_at;

@@ -67,7 +67,7 @@ struct MotorInputs {
 
 enum class BusKind { kRs485, kSerialPulse, kCommutator };  // docs/decisions/0043-bus-kinds.md
 
-// Of a bus of that kind.
+// The settings of a bus of kind serial-pulse.
 struct SerialPulse {
   bool rts = false;           // the direction is on RTS, else on DTR
   bool positive_off = false;  // that line is off in the positive direction
@@ -85,7 +85,7 @@ struct Bus {
   bool table_ticks = true;  // streamed ticks may be told as states of the run
   bushd_stop_mode emergency_stop = BUSHD_STOP_RAMP;
   SerialPulse serial_pulse = {};
-  // Of a commutator board.
+  // The settings of a commutator board.
   std::uint32_t start_hz = 0;   // F_start
   std::uint32_t answer_ms = 0;  // for an answer, beyond twice its delay
 

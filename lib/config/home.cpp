@@ -14,7 +14,7 @@ namespace {
 using tables::TomlReader;
 
 constexpr std::int64_t kMostSteps = INT32_MAX;
-// Of either of the two ways: from 0 both are counted.
+// The most of either way: both are counted from 0.
 constexpr std::int64_t kMostOfWay = (std::int64_t{1} << 30) - 1;
 // A motor makes as many steps beyond where it is homed, before it stands: at most one in each tick
 // in which the switch is read, and in that which is prepared then.

@@ -18,12 +18,13 @@ tl::unexpected<Error> fail_at(Error place, std::string message) {
   return fail(std::move(place));
 }
 
-// Of a pattern others are passed over, and what is plugged in later may be a serial port.
+// A pattern passes over consoles if it has other ports, and what is plugged in later may be a
+// serial port.
 Result<void> check_port(const std::string& port, const Error& place) {
   const auto paths = ports_matching(port);
   if (paths.empty() || !std::ranges::all_of(paths, is_console)) return {};
   return fail_at(place,
-                 fmt::format("\"{}\" is {}console{}; allowed: the serial port that the line "
+                 fmt::format("\"{}\" is {}console{}; allowed: the serial port that the bus "
                              "is connected to",
                              port, paths.size() == 1 ? "a " : "", paths.size() == 1 ? "" : "s"));
 }

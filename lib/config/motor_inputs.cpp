@@ -164,7 +164,7 @@ Result<void> read_motor_inputs(const TomlReader& reader, std::optional<bool> own
 
 namespace {
 
-// Of two motors of one MCU.
+// Checks the inputs of two motors of one MCU against each other.
 Result<void> check_pair(const Loading& loading, std::size_t index, std::size_t before) {
   const Motor& motor = loading.config.motors[index];
   const Motor& other = loading.config.motors[before];

@@ -43,7 +43,7 @@ std::string_view name_of(SettingKey key);  // as in bushd.toml
 bool goes_first(SettingKey key, std::string_view value);
 std::optional<SettingKey> setting_key_of(std::string_view name);
 
-// Of one motor, what they stand for.
+// What the settings of one motor stand for.
 struct Settings {
   units::Coordinates coordinates{};
   std::optional<units::SoftLimits> soft_limits = {};

@@ -28,8 +28,8 @@ namespace bushd::control {
 
 struct Limits {
   Places::Limits places{};
-  // Of packets that a client has not read yet: of one, and of all. Who has most unread is closed
-  // when it is too much of all.
+  // Packets that clients have not read yet: the most of one, and of all. Who has most unread is
+  // closed when it is too much of all.
   std::size_t unread_bytes = 1024 * 1024;
   std::size_t unread_bytes_in_all = 32 * 1024 * 1024;
   // Packets that were none, before the connection is closed.

@@ -83,9 +83,9 @@ static inline bool bushd_receiver_collect(bushd_receiver* receiver, uint8_t byte
 }
 // The CRC over what has come. O(bytes since the last call).
 void bushd_receiver_check(bushd_receiver* receiver);
-// Of a reply nothing but that is kept; its payload will mean nothing. For MCUs, which do not read
-// what others answer: however long it is, it needs no more of the buffer than came since the last
-// call, and as much as an empty frame.
+// Keeps nothing of a reply but that it is one; its payload will mean nothing. For MCUs, which do
+// not read what others answer: however long it is, it needs no more of the buffer than came since
+// the last call, and as much as an empty frame.
 void bushd_receiver_pass_reply(bushd_receiver* receiver);
 
 // Feeds one byte. Empty frames (two delimiters in a row) are nothing. O(1), O(frame) at a

@@ -18,7 +18,7 @@ static inline uint64_t twice_value(const bushd_line* line) {
 void bushd_line_start(bushd_line* line, uint32_t increment, uint32_t longest) {
   line->increment = increment;
   line->longest = longest;
-  // Of a motor that does not move 2 value is L, and stays so.
+  // 2 value is L for a motor that does not move, and stays so.
   line->value = first_value(line);
   line->made = 0;
 }

@@ -66,7 +66,7 @@ uint8_t bushd_line_follower_make(bushd_line_follower* follower, const bushd_run_
 }
 #endif
 
-// Of a quotient below 512. On an 8-bit MCU a whole division would not fit into a tick.
+// A quotient below 512, bit by bit. On an 8-bit MCU a whole division would not fit into a tick.
 static uint16_t small_quotient(uint64_t numerator, uint32_t divisor) {
   uint64_t part = (uint64_t)divisor << 8;
   uint16_t quotient = 0;

@@ -210,7 +210,7 @@ typedef enum bushd_travel_stage {
   BUSHD_TRAVEL_DELAY = 18,         // the first run is to begin
   BUSHD_TRAVEL_RUN = 19,           // until its limit is active
   BUSHD_TRAVEL_RETURN_DELAY = 20,  // stands there
-  BUSHD_TRAVEL_RETURN = 21,        // likewise, back
+  BUSHD_TRAVEL_RETURN = 21,        // back, until its limit is active
   BUSHD_TRAVEL_DONE = 22,
   BUSHD_TRAVEL_NOT_SEEN = 23,     // by the sensor in time
   BUSHD_TRAVEL_EARLY = 24,        // its limit was active before the last step

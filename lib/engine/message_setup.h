@@ -52,8 +52,8 @@ enum {
 #define BUSHD_CAN_OUTPUTS UINT32_C(0x100000)     // levels of its outputs may be chosen
 #define BUSHD_CAN_SLOW_RUNS UINT32_C(0x200000)   // shortest delays and slow delays beyond 16 bits
 
-// Of another protocol version only `protocol_version` is decoded, the rest is zero: enough to say
-// which one it is.
+// Only `protocol_version` is decoded of another version, the rest is zero: enough to say which one
+// it is.
 typedef struct bushd_identity {
   uint8_t protocol_version;
   uint8_t motors;  // outputs 0 .. motors-1, at most BUSHD_MOTORS_PER_MCU

@@ -91,8 +91,8 @@ void bushd_run_ramp_down(bushd_run* run);
 // The same, but the running step is completed however long it takes: motors that follow the run may
 // have made theirs.
 void bushd_run_ramp_down_after_step(bushd_run* run);
-// Of a run that ramps down from here on: leaves out the steps that it does not wait for, but not
-// the running one. For run_plan.c.
+// Leaves out the steps that a run does not wait for, but not the running one, where it ramps down
+// from here on. For run_plan.c.
 void bushd_run_leave_out_slow(bushd_run* run);
 
 // Changes where the run ends, in its direction, and its shortest delay: the running step, of delay

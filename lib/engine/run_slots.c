@@ -27,7 +27,7 @@ typedef uint64_t scaled_ns;
 typedef uint32_t scaled_high;
 #endif
 
-// Of one part of the run.
+// Counts steps that lie in one part of the run.
 static void make_steps(bushd_run* run, uint8_t steps) {
   bushd_run_count(run, steps);
   if (run->lead_delay != 0) {
@@ -158,8 +158,8 @@ static inline uint8_t at_most(uint32_t steps) {
   return steps < UINT8_MAX ? (uint8_t)steps : UINT8_MAX;
 }
 
-// Of the part that the step which is due belongs to. Returns how many were made; a tick has fewer
-// than a byte holds.
+// Makes the steps of the part that the step which is due belongs to. Returns how many were made; a
+// tick has fewer than a byte holds.
 static uint8_t make_part(bushd_run* run, const bushd_run_tick* tick, bushd_run_part* part) {
   const bushd_table* table = run->table;
   uint8_t made = 1;
@@ -406,7 +406,7 @@ static void walk_part(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* spa
 }
 
 bool bushd_run_walk_next(bushd_run_walk* walk, bushd_run* run, bushd_run_spans* spans) {
-  // Of the last ones.
+  // Past the steps of the last call.
   spans->step += spans->count;
   if (spans->parts != 256u) --spans->step;
   spans->count = 0;

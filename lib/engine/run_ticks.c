@@ -305,7 +305,7 @@ static uint32_t sub_units(uint32_t since_ns, uint32_t unit_ns) {
   return (uint32_t)((uint64_t)since_ns * 256u / unit_ns);
 }
 
-// Of the running delay, 1/256 rounded down.
+// How much of the running delay is over, in 1/256 rounded down.
 static inline uint32_t fraction_now(const bushd_run* run, uint32_t unit_ns) {
   const bushd_delay delay = bushd_run_delay(run);
   if (delay == 0) return 0;

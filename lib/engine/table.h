@@ -5,8 +5,9 @@
 //
 //     delay before step j of N  =  max( A(j-1), D(N-j), c ),   j = 1 .. N        (the BUSHD rule)
 //
-// where A(i) = c for i >= the length of the accelerating side, D likewise (JINR P10-85-635, figure
-// 4: mode 1 and mode 2 of BUSHD-2 are the short and the long case of this one formula).
+// where A(i) = c for i >= the length of the accelerating side, and D(i) = c behind its own (JINR
+// P10-85-635, figure 4: mode 1 and mode 2 of BUSHD-2 are the short and the long case of this one
+// formula).
 #ifndef BUSHD_ENGINE_TABLE_H
 #define BUSHD_ENGINE_TABLE_H
 
@@ -30,8 +31,8 @@ extern "C" {
 #define BUSHD_SLOW_RUNS 1
 #endif
 
-// Of a run, in time units: `bushd_delay` before a step, `bushd_since` after the last one, which may
-// be negative, modulo its width.
+// Times of a run, in time units: `bushd_delay` before a step, `bushd_since` after the last one,
+// which may be negative, modulo its width.
 #if BUSHD_SLOW_RUNS
 typedef uint64_t bushd_delay;
 typedef uint64_t bushd_since;

@@ -20,7 +20,7 @@ extern "C" {
 #define BUSHD_VELOCITY_INTERVAL_NS UINT32_C(25000)
 #define BUSHD_VELOCITY_UPDATE_INTERVALS 625u  // 1/64 s
 #define BUSHD_VELOCITY_PERIOD_OF_ONE 2560000u
-// Of VMIN: T has 16 bits. Of all: the variables have 24.
+// The least VMIN, since T has 16 bits, and the most of all, since the variables have 24.
 #define BUSHD_VELOCITY_LEAST 40
 #define BUSHD_VELOCITY_MOST 0x7FFFFF
 

@@ -51,7 +51,7 @@ const MemoryMap::Object& MemoryMap::object(const std::string& name) const {
 }
 
 std::set<std::string> MemoryMap::read_owners(const std::string& path) {
-  // Of those that begin together the larger one is the whole.
+  // The larger one of those that begin together is the whole.
   std::stable_sort(objects_.begin(), objects_.end(), [](const Object& a, const Object& b) {
     return a.address != b.address ? a.address < b.address : a.size > b.size;
   });

@@ -56,7 +56,7 @@ class MemoryMap {
   // When all objects are added. Returns the names that are in the file. Throws std::runtime_error,
   // with file, line and cause.
   std::set<std::string> read_owners(const std::string& path);
-  // Of an object that is not in the file of owners.
+  // Who may write an object that is not in the file of owners.
   void set_writers(std::size_t object, Units units) { objects_[object].writers = units; }
 
  private:

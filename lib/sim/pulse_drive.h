@@ -33,7 +33,7 @@ class PulseDrive {
   void break_off(TimeNs now_ns);
   void advance_to(TimeNs now_ns);
 
-  // Of now, as advanced to.
+  // What is so now, as advanced to.
   std::size_t queued() const { return ends_ns_.size(); }  // bytes that have not left
   std::uint8_t lines();
   bool positive() const { return positive_; }

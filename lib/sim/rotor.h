@@ -53,7 +53,7 @@ class Rotor {
   void step(TimeNs t_ns, bool forward);
   void advance_to(TimeNs t_ns);
 
-  // Of the field beyond the rotor, full steps.
+  // How far the field is beyond the rotor, full steps.
   double lag_full_steps() const;
   double greatest_lag_full_steps() const;
   // When it was beyond two full steps for the first time.

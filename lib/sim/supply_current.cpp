@@ -7,7 +7,7 @@
 namespace bushd::sim {
 namespace {
 
-// Of the settling time: until the drop is over, and until the overshoot is at its highest.
+// Shares of the settling time: until the drop is over, and until the overshoot is at its highest.
 constexpr double kDropShare = 0.12;
 constexpr double kPeakShare = 0.30;
 constexpr double kFluctuationNs = 1'700'000;

@@ -23,7 +23,7 @@ struct McuOptions {
   std::uint16_t queue_ticks = 1024;  // a power of two
   std::uint16_t code_count = 16384;
   std::uint32_t disabled_capabilities = 0;  // BUSHD_CAN_*: it has all others
-  // Of how many motors it controls the currents, and how many may move by the velocity loop; >= 1:
+  // How many motors it controls the currents of, and how many may move by the velocity loop; >= 1:
   // an MCU without these capabilities has them disabled.
   std::uint8_t current_motors = BUSHD_MAX_CURRENT_MOTORS;
   std::uint8_t velocity_motors = BUSHD_MAX_VELOCITY_MOTORS;

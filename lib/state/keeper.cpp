@@ -79,7 +79,7 @@ Result<void> Keeper::want_counter(std::int64_t now_us, Motor& motor) {
 Result<void> Keeper::want_mark(std::int64_t now_us, MotorId id) {
   Motor& motor = motors_[id];
   if (marked(id)) {
-    // Of a rest that has not gone out yet nobody learns.
+    // Nobody learns of a rest that has not gone out yet.
     if (motor.kept.record && motor.kept.record->motion == motor.kept.motion) {
       motor.kept.record->at_rest = false;
       pending_.records[motor.name] = *motor.kept.record;

@@ -63,7 +63,7 @@ class Keeper {
   // It was seen in motion.
   void moves(MotorId motor, Record record);
   void settings(MotorId motor, Settings settings);
-  // Of what is no motor.
+  // The settings of what is no motor.
   void settings(const std::string& name, Settings settings);
   // While the disk does not take them, the newest are kept.
   void past(PastMove move);

@@ -25,7 +25,7 @@ struct Seen {
   std::int64_t steps = 0;  // as the MCU counts them now
   // Whose position this output's counter was until now, if that was another motor.
   std::optional<Owner> before{};
-  // Of the kept steps, or those of the motor before, in the motor's unit; "" if there is none.
+  // The kept steps, or those of the motor before, in the motor's unit; "" if there is none.
   std::string position_text{};
   bool local = false;  // people may have moved it unseen
   // It stands where a switch stops it immediately: nobody saw from which speed.

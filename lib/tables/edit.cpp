@@ -20,7 +20,7 @@ constexpr double kNoise = 1e-6;
 constexpr double kPathNoise = 1e-9;  // of a step; a side's path is up to 131070 steps
 constexpr int kHalvings = 60;        // of a path that a double holds
 constexpr double kLongestCode = std::numeric_limits<std::uint16_t>::max();
-// Of a speed by rounding, beyond which a finer time unit is taken.
+// The share of a speed that rounding may take; a finer time unit is taken beyond it.
 constexpr double kMostShortfall = 0.01;
 constexpr double kLongestSide = std::numeric_limits<std::int32_t>::max();
 
@@ -47,7 +47,7 @@ tl::unexpected<Error> no_index(SideKey side, std::size_t index, std::size_t size
                           side == SideKey::kAccel ? "accel" : "decel", index, size - 1));
 }
 
-// Of a mirrored table both sides change, so that it stays one.
+// Both sides of a mirrored table change, so that it stays one.
 Result<Codes*> editable(TableContent& content, SideKey side, std::size_t index, bool end_too) {
   const bool mirrored = !content.decel;
   Codes& codes = mirrored && side == SideKey::kAccel ? content.accel : side_of(content, side);

@@ -14,7 +14,8 @@ namespace bushd::tables {
 
 class Gentler {
  public:
-  // Of both sides. Making one takes about a microsecond a code, and whoever asks waits for it.
+  // Codes of both sides together. Making a table takes about a microsecond a code, and whoever asks
+  // waits for it.
   static constexpr std::size_t kMostCodes = 16384;
 
   // `table` itself for a share of 1; else its speeds with so much of its acceleration: same name

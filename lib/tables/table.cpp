@@ -53,7 +53,7 @@ ContentFault place(bushd_status status, std::uint32_t engine_index, bool in_dece
     case BUSHD_E_TABLE_ZERO:
       return {key, at, "is 0; allowed: 1..65535 time units"};
     case BUSHD_E_TABLE_UNSORTED: {
-      // Of the two codes that clash, the one that comes later in the file is the one to name.
+      // Two codes clash; the one that comes later in the file is the one to name.
       const std::size_t later = in_decel ? at + 1 : at;
       return {key, later,
               fmt::format("is {} after {}; allowed: codes that never {} ({} is listed from {})",

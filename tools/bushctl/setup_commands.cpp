@@ -26,7 +26,7 @@ using bushd::Result;
 
 // Those of the images, and what small chips are given.
 constexpr std::array<std::uint32_t, 3> kBauds = {500'000, 1'000'000, 115'200};
-// The first that the line can carry for all MCUs.
+// The first that the bus can carry for all MCUs.
 constexpr std::array<std::uint32_t, 4> kTicksUs = {2560, 5120, 10'240, 20'000};
 
 struct SetupOptions {

@@ -29,8 +29,8 @@ struct NumberTable {
   std::size_t rows() const { return lines.size(); }
 };
 
-// Of a file's text. Errors name file, line and column: names missing, empty or given twice, none or
-// more than `most_rows` rows, a row of another length, what is no finite number.
+// Reads the text of a file. Errors name file, line and column: names missing, empty or given twice,
+// no rows or more than `most_rows`, a row of another length, what is no finite number.
 Result<NumberTable> parse_numbers(std::string_view text, const std::string& file,
                                   std::size_t most_rows);
 

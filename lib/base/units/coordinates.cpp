@@ -66,7 +66,7 @@ std::int64_t clamped(const mpz_class& steps) {
   return steps.get_si();
 }
 
-// Of the decimal text that a double stands for, with the digits that a long double has beyond.
+// The decimal number that a double stands for, with the digits that a long double has beyond.
 long double widened(double value) {
   return std::strtold(fmt::format("{}", value).c_str(), nullptr);
 }

@@ -51,7 +51,7 @@ class Coordinates {
   static constexpr int kMostDecimals = 12;
   static constexpr const char* kSteps = "steps";  // is no unit of a configuration
 
-  // Of a motor without a unit: all positions are steps.
+  // A motor without a unit: all positions are steps.
   Coordinates() = default;
   // Error: an offset so large that doubles do not tell the steps apart any more.
   static Result<Coordinates> make(Scale scale);
@@ -77,7 +77,7 @@ class Coordinates {
   double user_of(const Steps& steps) const;
   // In 2^-32 of a step, the nearest.
   Result<std::int64_t> parts_of_user(double user) const;
-  // Of a distance on the user's scale, with its sign.
+  // The steps of a distance on the user's scale, with its sign.
   Result<std::int64_t> steps_of_distance(double user_units) const;
 
   // The delay of a step at this speed, in time units rounded up: never faster.

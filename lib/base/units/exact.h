@@ -8,10 +8,11 @@
 
 namespace bushd::units {
 
-// Of "-12", "0.1", ".5", "2.5e-3". None: not such a text, or an exponent beyond +-400.
+// The number that a text such as "-12", "0.1", ".5" or "2.5e-3" says. None: not such a text, or an
+// exponent beyond +-400.
 std::optional<mpq_class> exact(std::string_view text);
 
-// Of the shortest decimal text that reads back as this number. None: not a finite number.
+// What the shortest decimal text says that reads back as this number. None: not a finite number.
 std::optional<mpq_class> exact(double number);
 
 }  // namespace bushd::units

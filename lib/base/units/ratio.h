@@ -16,11 +16,12 @@ struct Ratio {
   friend bool operator==(const Ratio&, const Ratio&) = default;
 };
 
-// Of "400", "0.1", "2.5e-3" or "400/1.25". Errors: not such a text; not above 0; numerator or
-// denominator in lowest terms beyond 2^63 - 1.
+// The ratio that a text such as "400", "0.1", "2.5e-3" or "400/1.25" says. Errors: not such a text;
+// not above 0; numerator or denominator in lowest terms beyond 2^63 - 1.
 Result<Ratio> parse_ratio(std::string_view text);
 
-// Of the shortest decimal text that reads back as this number: 0.1 is one tenth. Errors as above.
+// What the shortest decimal text says that reads back as this number: 0.1 is one tenth. Errors as
+// above.
 Result<Ratio> ratio_of(double number);
 
 // "400", "2/5".

@@ -47,7 +47,7 @@ Error port_error(const std::string& path, const std::string& what, int error) {
 // be destroyed.
 Result<int> open_and_lock(const std::string& path) {
   if (is_console(path)) {
-    return fail(Error{.message = "is a console, not a serial port; name the port that the line is "
+    return fail(Error{.message = "is a console, not a serial port; name the port that the bus is "
                                  "connected to",
                       .file = path});
   }

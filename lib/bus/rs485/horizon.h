@@ -31,7 +31,7 @@ class Horizon {
   Tick earliest_start(std::int64_t now_us) const {
     return clock_.tick_at(now_us) + clock_.ticks_in(kStartLeadUs + 4 * held_back_us());
   }
-  // Earliest tick from which a replacement can take effect that the line will have carried by
+  // Earliest tick from which a replacement can take effect that the bus will have carried by
   // `carried_us`. This clock lags by a part of a tick.
   Tick earliest_replace(std::int64_t now_us, std::int64_t carried_us) const {
     const std::int64_t lead_us = kReplaceLeadUs + carried_us - now_us + 2 * held_back_us();

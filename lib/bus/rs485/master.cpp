@@ -17,7 +17,7 @@ constexpr std::int64_t kQueueCriticalUs = 40'000;
 // So long after a replacement queues are filled for the case that the program is held up; then it
 // is asked whether it was taken.
 constexpr std::int64_t kFollowFirstUs = 20'000;
-// Less than what replacements are planned ahead beyond the time that the line takes for them: those
+// Less than what replacements are planned ahead beyond the time that the bus takes for them: those
 // that have theirs do not keep the others waiting.
 constexpr std::int64_t kCriticalMarginUs = 5'000;
 

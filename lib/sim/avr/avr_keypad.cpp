@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint32_t kKeypadHz = 16'000'000;
 constexpr int kKeys = 4;
-// Of port B: segment g, and the digits from bit 1 on. Of port D: segments a to f from bit 2 on.
+// Port B has segment g, and the digits from bit 1 on. Port D has segments a to f from bit 2 on.
 constexpr int kFirstDigit = 1;
 constexpr int kFirstSegment = 2;
 

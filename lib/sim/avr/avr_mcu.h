@@ -68,7 +68,7 @@ class AvrMcu final : public Mcu {
   std::function<std::uint16_t(TimeNs time_ns)> on_conversion;
 
   void keypad_byte(std::uint8_t byte, TimeNs now_ns) override;
-  // Likewise, but with a framing error. Precondition: the chip has such a line.
+  // A byte with a framing error from the keypad. Precondition: the chip has such a line.
   void keypad_break(TimeNs now_ns);
   std::string take_keypad_display() override { return std::exchange(display_, {}); }
   // If set, it gets what would be taken: when the stop bit ends, and the byte.

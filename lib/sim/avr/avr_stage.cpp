@@ -22,7 +22,8 @@ constexpr double kFullScaleA = 5.11;  // of an output that is always high
 constexpr std::size_t kTccr2a = 0xB0;
 constexpr std::size_t kTccr2b = 0xB1;
 constexpr std::size_t kOcr2a = 0xB3;
-// Of the low-pass, with one pole: a new reference is there to 1 % within a tick.
+// The time constant of the low-pass, which has one pole: a new reference is there to 1 % within a
+// tick.
 constexpr double kFilterNs = 300'000;
 constexpr TimeNs kSampleNs = 5'000;
 constexpr double kSampleA = 0.001;  // less is not told

@@ -29,7 +29,7 @@ class AvrMemoryWatch {
  public:
   static constexpr std::uint16_t kReserve = 512;
 
-  // Of an image's ELF. The map is read once for each image.
+  // `image`: its ELF. The map is read once for each image.
   AvrMemoryWatch(avr_t* avr, const AvrChip& chip, const std::string& image,
                  const std::string& owners);
   ~AvrMemoryWatch();
@@ -40,7 +40,7 @@ class AvrMemoryWatch {
   // What was done wrong, once.
   const std::optional<std::string>& violation() const { return violation_; }
 
-  // Of simavr's: by the instruction at the program counter.
+  // Accesses that simavr makes, by the instruction at the program counter.
   void write(std::uint16_t address, std::uint8_t value);
   void read(std::uint16_t address);
   void stack_pointer(std::uint16_t address, std::uint8_t value);

@@ -44,7 +44,7 @@ class SimDisk final : public state::Disk {
   std::vector<std::string> names() const;
   std::vector<std::uint8_t>& content(const std::string& path);  // as it is on the medium as well
 
-  // Of SQLite's files as well.
+  // A write to a file, SQLite's included.
   struct Write {
     std::uint64_t offset;
     std::vector<std::uint8_t> bytes;

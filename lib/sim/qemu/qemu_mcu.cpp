@@ -139,7 +139,7 @@ void QemuMcu::violated(const lockstep_message& event) const {
                            map_->thing_at(event.address));
 }
 
-// Of itself.
+// QEMU has ended of itself.
 void QemuMcu::has_ended() const {
   siginfo_t how{};
   ::waitid(P_PID, static_cast<id_t>(process_), &how, WEXITED | WNOWAIT);

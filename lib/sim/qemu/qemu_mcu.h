@@ -70,7 +70,7 @@ class QemuMcu final : public Mcu {
   void wear_flash() { order(LOCKSTEP_WEAR_FLASH, 0); }      // it cannot be written
   void stick_inputs() { order(LOCKSTEP_STICK_INPUTS, 0); }  // the motors' all read high
 
-  // Of what the image has written; from the next boot on.
+  // Flips a bit of what the image has written; from the next boot on.
   void flip_flash_bit(std::uint32_t address, int bit);
 
   // Words written to its flash while it ran.

@@ -17,7 +17,7 @@ namespace {
 constexpr double kNoise = 1e-6;
 constexpr double kSpeedRatio = 2.0;
 constexpr int kMostRounds = 30;  // of looking for a factor
-// Of the factor from one round to the next. What coarse codes make of it falls in jumps.
+// How far the factor shrinks from one round to the next. Coarse codes make jumps of it.
 constexpr double kShrink = 0.9;
 constexpr double kLeastShrink = 0.5;
 
@@ -26,7 +26,7 @@ struct Pair {
   double slower_s;
   double faster_s;
   std::optional<std::size_t> index;  // none: the step from the side to the cruise delay
-  // Of the steps before and after the pair, the same as its own where there are none: a delay tells
+  // The delays before and after the pair, the same as its own where there are none: a delay tells
   // the mean speed of its step, and the steps of the pair have all speeds between these.
   double before_s;
   double after_s;
@@ -64,7 +64,7 @@ class Inspector {
     found_.push_back({severity, rule, side, index, value, limit, std::move(message)});
   }
 
-  // Of the side's codes only those above the cruise delay are ever run.
+  // Only those codes of the side that are above the cruise delay are ever run.
   void inspect_side(const bushd_ramp& side, Side which) {
     const char* name = which == Side::kAccel ? "accel" : "decel";
     const auto in_file = [&](std::size_t i) {

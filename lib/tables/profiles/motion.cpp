@@ -7,7 +7,7 @@ namespace bushd::tables::profiles {
 namespace {
 
 constexpr int kNewtonIterations = 60;
-// Of a segment's time: below that a double cannot tell two times apart.
+// A share of a segment's time: below that a double cannot tell two times apart.
 constexpr double kTimeResolution = 1e-15;
 
 double slope(const Segment& s) {
