@@ -100,7 +100,7 @@ void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start,
   plan_end();
 }
 
-// Of the motor, from the line's beginning, when the run has made so many.
+// The motor's steps from the line's beginning, when the run has made so many.
 std::int64_t Axis::line_steps(std::uint32_t run_steps) const {
   if (on_path()) {
     const Path& path = share_->track->path();
@@ -331,9 +331,9 @@ Tick Axis::end_of(const Place& place) const {
   return place.tick + (ns + tick_ns_ - 1) / tick_ns_;
 }
 
-// Of a share: first tick after the motor's last step, before the run's own end if the motor makes
-// none of its last ones. The position that follow_line tells reaches the last step in the
-// tick in which the run reaches `crossing`/256 of the step `last` of the line.
+// The end of a share: the first tick after the motor's last step, before the run's own end if the
+// motor makes none of its last ones. The position that follow_line tells reaches the last step in
+// the tick in which the run reaches `crossing`/256 of the step `last` of the line.
 Tick Axis::own_end_of(const Place& place) const {
   const std::uint32_t left = bushd_run_steps_left(&place.run);
   const std::uint32_t run_end = share_->from + place.run.steps_done + left;
@@ -437,7 +437,7 @@ std::optional<Change> Axis::executed(Tick until) {
   advance(base_, until);
   if (followed_ && !end_is_near_) plan_end();
   std::optional<Change> taken;
-  // Of a run that makes no step nothing comes after the change.
+  // Nothing comes after the change in a run that makes no step.
   if (change_ && (until > effective() || until >= over_tick())) {
     take_change(base_);
     taken = std::exchange(change_, std::nullopt);

@@ -41,7 +41,7 @@ struct Change {
   Tick at;
   std::optional<std::int64_t> target_steps;
   bushd_delay shortest_delay = 0;  // of the run from then on (engine/run.h)
-  // Of a line's run, with a target: where that ends. The line's shortest delay is in the line's
+  // Where the run of a line ends, with a target. The line's shortest delay is in the line's
   // time units.
   std::uint32_t run_steps = 0;
 };
@@ -49,7 +49,7 @@ struct Change {
 // What a motor makes of the run of its line, or of its path.
 struct LineShare {
   std::uint64_t way = 0;                               // its number, for logs
-  std::uint64_t line = 0;                              // of which it is, likewise
+  std::uint64_t line = 0;                              // the number of its line, for logs
   tables::TablePtr by = {};                            // the motor's own is not what it goes by
   std::shared_ptr<const tables::Envelope> table = {};  // of the run; none: of a path
   std::shared_ptr<RunBlocks> blocks = {};              // of the run of a line, for all its motors
@@ -127,7 +127,7 @@ class Axis {
   // change(). Precondition: busy().
   void stop();
   void aim(std::int64_t target_steps, bushd_delay shortest_delay = 0);
-  // Of a line: an end of it, by its steps.
+  // Another end of its line, by the line's steps.
   void aim_on_line(std::uint32_t line_step, bushd_delay shortest_delay);
 
   // The plan does not yet do what is wanted, and can be changed: of two changes the first must have
@@ -191,7 +191,7 @@ class Axis {
   std::int64_t executed_steps() const { return steps_of(base_); }
   // Where it stands, as planned, when the ticks before `tick` have been run. O(ticks ahead).
   std::int64_t steps_at(Tick tick) const;
-  // Of this run: +1, -1. Of a path where it is, as executed.
+  // The direction of this run, +1 or -1; on a path that where it is, as executed.
   int direction() const;
   // Where this run ends, as planned now, and where the motor was last told to go.
   std::int64_t planned_end_steps() const { return planned_end_; }
@@ -199,10 +199,10 @@ class Axis {
   bushd_delay shortest_delay() const { return shortest_delay_; }
   // Where the motor will stand when all is done: after a second run, if it takes one.
   std::int64_t end_steps() const { return stopping_ ? planned_end_ : target_; }
-  // Of the step that runs at the last executed tick; 0 when not moving.
+  // The speed of the step that runs at the last executed tick; 0 when not moving.
   double velocity_steps_per_s() const;
 
-  // Of a line, by its steps: where it is, as executed, where its run ends, as planned now, and
+  // On a line, by its steps: where it is, as executed, where its run ends, as planned now, and
   // where it is to end. Its run is over for all motors at over_tick(); this one's last step is made
   // by end_tick(). Without a line that is the same.
   const std::optional<LineShare>& line() const { return share_; }
@@ -219,8 +219,8 @@ class Axis {
     std::int64_t told_256;  // where the share has led by then, 1/256 step from the line's beginning
     PathRun path;           // in place of `run`, `line`
     std::int64_t made;      // steps that this has taken, as its MCU counts them (engine/slots.h)
-    // Of a trajectory: on it, or by the run to rest from the step `left_at` on, whose direction is
-    // that of the run. told_256 counts from step 0.
+    // Along a trajectory: on it, or by the run to rest from the step `left_at` on, whose direction
+    // is that of the run. told_256 counts from step 0.
     bool follows;
     std::int64_t left_at;
     Follower follower;

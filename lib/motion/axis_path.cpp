@@ -44,7 +44,7 @@ int Axis::direction() const {
   if (followed_ && base_.follows) return base_.follower.direction() < 0 ? -1 : 1;
   if (!on_path()) return share_ ? share_->direction : base_.run.direction;
   const Path& path = share_->track->path();
-  // Of one that stands, where it came from.
+  // The direction from which it came, if it stands.
   for (std::size_t i = base_.path.segment() + 1; i-- > 0 && path.segments() > 0;) {
     const std::int64_t way = path.point(i + 1, share_->motor) - path.point(i, share_->motor);
     if (way != 0) return way < 0 ? -1 : 1;

@@ -109,8 +109,8 @@ void Axis::follow_trajectory(Place& place, std::size_t ticks, std::int16_t* out,
   }
 }
 
-// Of the running step in a tick, as the fastest one of it has it, and the one after this moment: a
-// ramp-down from it is not too short.
+// The way in a tick at the speed of the running step, as the fastest one of the tick has it, and
+// the one after this moment: a ramp-down from it is not too short.
 std::int64_t Axis::way_on_trajectory(const Place& place) const {
   const Follower& now = place.follower;
   // One that has all but come to rest since goes no faster than twice as it does.

@@ -188,7 +188,7 @@ std::vector<Event> Motor::report(const Report& report) {
   take_limits(report.of_mcu);
   if (has_plan()) follow(report, events);
   const bool by_itself = autonomous_ || has_bit(report.of_mcu.autonomous, output());
-  // Of one that is homed who has asked for that knows what its position is.
+  // Whoever has asked for homing knows what the position of the motor is.
   if (by_itself) follow_count(before);
   follow_autonomous(report.of_mcu, free && position_ != before);
   follow_asked_for();
@@ -463,7 +463,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
 
 std::optional<event::Ended> Motor::starts_late(const bushd_report& report) {
   const bool ran_down = report.faults != 0;  // says the next report
-  // Of a move that was cancelled before its start no tick is missed.
+  // No tick is missed of a move that was cancelled before its start.
   const bool cancelled = axis_.end_tick() <= axis_.start_tick();
   take_limits(report);
   const bool limited = forbidden_up_ || forbidden_down_;  // says the next report

@@ -251,7 +251,7 @@ class Motor {
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by`: why, if nobody has asked for it.
   void stop(std::optional<std::string> ended_by = {});
-  // Of one that moves and was stopped: nobody has asked for that. At its target it settles.
+  // It moves and was stopped, and nobody has asked for that. At its target it settles.
   void is_stopped_by_others() { moving_now().by_others = true; }
   // The plan is not yet what was requested, and can be changed.
   bool needs_change() const { return moves() && axis_.needs_change(); }
@@ -356,8 +356,9 @@ class Motor {
   std::optional<std::string> uncertain_reason_;
   std::optional<std::string> restored_reason_;
   bool restoring_ = false;
-  bool autonomous_ = false;      // as reported last: its MCU moves it by itself
-  bool moved_by_other_ = false;  // likewise: it has moved and still does, without a plan here
+  bool autonomous_ = false;  // as reported last: its MCU moves it by itself
+  bool moved_by_other_ =
+      false;  // as reported last: it has moved and still does, without a plan here
   bool forbidden_up_ = false;
   bool forbidden_down_ = false;
 };

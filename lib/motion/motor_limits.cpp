@@ -216,7 +216,7 @@ Result<void> Motor::stands_within_soft_limits() const {
                   setup_.coordinates.text(position_), text_of(range)));
 }
 
-// Of a motor without a unit nothing is rounded.
+// Nothing is rounded for a motor without a unit, so amounts in steps are whole.
 Result<void> Motor::is_amount(const words::Amount& amount) const {
   const auto* user = std::get_if<words::UserUnits>(&amount);
   if (user == nullptr || setup_.coordinates.has_unit()) return {};

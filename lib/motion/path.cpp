@@ -11,7 +11,7 @@
 namespace bushd::motion {
 namespace {
 
-// Of a delay that is not known better than to the last digit of a double.
+// Rounds up a delay that is not known better than to the last digit of a double.
 std::uint32_t rounded_up(double delay) {
   if (delay >= kRest - 1.0) return kRest - 1;
   const auto whole = static_cast<std::uint32_t>(delay);
@@ -193,7 +193,7 @@ std::uint32_t Path::corner(const Shares& before, const Shares& behind) const {
   return rounded_up(std::sqrt(least));
 }
 
-// Of the first step behind it, after one of this delay.
+// The least delay of the first step behind a border, after one of this delay.
 std::uint32_t Path::least_behind(const Shares& before, const Shares& behind,
                                  std::uint32_t delay) const {
   double least = 1;
@@ -208,7 +208,7 @@ std::uint32_t Path::least_behind(const Shares& before, const Shares& behind,
   return rounded_up(std::sqrt(least));
 }
 
-// Of the last step before it, with one of this delay behind it.
+// The least delay of the last step before a border, with one of this delay behind it.
 std::uint32_t Path::least_before(const Shares& before, const Shares& behind,
                                  std::uint32_t delay) const {
   double least = 1;
@@ -282,8 +282,8 @@ void Path::raise_heads(std::size_t segment, const Shares& before, const Shares& 
   }
 }
 
-// Of segments that end with rest or with the step of `side` behind them: `side` becomes that of
-// its own first step.
+// The delay of the first step of a segment that ends with rest or with the step of `side` behind
+// it: `side` becomes that of its own first step.
 std::uint32_t Path::first_delay(std::size_t segment, const Shares& before, const Shares& now,
                                 const Places& places) const {
   std::uint32_t least = flat_[segment];

@@ -70,7 +70,7 @@ class Path {
   std::size_t segments() const { return start_.size() - 1; }
   std::uint32_t unit_ns() const { return unit_ns_; }
   std::uint64_t steps() const { return start_.back(); }
-  // Of the run, at the beginning of a segment; that of segments() is steps(), where it ends.
+  // The step of the run at which a segment begins; that of segments() is steps(), where it ends.
   std::uint32_t start_of(std::size_t segment) const {
     return static_cast<std::uint32_t>(start_[segment]);
   }
@@ -100,7 +100,7 @@ class Path {
   // Delays of a segment. O(its codes).
   Profile profile(std::size_t segment) const;
 
-  // Of a run that ends at rest within the path: its delays by segment up to there, back to where
+  // A run that ends at rest within the path: its delays by segment up to there, back to where
   // they are the path's own.
   using Parts = std::map<std::size_t, Profile>;
   Parts parts_to(std::uint32_t step) const;
@@ -183,7 +183,7 @@ class Path {
   std::vector<std::int32_t> decel_;
   std::vector<double> fastest_;
 
-  // Of the pass that is under way.
+  // The pass that is under way.
   Phase phase_ = Phase::kDone;  // nothing to do without points
   std::size_t at_ = 0;
   std::uint32_t delay_ = 0;

@@ -8,7 +8,7 @@
 namespace bushd::motion {
 namespace {
 
-// Of a motor in so many steps of the run, but for parts of steps.
+// Steps of a motor in so many steps of the run, but for parts of steps.
 std::int64_t own_steps(const PathShare& share, std::uint32_t steps) {
   return static_cast<std::int64_t>(std::uint64_t{share.steps} * steps / share.longest);
 }

@@ -25,7 +25,7 @@ class PathTrack {
   const std::shared_ptr<const Path>& shared_path() const { return path_; }
   std::uint32_t from() const { return path_->first_step(); }
   std::uint32_t to() const { return to_; }
-  // Of the part of a segment that it makes. Precondition: that is some of it.
+  // The delays of the part of a segment that it makes. Precondition: that is some of it.
   std::shared_ptr<const Profile> profile(std::size_t segment) const;
   // Time from its beginning to the end of a step of the path.
   std::uint64_t units_at(std::uint32_t step) const;

@@ -11,7 +11,7 @@ namespace {
 using Position = Trajectory::Position;
 using SignedWide = Trajectory::Segment::Wide;
 
-// Of u in a cubic.
+// Binary places of u in a cubic.
 constexpr int kShareBits = 40;
 
 // More than that in a tick no table allows, and no MCU takes.

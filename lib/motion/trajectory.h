@@ -31,7 +31,7 @@ class Trajectory {
   static constexpr std::size_t kMostRows = 100'000;
   enum class Interpolation { kLinear, kCubic };
 
-  // Of at least one motor.
+  // Precondition: motors >= 1.
   Trajectory(std::size_t motors, Interpolation interpolation)
       : motors_(motors), interpolation_(interpolation) {}
 

@@ -25,7 +25,7 @@ using bushd::Result;
 using bushd::client::Client;
 using nlohmann::ordered_json;
 
-// Of BUSHD-2 (docs/camac.md).
+// The memory of a BUSHD-2 (docs/camac.md).
 constexpr std::uint32_t kPageBytes = 256;
 constexpr std::uint32_t kCodes = 238;
 constexpr std::uint32_t kFirstCode = 2;

@@ -135,7 +135,7 @@ api::Reply worded(api::Reply reply, const Wording& wording) {
   return reply;
 }
 
-// Of a path; kDone if all of its points but those of the last request are taken.
+// Tells a path; kDone if all of its points but those of the last request are taken.
 int bring(Client& client, const std::vector<api::MovePath>& parts, const Wording& wording) {
   for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
     const auto reply = client.run(parts[i], Client::Until::kResult);

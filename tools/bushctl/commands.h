@@ -98,12 +98,12 @@ int complete(const bushd::client::Status& status, const bushd::client::Status::M
              const char* things);
 // Says on stderr why.
 int failed(const bushd::Error& error);
-// Of words that make no request.
+// Says what is wrong with words that make no request.
 int wrong_usage(const bushd::Error& error);
 int refused(const bushd::api::Reply& reply);
 
 std::chrono::milliseconds milliseconds(double seconds);
-// Of the clock on the wall, since 1970.
+// The clock on the wall, since 1970.
 std::int64_t unix_us();
 
 }  // namespace bushctl

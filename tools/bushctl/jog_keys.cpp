@@ -10,8 +10,8 @@ constexpr char kEndOfInput = '\x04';   // Ctrl-D
 constexpr char kSuspendByte = '\x1a';  // Ctrl-Z
 constexpr std::size_t kLongestSequence = 16;
 
-// Of the sequence that `bytes` begin with, an escape byte first: ESC, ESC O x, ESC [ ... x, where x
-// is the first letter or the like. 0: it is not complete.
+// The length of the sequence that `bytes` begin with, an escape byte first: ESC, ESC O x, ESC [ ...
+// x, where x is the first letter or the like. 0: it is not complete.
 std::size_t sequence_length(std::string_view bytes) {
   if (bytes.size() == 1) return 0;
   if (bytes[1] == 'O') return bytes.size() < 3 ? 0 : 3;

@@ -19,7 +19,7 @@ struct JogPanelOptions {
   std::string motor{};
   bool in_steps = false;  // else in the motor's unit
   double speed = 0;       // the first one; 0: as the motor's table starts
-  double step = 0;        // likewise; 0: a few steps of the motor
+  double step = 0;        // the first one; 0: a few steps of the motor
   std::int64_t keepalive_ms = 500;
 };
 

@@ -10,7 +10,8 @@
 
 namespace bushctl {
 
-// Of the motor at this place in the state; another one's never, whatever the network says.
+// The description of the motor at this place in the state; never another one's, whatever the
+// network says.
 bushd::api::MotorDescription description_of(const bushd::api::Description& mcu, std::size_t index,
                                             const std::string& motor);
 

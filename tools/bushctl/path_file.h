@@ -20,7 +20,7 @@ struct PathFile {
   std::string located(const std::string& reason) const;
 };
 
-// Of a file's text: a header of motors' names, and rows of positions in their units.
+// Reads a file's text: a header of motors' names, and rows of positions in their units.
 bushd::Result<PathFile> parse_path(std::string_view text, const std::string& file,
                                    const std::string& corners, const std::string& speed);
 

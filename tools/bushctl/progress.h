@@ -12,7 +12,7 @@
 
 namespace bushctl {
 
-// Of this terminal, with the last one left free, where some would go on to the next line.
+// Columns of this terminal but the last one, where some terminals would go on to the next line.
 std::size_t columns_of_terminal(int fd);
 
 class Progress {

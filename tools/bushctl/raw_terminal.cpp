@@ -10,7 +10,7 @@
 namespace bushctl {
 namespace {
 
-// Of what comes without an end, so much at a time.
+// So much is read at a time of what comes without an end.
 constexpr std::size_t kMostAtOnce = 1 << 20;
 
 }  // namespace

@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kLookAgainAfter{100};
 constexpr std::chrono::milliseconds kStateWithin{1000};
 
-// Of the first MCU that takes no moves; "": all do.
+// What keeps the first MCU from taking moves that takes none; "": all take them.
 std::string what_is_not_ready(const Status& status) {
   if (status.states.empty()) return "the state of its MCUs has not come";
   for (std::size_t i = 0; i < status.states.size(); ++i) {

@@ -277,7 +277,7 @@ std::vector<std::string> lines(const api::Reply& reply) {
     return out;
   }
   const std::string outcome(word(completed->outcome));
-  // Of what was done there may be more to tell; of what was not, stderr tells.
+  // There may be more to tell of what was done; stderr tells what was not.
   if (completed->outcome != api::Outcome::kDone) return {outcome};
   const bool repeats = completed->reason.starts_with(outcome);
   return {bushd::printable(repeats ? completed->reason : outcome + ": " + completed->reason)};

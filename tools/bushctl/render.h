@@ -24,11 +24,11 @@ std::string lost_text(std::uint64_t messages);
 // target, velocity, moving or at rest, trust when it is not "known".
 std::string motor_line(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 
-// Of the same motor: "at 5.3 of 12.5 mm".
+// The way of the same motor: "at 5.3 of 12.5 mm".
 std::string way_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 
-// Of the same motor: "5.3 mm, 0.25 mm/s", "5.3 mm, at rest". And what bounds it: "uncertain |
-// limit positive | -5 .. 25".
+// Where the same motor stands: "5.3 mm, 0.25 mm/s", "5.3 mm, at rest". And what bounds it:
+// "uncertain | limit positive | -5 .. 25".
 std::string stand_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 std::string bounds_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 
@@ -43,8 +43,8 @@ std::vector<std::string> lines(const bushd::api::MovePlan& plan);
 // which is for stderr.
 std::vector<std::string> lines(const bushd::api::Reply& reply);
 
-// Of motors that reached a position which is not quite the one that they were sent to, since there
-// is no step: "theta: at 12.3448 mm, asked 12.345".
+// A line for each motor that reached a position which is not quite the one that it was sent to,
+// since there is no step: "theta: at 12.3448 mm, asked 12.345".
 std::vector<std::string> rounding_lines(const bushd::api::Request& request,
                                         const bushd::api::Reply& reply);
 

@@ -20,7 +20,7 @@ namespace config = bushd::config;
 using bushd::fail;
 using bushd::Result;
 
-// Of a daemon that is newer, a text.
+// A value of a key that a newer daemon has is a text.
 nlohmann::json json_of(const std::string& key, const std::string& value) {
   for (const auto word : {config::SettingKey::kDirection, config::SettingKey::kInputActive}) {
     if (key == name_of(word)) return value;

@@ -121,7 +121,7 @@ group = "all"
                                  prefix, bus, mcu.address);
   if (mcu.identity.motors > 1) {
     text += fmt::format(R"(
-#[[motor]]                # likewise up to output {3}
+#[[motor]]                # so on up to output {3}
 #name = "{0}m{2}-1"
 #mcu = "{1}:{2}"
 #output = 1

@@ -16,7 +16,7 @@ struct Whereabouts {
   double age_s = 0;  // of the state
 };
 
-// Of these motors in this order; none named: of all. Error: a name that is none.
+// Where these motors stand, in this order; none named: all. Error: a name that is none.
 bushd::Result<std::vector<Whereabouts>> where(const bushd::client::Status& status,
                                               const std::vector<std::string>& names,
                                               std::int64_t now_us);

@@ -50,7 +50,7 @@ bushd::tables::TableContent with_code(bushd::tables::TableContent content, CodeR
                                       std::uint16_t code);
 // The code once more; of cruise nothing changes.
 bushd::tables::TableContent with_copy(bushd::tables::TableContent content, std::size_t at);
-// Of cruise it goes with the last code of accel again.
+// A cruise delay in the range is dropped: it is then that of the last code of accel.
 bushd::tables::TableContent without_codes(bushd::tables::TableContent content, CodeRange range);
 
 // Where two contents differ, for the log: "accel[3..17], cruise", "accel 238 to 240 codes".

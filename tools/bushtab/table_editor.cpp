@@ -14,7 +14,7 @@ namespace {
 namespace tables = bushd::tables;
 using tables::TableContent;
 
-// Of a table of 65535 codes that is 65 MB.
+// Undoing so much of a table with 65535 codes takes 65 MB.
 constexpr std::size_t kMaxUndo = 500;
 constexpr std::size_t kPageShare = 20;  // a page is this share of all codes
 constexpr double kDragFactor = 1.01;

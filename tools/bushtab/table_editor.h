@@ -35,7 +35,7 @@ class TableEditor {
   Wish press(Key key);
   // Ctrl-C: leaves what is being typed, else wants to quit.
   Wish interrupt();
-  // Of kSaveAs: the other table.
+  // The name of the other table of kSaveAs.
   const std::string& wished_name() const { return wished_name_; }
   void saved(std::uint32_t revision);
   void refused(std::string why);
@@ -50,7 +50,7 @@ class TableEditor {
   const bushd::tables::Table& table() const { return *table_; }
   std::uint32_t revision() const { return revision_; }
   bool changed() const { return now_.content != saved_; }
-  // Of the check, those that are errors.
+  // How many findings of the check are errors.
   std::size_t errors() const;
   // What was changed since the last save; a note for the log.
   std::string note() const { return difference_text(saved_, now_.content); }

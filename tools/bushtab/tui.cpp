@@ -102,7 +102,7 @@ bool grant(const Places& places, Original& original, TableEditor& editor, TableE
 // False: the terminal went away, or the program was told to end.
 bool edit_in(Terminal& terminal, const Places& places, Original& original, TableEditor& editor) {
   while (true) {
-    // Of a held key that comes faster than it can be drawn nothing is left when it is let go.
+    // A held key that comes faster than it can be drawn leaves nothing to draw when it is let go.
     if (!terminal.key_waits()) terminal.draw(render(editor, terminal.window()));
     const Terminal::Input input = terminal.wait();
     switch (input.event) {

@@ -24,7 +24,7 @@ def arrange(motors, slots):
     for motor in motors:
         for i, step in enumerate(motor.steps):
             if step.move.emission in PERIODIC:
-                # Of one that met its limit nobody knows how many of its steps were made.
+                # Nobody knows how many steps one has made that met its limit.
                 apart = motor.output if step.move.result == "limit" else None
                 together[step.tick, step.nth, apart].append((motor.output, motor, i))
     for (tick, nth, _), group in together.items():

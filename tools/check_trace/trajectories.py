@@ -188,7 +188,7 @@ class TrajectoryMove(Move):
         # What is still being caught up was told in half its time.
         caught_up = told == at + (direction or 1) * (STEP // 2)
         begun = (parts - 256 * made) * (direction or 1) if caught_up else 0
-        # Of its time less is over than of its way, where it was told faster than it goes now.
+        # Less of its time is over than of its way, where it was told faster than it goes now.
         begun = min(max(begun * min(fastest, fastest_told) // fastest_told, 0), 255)
         delays = []
         if 0 < delay <= 65535:

@@ -17,7 +17,7 @@ THEMES = {
     "light": {"window": "#f6f8fa", "edge": "#c4ccd4", "bar": "#e4e8ed", "knob": "#aab3bd", "ink": "#1f2328", "prompt": "#1a7f37"},
     "dark": {"window": "#1c1f24", "edge": "#3d444d", "bar": "#30353d", "knob": "#5b626d", "ink": "#d6dae0", "prompt": "#7fb77e"},
 }
-# Of Braille, dots 1 to 8: column and row.
+# Column and row of the dots 1 to 8 of Braille.
 DOTS = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3)]
 ARMS = {"LEFT": (0, 0.5), "RIGHT": (1, 0.5), "UP": (0.5, 0), "DOWN": (0.5, 1)}
 ARROWS = {"←": (-1, 0), "→": (1, 0), "↑": (0, -1), "↓": (0, 1)}

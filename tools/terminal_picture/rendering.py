@@ -10,7 +10,7 @@ import tempfile
 
 PROGRAMS = {"chromium": "chromium", "librsvg": "rsvg-convert"}
 THEMES = ("light", "dark")
-# Of the sheet, behind pictures that leave it out.
+# The colour of the sheet, behind pictures that leave it out.
 PAPER = {"light": "#ffffff", "dark": "#0d1117"}
 # Headless, alone, and asking nobody for anything.
 QUIET = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",

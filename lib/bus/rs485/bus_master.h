@@ -147,13 +147,13 @@ class BusMaster {
   }
   // It can make runs of lines, and may: ticks need not be told one by one.
   virtual bool makes_lines(McuIndex) const { return false; }
-  // Of any MCU that makes lines: whether it is fast enough for that.
+  // Whether an MCU that makes lines is fast enough for this one.
   virtual bool keeps_up_with(McuIndex, const bushd_table&, bushd_delay /*shortest_delay*/,
                              bool /*alone*/) const {
     return false;
   }
   virtual void begin_line_run(McuIndex, std::uint8_t, Tick, const LineRun&) {}
-  // Of a table of the MCU that makes the same runs as this one.
+  // The bank of a table that makes the same runs as this one.
   virtual std::optional<std::uint8_t> bank_of(McuIndex, const bushd_table&) const {
     return std::nullopt;
   }

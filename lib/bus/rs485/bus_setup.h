@@ -45,11 +45,11 @@ struct McuSetup {
   bushd_set_outputs outputs{.step_low = 0, .direction_low = 0, .enabled = BUSHD_ENABLED_HIGH};
   Error outputs_at{};  // where one of them is said to be active low; without a message
   bushd_set_inputs inputs{};
-  // Of motors whose switches are not all at the input with the number of their output.
+  // Inputs of motors whose switches are not all at the input with the number of their output.
   std::vector<bushd_motor_inputs> motor_inputs{};
-  // Of all motors that are driven by phases: those without current control have zeros.
+  // Currents of all motors that are driven by phases: those without current control have zeros.
   std::vector<bushd_currents> currents{};
-  // Of all motors that people move at it: those that do so by their table have zeros.
+  // Velocities of all motors that people move at it: those that move by their table have zeros.
   std::vector<bushd_set_velocity> velocities{};
   std::uint16_t used_inputs = 0;
   bool off_after_watchdog = false;  // then drivers stay off until control() enables them

@@ -40,7 +40,8 @@ class ReportedCounters {
   std::uint16_t ramp_downs_ = 0;
 };
 
-// Of an adapter: from when the line has carried an answer's last byte to when the program had it.
+// The latency of an adapter: from when the bus has carried an answer's last byte to when the
+// program had it.
 struct Latency {
   static constexpr std::array<std::int64_t, 7> kBoundsUs = {500,   1'000,  2'000, 4'000,
                                                             8'000, 16'000, 32'000};

@@ -57,7 +57,8 @@ Result<void> check_time(const McuSetup& setup, const bushd_identity& identity,
   return {};
 }
 
-// Of even emission: steps that wait for DIR would be followed by others too soon.
+// Even emission needs a long first delay: steps that wait for DIR would be followed by others too
+// soon.
 Result<void> check_dir_setup(const McuSetup& setup) {
   const bushd_emission& settings = setup.emission.settings;
   if (settings.mode != BUSHD_EMISSION_EVEN) return {};

@@ -26,7 +26,7 @@ struct McuView {
   // then there has been another one.
   std::int64_t outdated_us = 0;
   Tick tick = 0;                                         // report.tick, unwrapped
-  std::array<Tick, BUSHD_MOTORS_PER_MCU> known_until{};  // likewise
+  std::array<Tick, BUSHD_MOTORS_PER_MCU> known_until{};  // those of the report, unwrapped
   std::string uncertain_reason{};                        // of the last PositionUncertain
   std::string note{};  // what people should know of it while it is online
   // An emergency stop that nobody has cleared binds it, whether it is there or not.

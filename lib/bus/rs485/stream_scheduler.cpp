@@ -181,7 +181,7 @@ std::int64_t StreamScheduler::carried_us(std::int64_t now_us, const LineUse& use
   }
   // Before one that is sent and not confirmed no other one goes to its MCU.
   if (!confirmed) at_us += use.confirm_us;
-  // Of motors that go on.
+  // The ticks of motors that go on.
   const Tick critical = clock_.tick_at(at_us) + clock_.ticks_in(use.margin_us);
   for (const McuIndex i : mcus_.indices()) {
     std::uint16_t asked = 0;
@@ -261,7 +261,7 @@ void StreamScheduler::follow_streams(McuIndex index) {
     // A frame that it shares with others may have gone on past its end: that is rest, and no MCU
     // takes it alone.
     const Tick needed = std::min(stream.sent, source_.end_tick(index, m));
-    // Of a stream that has not begun nothing can be missing; but a busy line may keep it waiting
+    // Nothing can be missing of a stream that has not begun; but a busy bus may keep it waiting
     // past its start.
     if (stream.begun() ? known >= needed : moving || known <= stream.start) continue;
     if (!moving && known > stream.start) {

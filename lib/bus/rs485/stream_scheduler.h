@@ -141,13 +141,13 @@ class StreamScheduler {
     std::int64_t replaced_us = 0;  // when that was
     unsigned failures = 0;         // of replacements, in a row
 
-    // Of a motor whose replacement still waits, or has just failed, the next ticks belong to a plan
+    // The next ticks of a motor whose replacement still waits, or has just failed, belong to a plan
     // that the MCU does not know.
     bool sendable(unsigned motor) const {
       return stream[motor].active && !stream[motor].finished &&
              ((replacing | unplanned) >> motor & 1) == 0;
     }
-    // Of all motors that are sendable; none: there is none.
+    // The first tick that is due of all motors that are sendable; none: there is none.
     std::optional<Tick> next_tick() const;
   };
   // What the next frame to an MCU may hold: the motors whose next tick is the oldest.
@@ -183,7 +183,8 @@ class StreamScheduler {
                   unsigned flags);
   void note_sent(McuIndex mcu, std::uint8_t motor, Tick first, Tick until);
   Tick ticks_per_frame(std::uint16_t mask) const;
-  // Of a replacement: fewer after failures, as a short frame is sooner there and less often lost.
+  // Ticks in the frame of a replacement: fewer after failures, as a short frame is sooner there and
+  // less often lost.
   Tick ticks_of_replacement(const Mcu& mcu, std::uint16_t mask) const;
 
   const BusSetup& setup_;

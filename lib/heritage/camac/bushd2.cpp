@@ -13,7 +13,7 @@ constexpr int kEndEnabled = 7;
 constexpr int kDirection = 8;
 constexpr int kMotorMask = 0x1F;
 
-// Of the status.
+// Bits of the status.
 constexpr unsigned kRightLimit = 0x01;
 constexpr unsigned kLeftLimit = 0x02;
 constexpr unsigned kSupplyMissing = 0x04;

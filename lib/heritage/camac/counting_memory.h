@@ -25,7 +25,8 @@ class CountingMemory {
 
   std::size_t size() const { return bytes_.size(); }
   std::span<const std::uint8_t> bytes() const { return bytes_; }
-  // Of all; what is more than the memory is ignored, what is less leaves the rest as it is.
+  // Loads all of it; what is more than the memory is ignored, what is less leaves the rest as it
+  // is.
   void load(std::span<const std::uint8_t> bytes);
   // Two bytes, the low one at the lower address. Precondition: address + 1 < size().
   std::uint16_t word_at(std::size_t address) const;

@@ -45,11 +45,12 @@ struct Block {
   static constexpr int kMostTries = 100;
 
   BlockMode mode = BlockMode::kSingle;
-  // Of a block other than kSingle the first one has the address, and each one a word, if it writes.
+  // The first cycle of a block other than kSingle has the address, and each one a word, if it
+  // writes.
   std::vector<Naf> cycles{};  // at least one
   // Words; of kSingle and of blocks that write as many as there are cycles.
   std::uint32_t count = 1;
-  // Of kScan: the last address, inclusive.
+  // The last address of a kScan, inclusive.
   int last_station = kStations;
   int last_subaddress = kLastSubaddress;
   static void fields(auto& self, auto& visit) {
@@ -68,7 +69,8 @@ struct Block {
 };
 
 struct BlockResult {
-  // Of the cycles that moved a word, of kSingle of all; of one address that by which it ended, too.
+  // Responses of the cycles that moved a word, and of all cycles of kSingle; a block at one address
+  // has that too by which it ended.
   std::vector<Response> responses{};
   std::uint32_t tally = 0;  // words moved; of kSingle cycles made
   friend bool operator==(const BlockResult&, const BlockResult&) = default;

@@ -26,7 +26,7 @@ struct Travel {
 
   bool left = false;                   // the first run
   std::vector<std::uint16_t> codes{};  // one for each step; 1..30000
-  std::uint16_t return_delay = 1;      // likewise
+  std::uint16_t return_delay = 1;      // 1..30000
   // Each reactor start begins a travel; one that comes during a travel is ignored. Otherwise one
   // travel begins at once.
   bool synchronous = false;

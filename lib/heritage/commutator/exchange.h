@@ -77,7 +77,7 @@ class Exchange {
   };
   struct Event {
     std::optional<Answer> answer;  // of the step asked for; then free()
-    std::optional<Lost> lost;      // likewise
+    std::optional<Lost> lost;      // of the step asked for; then free()
     bool stray = false;            // a byte that answers nothing
   };
   Event receive(std::int64_t now_us, std::uint8_t byte);

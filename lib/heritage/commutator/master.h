@@ -67,7 +67,7 @@ class CommutatorMaster final : public link::BusMaster {
   void bind_to_stop(link::McuIndex, bushd_stop_mode mode) override { emergency_stop(mode); }
 
   void reconfigure(link::McuIndex mcu, link::McuSetup setup) override;
-  // Of a table with steps that come sooner than one delay code: the board could not keep it.
+  // Refuses a table with steps that come sooner than one delay code: the board could not keep it.
   Result<void> check_room(link::McuIndex mcu, const link::McuSetup& setup) const override;
   void control(link::McuIndex mcu, std::uint8_t actions) override;
   void set_position(link::McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) override;
@@ -78,7 +78,7 @@ class CommutatorMaster final : public link::BusMaster {
     PlannedSteps steps;
     std::optional<PlannedSteps::Step> asked{};  // of the board
     bool cut = false;                           // no step more
-    // Of the code sent last, and the interval between its step and the one before.
+    // The code sent last, and the interval between its step and the one before.
     std::int64_t sent_us = 0;
     std::uint64_t delay_ns = 0;
     std::uint64_t interval_ns = UINT64_MAX;

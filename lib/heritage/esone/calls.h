@@ -61,7 +61,7 @@ class Calls {
 
   // One cycle. `data` may be null for a function that moves none.
   Status cycle(int f, std::int32_t ext, std::uint32_t* data, bool* q);
-  // Of the last one at this address; 0 before the first.
+  // The status of the last cycle at this address; 0 before the first.
   Status last_of(std::int32_t ext) const;
   // A cycle of the controller of the crate that EXT is in.
   Status control(std::int32_t ext, int n, int a, int f, bool* q);

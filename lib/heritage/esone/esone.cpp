@@ -62,7 +62,7 @@ int call(const Work& work) {
   }
 }
 
-// Of a call that returns a logical.
+// A call that returns a logical.
 template <class Work>
 int call(std::int32_t* logical, const Work& work) {
   bool value = false;

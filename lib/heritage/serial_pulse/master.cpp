@@ -279,7 +279,7 @@ void SerialPulseMaster::begin(McuIndex, std::uint8_t, Tick start) {
 void SerialPulseMaster::begin_run(std::int64_t now_us, const link::MotorPlan& plan, Tick start,
                                   bool planned) {
   const bushd_run& run = plan.run;
-  // Of a line the delay before the first step counts from when all are ready.
+  // The delay before the first step of a line counts from when all are ready.
   const std::int64_t first_us =
       plan.line ? 0
                 : us_of(static_cast<std::int64_t>(bushd_run_delay(&run) * run.table->time_unit_ns));

@@ -113,7 +113,7 @@ class SerialPulseMaster final : public link::BusMaster, private link::LinePort {
     std::uint8_t steps;
     std::int64_t takes_ns;
     std::int64_t last_step_ns;  // behind its first one
-    // Of a line: times of its run at which the first and the last of them are due.
+    // On a line: times of its run at which the first and the last of them are due.
     std::int64_t first_ns;
     std::int64_t last_ns;
   };

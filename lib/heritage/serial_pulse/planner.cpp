@@ -81,7 +81,7 @@ const Pattern* fastest_byte(const Ahead& ahead, std::size_t from, const Rate& ra
     if (allowed(last, ahead, from, rate.most)) return &last;
   }
   for (const Pattern& pattern : kAny) {
-    // Of the step behind it the delay has to be known.
+    // The delay of the step behind it has to be known.
     if (pattern.steps > left || (pattern.steps == left && !ahead.to_the_end)) continue;
     if (allowed(pattern, ahead, from, rate.most)) return &pattern;
   }

@@ -45,7 +45,7 @@ class Steps {
   std::uint64_t take_ns();
   std::uint32_t left() const;
   const bushd_table& table() const { return *run_.table; }
-  // Of the run, from its beginning: of the last step taken. Of a line only.
+  // When the last step taken is due, from the beginning of the run. On a line only.
   std::int64_t time_ns() const { return static_cast<std::int64_t>(last_ns_); }
   // The run's steps in which those of the motor lie that have been taken.
   std::uint32_t run_steps() const { return run_step_; }
@@ -70,7 +70,7 @@ class Steps {
   std::deque<bushd_run> then_;  // in the order of their steps; of a line there may be several
   std::optional<link::MotorPlan::Line> line_;
   bool ended_ = false;
-  // Of a line:
+  // On a line:
   std::uint32_t made_ = 0;      // steps of the motor from the line's beginning
   std::uint64_t run_ns_ = 0;    // time of the run where run_ is, by its steps
   std::uint64_t last_ns_ = 0;   // and of the step taken last

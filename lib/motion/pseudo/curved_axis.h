@@ -26,7 +26,7 @@ class CurvedAxis {
                                  const std::vector<std::string>& motors);
 
   std::size_t motors() const { return curves_.size(); }
-  // Of the calibration.
+  // The range of the calibration.
   Range range() const { return {curves_.front().first_x(), curves_.front().last_x()}; }
 
   // That of the first motor; beyond the calibration: its end.

@@ -335,4 +335,4 @@ class Table:
     cruise: int = 0  # 0: the last of accel
     description: str = ""
     revision: int = 0  # of the table that this one was made from; 0: none
-    hash: str = ""  # likewise, 64 hexadecimal digits; "": the table is new
+    hash: str = ""  # of that table, 64 hexadecimal digits; "": the table is new

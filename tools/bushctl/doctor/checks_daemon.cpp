@@ -126,7 +126,7 @@ Finding offline(const api::StateSnapshot& mcu) {
       kSeveral);
 }
 
-// Of the MCUs of all buses, by bus.
+// Compares the firmware of all MCUs, bus by bus.
 void check_versions(const Observations& seen, Findings& out) {
   std::set<std::int32_t> versions;
   std::size_t heard = 0;

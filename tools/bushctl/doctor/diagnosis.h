@@ -17,7 +17,7 @@ struct Finding {
       check{};         // configuration, port, lcm, clock, disk, socket, daemon, mcu, line, position
   std::string seen{};  // what it is about, and what was seen
   std::string remedy{};  // "" where nothing is wrong
-  // Of one of many things of which the same may be found: which one, and what is told of several at
+  // Where the same may be found of many things: which one it is, and what is told of several at
   // once, "motors are uncertain".
   std::string about{};
   std::string of_several{};

@@ -19,7 +19,7 @@ struct User {
   bool is_root() const { return uid == 0; }
 };
 
-// Of a file, as stat(2) tells.
+// Owner and mode of a file, as stat(2) tells.
 struct Rights {
   std::uint32_t uid = 0;
   std::uint32_t gid = 0;

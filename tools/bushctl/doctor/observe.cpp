@@ -190,7 +190,7 @@ Scope as_configured(Scope scope, const bushd::Result<bushd::config::Config>& con
   return scope;
 }
 
-// Of the daemon that runs here, if it tells; else that of the service.
+// The file of the daemon that runs here, if it tells; else that of the service.
 std::string configuration_to_examine(const Scope& scope) {
   if (const auto client = Client::open(scope.client); client && !(*client)->link().loses()) {
     DaemonSeen seen;
@@ -201,7 +201,7 @@ std::string configuration_to_examine(const Scope& scope) {
   return kSystemConfig;
 }
 
-// Of a pattern, the match that the daemon has open; "": none is, or nobody says.
+// The match of a pattern that the daemon has open; "": none is, or nobody says.
 std::string port_in_use(const DaemonSeen& daemon, const std::string& bus) {
   for (const auto& description : daemon.status.descriptions) {
     if (description.snapshot.bus == bus && !description.snapshot.port.empty()) {

@@ -36,7 +36,7 @@ Holder holder_of(std::int64_t pid) {
   return holder;
 }
 
-// Of other users' processes only root sees what they have open.
+// Only root sees what processes of other users have open.
 std::set<std::int64_t> who_has_open(const std::string& target) {
   std::set<std::int64_t> pids;
   std::error_code error;

@@ -25,7 +25,7 @@ std::string text_of(const std::string& path);
 // As a new login of that account would have them.
 std::vector<std::uint32_t> groups_of_account(const std::string& name);
 
-// Of a pattern: `in_use` is the match that the daemon has open, or "".
+// `in_use`: the match of a pattern that the daemon has open, or "".
 PortSeen port_seen(const std::string& bus, const std::string& configured,
                    const std::string& in_use);
 SocketSeen socket_seen(const std::string& path, const User& asking);

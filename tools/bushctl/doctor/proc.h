@@ -22,7 +22,7 @@ std::uint64_t datagrams_without_room(std::string_view text);
 // Sockets of /proc/net/udp at this port.
 std::vector<UdpSocket> udp_sockets(std::string_view text, std::uint32_t port);
 
-// Of /proc/locks: processes that have locked the whole of this file.
+// Processes that have locked the whole of this file, out of /proc/locks.
 std::vector<std::int64_t> lock_holders(std::string_view text, std::uint32_t device_major,
                                        std::uint32_t device_minor, std::uint64_t inode);
 
