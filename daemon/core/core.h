@@ -89,7 +89,7 @@ class Core {
 
   // Answers to what the outputs were asked, what the daemon has kept from before, and checks.
   TablesInService& tables() { return tables_; }
-  // The store of positions, likewise.
+  // The store of positions: its answers, what the daemon has kept from before, and checks.
   KeptPositions& kept() { return kept_; }
 
   // Ramps down all motors and takes no more moves.

@@ -17,7 +17,7 @@ std::string by_cause(std::uint8_t reset_cause) {
   return word.empty() ? word : " (" + word + ")";
 }
 
-// Of the motors that the MCU has, as far as they are configured.
+// Whether a motor is among those that the report of its MCU has.
 bool is_reported(const Mcu& mcu, const motion::Motor& motor) {
   return motor.output().value < mcu.report().motor_count;
 }

@@ -13,7 +13,7 @@ namespace bushd::daemon {
 struct Arrival {
   std::int64_t earliest_ns;
   std::int64_t latest_ns;
-  // Of one stream (not 0) messages are read in the order in which they were sent, or numbered.
+  // Messages of one stream (not 0) are read in the order in which they were sent, or numbered.
   std::int64_t stream = 0;
 };
 

@@ -65,7 +65,7 @@ class LcmFront : public Listener {
   Publishing& publishing_;
   std::function<std::int64_t()> unix_us_;
   api::Sessions sessions_;
-  // Of requests that end motion and have no session: by who sent them and when, so that one that is
+  // Requests that end motion and have no session: by who sent them and when, so that one that is
   // repeated ends nothing that was asked for since.
   api::Sessions without_session_;
   std::uint64_t dropped_ = 0;

@@ -138,8 +138,8 @@ class Mcu {
   void begin_table_run(Output output, link::Tick start, link::TableRun run) {
     master_.begin_table_run(on_bus_, output.value, start, run);
   }
-  // Of a motor's share that the MCUs are to make themselves, in so many ticks. Precondition:
-  // can_run_line of its line, or its table is yet to be uploaded.
+  // The run of a motor's share that the MCUs are to make themselves, in so many ticks.
+  // Precondition: can_run_line of its line, or its table is yet to be uploaded.
   link::LineRun line_run(const motion::LineShare& share, bushd_delay shortest_delay,
                          link::Tick ticks) const;
   link::LineRun line_run(const motion::Axis& axis) const {
@@ -235,15 +235,15 @@ class Installation {
 
   // By the names that clients use; none of them twice.
   Result<MotorId> find(const std::string& name) const;
-  // Of motors and computed axes, and of groups.
+  // The names of motors and computed axes, or those of groups.
   std::vector<std::string_view> names(bool of_groups) const;
   Result<std::vector<MotorId>> find(const api::MotorNames& names) const;
   Result<std::vector<MotorId>> find(const std::vector<api::MotorAmount>& motors) const;
   Result<std::vector<MotorId>> find_or_all(const api::MotorNames& names) const;  // none named: all
   // Motors, or those of groups, each once; none named: all.
   Result<std::vector<MotorId>> find_with_groups(const api::MotorNames& names) const;
-  // Likewise, as far as there are such motors, or groups where these may be named: for what ends
-  // motion, which does what it can. None named: all.
+  // The motors as far as there are such, or groups where these may be named: for what ends motion,
+  // which does what it can. None named: all.
   struct Known {
     std::vector<MotorId> motors{};
     std::string unknown{};  // what is said of the other names; "": there are none

@@ -23,7 +23,7 @@ using LogSubject = std::variant<std::monostate, MotorId, McuId>;
 class Outputs : public api::Publisher {
  public:
   virtual void send(BusId bus, std::span<const std::uint8_t> bytes) = 0;
-  // Of a port that is more than bytes; answered by Core::pulse_status, at once.
+  // An order to a port that is more than bytes; answered by Core::pulse_status, at once.
   virtual void pulse(BusId, const link::PulseOrder&) {}
   virtual void move_log(const std::string& json_line) = 0;
   virtual void log(LogLevel level, LogSubject subject, const std::string& text) = 0;

@@ -125,7 +125,7 @@ std::optional<Precedence::Overtaken> Precedence::overtaken(const api::Asker& ask
             return find(emergency_stops_, asker.after_stops,
                         installation_.find_known(r.motors, false).motors);
           },
-          // Of these only who lets them wait knows the motors.
+          // Only who lets these wait knows their motors.
           [](const OneOf<api::MovePath, api::Follow, api::Camac> auto&) { return Answer(); },
           [](const OneOf<api::Stop, api::EmergencyStop, api::Pause, api::Hold, api::Disarm,
                          api::Enable, api::Disable, api::SetPosition, api::UseTable,

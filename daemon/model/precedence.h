@@ -42,8 +42,8 @@ class Precedence {
     std::string by;
     std::vector<MotorId> of{};
   };
-  // Of a request that moves motors, or lets them move: those that it names. Of a path and of an
-  // trajectory only who has their parts can tell.
+  // What has overtaken a request that moves motors, or lets them move, for those that it names.
+  // Only who has the parts of a path or a trajectory can tell it of these.
   std::optional<Overtaken> overtaken(const api::Asker& asker, const api::Request& request) const;
   std::optional<Overtaken> overtaken(std::uint64_t after_stops,
                                      const std::vector<MotorId>& motors) const;

@@ -28,7 +28,7 @@ class CamacSession final : public api::Session {
   explicit CamacSession(std::string name)
       : Session(api::Transport::kCamac, std::move(name), true) {}
 
-  // Of the request that is made next.
+  // The number of the request that is made next.
   std::int64_t next_number() {
     answer_.reset();
     return ++number_;

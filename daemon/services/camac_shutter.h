@@ -64,7 +64,7 @@ class CamacShutter final : public camac::Shutter {
     bool begins_no_more = false;    // by another's stop
     bool stopping = false;          // it was asked to
     std::uint64_t after_stops = 0;  // as Asker::after_stops
-    // Of a travel, as the module knows it.
+    // The travel as the module knows it.
     bool returns = false;
     std::int64_t from_steps = 0;  // of the run
     std::int64_t told = 0;        // steps of it
@@ -75,7 +75,7 @@ class CamacShutter final : public camac::Shutter {
     };
     std::optional<Start> start{};  // of the run that was reported last
 
-    // Of the run, or the step, that is made.
+    // The direction of the run, or the step, that is made.
     bool left() const { return kind == Kind::kTravel ? travel.left != returns : step.left; }
   };
 

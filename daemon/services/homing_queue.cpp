@@ -436,8 +436,8 @@ bool HomingQueue::is_of_sequence(MotorId id) const {
          std::ranges::find(sequence_->later, id, &Task::motor) != sequence_->later.end();
 }
 
-// Of all motors those that are being homed go on, if only others are paused or held: these end when
-// it is their turn.
+// Motors that are being homed go on if only others of all are paused or held: those end when it is
+// their turn.
 void HomingQueue::end_overtaken(std::int64_t) {
   for (const MotorId id : installation_.motors()) {
     if (!installation_[id].is<motion::Homing>()) continue;

@@ -55,7 +55,7 @@ class HomingQueue final : public Service {
     std::int64_t then_steps = 0;
     std::uint64_t after_stops = 0;  // as Asker::after_stops
   };
-  // Of one MCU: all but the first wait.
+  // The tasks of one MCU: all but the first wait.
   using Queue = std::deque<Task>;
   // All motors with `home`: those of the lowest order are in their queues, the others not yet.
   struct Sequence {

@@ -14,7 +14,8 @@ std::string ms_text(std::int64_t us) {
   return std::to_string(us / 1000) + " ms";
 }
 
-// Of one that begins, changes or renews a jog. What ends one is not refused for any of it.
+// Checks a request that begins, changes or renews a jog. What ends one is not refused for any of
+// it.
 Result<void> in_range(const api::Jog& request) {
   using Jog = api::Jog;
   if (request.per_s == 0 && !request.renew) return {};

@@ -106,7 +106,7 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
     line["path"] = {
         {"line", share->line}, {"way", share->way}, {"from", share->from}, {"to", share->to}};
   } else if (share) {
-    // Of all motors of a line the same, but for the increment.
+    // The same for all motors of a line, but for the increment.
     line["line"] = {{"line", share->line},
                     {"way", share->way},
                     {"increment", share->increment},

@@ -59,7 +59,7 @@ class Journal final : public Service {
   void position_lost(MotorId motor, std::int64_t from_steps);
 
  private:
-  // Of a motor that moves by itself.
+  // A motor that moves by itself.
   struct Autonomous {
     std::optional<motion::Tick> since;  // of the last report before, if there is one
     std::int64_t from_steps;

@@ -17,7 +17,7 @@ class LineTables {
   LineTables(Installation& installation, const Lines& lines)
       : installation_(installation), lines_(lines) {}
 
-  // Of one request.
+  // What one request waits for.
   struct Wait {
     bool looked = false;  // whether there is anything to wait for
     std::optional<Lines::WantedTable> table{};

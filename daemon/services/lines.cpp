@@ -240,8 +240,8 @@ bool Lines::follow(std::int64_t now_us, std::uint64_t number, Line& line) {
   return any;
 }
 
-// Of a motor that does not go on along the line as the others do. At the end of a run their reports
-// come one after the other.
+// Why the line ends, if one motor does not go on along it as the others do. At the end of a run
+// their reports come one after the other.
 std::optional<std::string> Lines::cause_to_end(std::int64_t now_us, std::uint64_t number,
                                                const Line& line) const {
   std::optional<std::string> cause;

@@ -166,7 +166,7 @@ void Moves::cancel(MotorId motor, const std::string& reason) {
   end(motor, *installation_[motor].end(api::Outcome::kStopped, reason));
 }
 
-// Of runs whose plans are made.
+// Whether runs may begin whose plans are made.
 bool Moves::may_begin(const std::vector<MotorId>& motors) {
   for (const MotorId held_back : motors) {
     const auto may = interlocks_.may_begin(held_back);
@@ -362,7 +362,7 @@ void Moves::step(std::int64_t now_us) {
   if (!now.empty()) replan(now_us, now);
 }
 
-// Of a line all MCUs have.
+// All MCUs of a line have to have time.
 bool Moves::has_time_to_retarget(std::int64_t now_us, MotorId motor) const {
   return std::ranges::all_of(installation_.with_lines({motor}), [&](MotorId id) {
     return installation_.mcu_of(id).has_time_to_retarget(now_us);

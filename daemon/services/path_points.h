@@ -13,7 +13,7 @@ namespace bushd::daemon {
 
 class PathPoints {
  public:
-  // Of so many clients at once; the one that has begun first is dropped for another one.
+  // Clients whose points are kept at once; the one that has begun first is dropped for another one.
   static constexpr std::size_t kMost = 4;
   static constexpr std::size_t kMostValues = 1'000'000;  // of one path
 

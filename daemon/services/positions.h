@@ -36,7 +36,7 @@ class Positions final : public Service {
   bool would_take(const api::SetPosition& request) const { return plan_of(request).has_value(); }
   // What was asked for is not yet done.
   bool being_set(MotorId motor) const;
-  // Likewise, and it is the MCU's counter.
+  // A position that was asked for is not yet set, and it is that of the MCU's counter.
   bool counter_being_set(MotorId motor) const;
 
   void reports(std::int64_t now_us, Mcu& mcu) override { follow(now_us, &mcu); }

@@ -94,7 +94,7 @@ api::MotorNames names_in(const auto& request) {
   return names;
 }
 
-// Of all motors together, but for the position.
+// The state of all motors together, but for the position.
 void take_worst(api::MotorState& all, const api::MotorState& motor) {
   if (motor.activity != api::Activity::kResting) all.activity = api::Activity::kMoving;
   all.moving = all.moving || motor.moving;

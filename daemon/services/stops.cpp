@@ -41,7 +41,8 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
   open_.push_back(std::move(stopping));
 }
 
-// Of all motors, those count that were lost while they moved: racks may be without power for years.
+// Where all motors are meant, those count that were lost while they moved: racks may be without
+// power for years.
 bool Stops::may_run_on(const std::vector<MotorId>& motors, bool named) const {
   const auto is_online = [this](MotorId id) { return installation_.mcu_of(id).online(); };
   if (named || std::ranges::none_of(motors, is_online)) {

@@ -103,7 +103,7 @@ void TablesInService::request(const api::Asker& asker, const api::ReloadTables&)
   for (const GroupId group : wanted_.ids()) {
     change.parts.push_back({.group = group, .wanted = wanted_[group]});
   }
-  // Of a group that is about to get another table, that one is read again.
+  // The table that a group is about to get is read again.
   for (const Change& other : changes_) {
     if (!other.kept) continue;
     for (const Part& part : other.parts) change.parts[part.group.value].wanted = part.wanted;
@@ -223,7 +223,7 @@ Result<void> TablesInService::fits(const std::vector<Part>& parts) const {
   return {};
 }
 
-// Of changes that still wait, the last one counts.
+// The last one counts of changes that still wait.
 void TablesInService::supersede(const Change& by) {
   for (auto it = changes_.begin(); it != changes_.end();) {
     const auto other = it++;

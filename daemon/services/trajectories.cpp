@@ -12,7 +12,7 @@ namespace {
 using motion::Trajectory;
 using motion::TrajectoryCheck;
 
-// Of all motors together; each takes some 100 ns.
+// Ticks of all motors together; each takes some 100 ns.
 constexpr unsigned kTicksPerSlice = 2000;
 // Times that were found to be long enough for each step by itself are mostly so for all of them.
 constexpr int kMostTries = 6;

@@ -22,7 +22,7 @@ namespace bushd::daemon {
 
 class Trajectories final : public Service {
  public:
-  // Of those that are loaded and do not run, the oldest one gives way to one more.
+  // Trajectories that are loaded and do not run; the oldest one gives way to one more.
   static constexpr std::size_t kMostLoaded = 8;
 
   Trajectories(Installation& installation, const Interlocks& interlocks, Journal& journal,
@@ -44,7 +44,7 @@ class Trajectories final : public Service {
   void step(std::int64_t now_us) override;
 
  private:
-  // Of a motor, when its trajectory was begun: what the check goes by.
+  // What the check of a motor goes by: as it was when its trajectory was begun.
   struct Part {
     MotorId motor;
     tables::TablePtr table;

@@ -115,7 +115,7 @@ Result<void> Trigger::may_arm(MotorId id, std::int64_t steps, const api::Arm& re
 void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
   auto [motors, unknown] = installation_.find_known(request.motors, false);
   if (motors.empty()) return asker.answer(api::Refused{unknown});
-  // Of all motors, those count that were lost while they waited or moved.
+  // Where all motors are meant, those count that were lost while they waited or moved.
   const bool may_begin =
       !request.motors.empty() || std::ranges::any_of(motors, [this](MotorId motor) {
         return installation_[motor].lost_in_motion();

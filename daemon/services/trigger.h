@@ -12,7 +12,7 @@
 
 namespace bushd::daemon {
 
-// Of every move that waits for a trigger.
+// Checks the delay of every move that waits for a trigger.
 Result<void> check_trigger_delay(std::int64_t delay_us);
 
 class Trigger final : public Service {

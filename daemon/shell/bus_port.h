@@ -29,7 +29,7 @@ class BusPort {
   virtual Result<void> write(std::span<const std::uint8_t> bytes) = 0;
   virtual Result<void> flush() { return {}; }
   virtual bool wants_to_write() const { return false; }
-  // Of a port that is more than bytes.
+  // Carries out an order to a port that is more than bytes.
   virtual Result<link::PulseStatus> carry_out(const link::PulseOrder&) {
     return fail("makes no pulses");
   }
@@ -41,8 +41,9 @@ struct PortInUse {
   std::string user;  // "bus roof"
 };
 
-// Of the ports that the configuration may mean, in this order, the first that opens; else why the
-// first does not. What `in_use` names, under whatever name, is passed over without being opened.
+// The first port that opens of those that the configuration may mean, in this order; else why the
+// first of them does not. What `in_use` names, under whatever name, is passed over without being
+// opened.
 Result<std::unique_ptr<BusPort>> open_first_port(const config::Bus& bus, const PortOrder& order,
                                                  const std::vector<PortInUse>& in_use);
 

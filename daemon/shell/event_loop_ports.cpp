@@ -69,7 +69,7 @@ void EventLoop::next_port_opened(std::int64_t now, BusId bus,
   port_opened(now, bus, std::move(opened));
 }
 
-// Of buses, and of keypads.
+// The ports of buses, and of keypads.
 std::vector<PortInUse> EventLoop::ports_in_use(BusId asking) const {
   std::vector<PortInUse> in_use;
   for (const BusId bus : ports_.ids()) {

@@ -13,7 +13,7 @@ typedef struct bushd_mcu bushd_mcu;
 #define BUSHD_CURRENT_TICKS 16u
 #define BUSHD_MAX_CURRENT_MOTORS (BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS)
 
-// Of a motor; memory of the port.
+// The current control of a motor; memory of the port.
 typedef struct bushd_mcu_currents {
   bushd_currents settings;  // not set: all zero, and no current is controlled
   uint16_t speed;           // when it changed last: a delay of its run, or a displacement
@@ -22,7 +22,8 @@ typedef struct bushd_mcu_currents {
 } bushd_mcu_currents;
 
 bushd_status bushd_mcu_set_currents(bushd_mcu* mcu, const bushd_currents* message);
-// Of the slot buffer that is complete: before its tick. O(motors with current control).
+// Chooses the currents for the slot buffer that is complete, before its tick. O(motors with current
+// control).
 void bushd_mcu_choose_currents(bushd_mcu* mcu);
 
 #endif

@@ -100,7 +100,7 @@ static uint8_t next_phase(uint8_t phase, uint8_t count, bool forward) {
   return phase == 0 ? (uint8_t)(count - 1u) : (uint8_t)(phase - 1u);
 }
 
-// Of motor m, at the outputs that are its.
+// The levels of motor m, at the outputs that are its.
 static uint16_t levels_of(const bushd_mcu* mcu, uint8_t m) {
   const uint8_t phase = mcu->emission.of.windings.phase[m];
   const uint16_t levels = bushd_phase_levels(mcu->emission.settings.sequence, phase);

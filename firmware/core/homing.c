@@ -77,7 +77,7 @@ static bool is_sure(bushd_mcu* mcu, bool as_wanted) {
   return ++homing->readings >= READINGS;
 }
 
-// Of the fast stage.
+// Ends the fast stage.
 static void begin_to_stop(bushd_mcu* mcu, bool cuts) {
   bushd_run* run = &mcu->motor[mcu->homing.motor].made.run;
   // One that has not made a step need not begin in order to stop.

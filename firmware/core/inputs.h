@@ -11,7 +11,7 @@ bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* messag
 bushd_status bushd_mcu_set_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message);
 void bushd_mcu_begin_inputs(bushd_mcu* mcu);  // after the settings were restored
 void bushd_mcu_report_inputs(const bushd_mcu* mcu, bushd_report* report);
-// Of these, 0: all, those whose cause is gone.
+// Clears those of these faults (0: of all) whose cause is gone.
 void bushd_mcu_clear_faults(bushd_mcu* mcu, uint8_t faults);
 
 #endif

@@ -21,7 +21,7 @@ extern "C" {
 
 typedef struct bushd_mcu bushd_mcu;
 
-// Of the source: the first delay, what "slower" adds, and the longest.
+// The figures of the source document: the first delay, what "slower" adds, and the longest.
 #define BUSHD_KEYPAD_UNIT_NS UINT32_C(10000)
 #define BUSHD_KEYPAD_FIRST 300u
 #define BUSHD_KEYPAD_SLOWER 30u

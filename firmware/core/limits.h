@@ -43,8 +43,8 @@ bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks)
 // Once a tick: the watched inputs as they are now. Returns motors of which a switch has become
 // active.
 uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins);
-// Of a motor that goes in this direction: true if its switch stops it. One that goes away from it
-// has left it. `homes`: a limit that is the switch it looks for is not looked at.
+// Whether its switch stops a motor that goes in this direction. One that goes away from it has left
+// it. `homes`: a limit that is the switch it looks for is not looked at.
 bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active, bool homes);
 // A motor that homes has come to its switch: if that is a limit, it inhibits the way on. It has
 // left it.

@@ -203,7 +203,7 @@ static uint16_t begin_tick(bushd_mcu_motor* motor, int16_t* steps, uint16_t moto
   return forward;
 }
 
-// Of a ramp-down: otherwise the end is known beforehand.
+// Ends a ramp-down; the end of another run is known beforehand.
 static void end_ramp_down(bushd_mcu* mcu, uint16_t motors) {
   for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
     if ((motors & 1u) == 0 || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) continue;

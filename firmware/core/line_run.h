@@ -25,8 +25,8 @@ typedef struct bushd_mcu_line {
 } bushd_mcu_line;
 
 bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message);
-// Of motors at rest, for the trigger (trigger.c): all is ready but its beginning. Returns the
-// motors.
+// Holds a line of motors at rest for the trigger (trigger.c): all is ready but its beginning.
+// Returns the motors.
 bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, uint16_t* motors);
 // It has come: these begin, `ns` after the beginning of that tick.
 void bushd_mcu_begin_held_line(bushd_mcu* mcu, uint16_t motors, uint32_t first_tick, uint32_t ns);
@@ -40,13 +40,14 @@ uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu);
 // A motor leaves the line where it is, as a stream would have left it there. No division of more
 // than 32 bits.
 void bushd_mcu_leave_line(bushd_mcu* mcu, uint8_t m);
-// Of its running step, in time units of its own table, rounded up; 0: it has made its last step.
+// The delay of its running step, in time units of its own table, rounded up; 0: it has made its
+// last step.
 uint16_t bushd_mcu_line_delay(const bushd_mcu* mcu, uint8_t m);
 // In the first tick of its run.
 void bushd_mcu_line_begins(bushd_mcu* mcu, uint32_t tick);
 // If no SYNC tells the time, the line is ramped down from this tick on.
 uint32_t bushd_mcu_line_deadline(const bushd_mcu* mcu);
-// Of a motor in a run, by itself or on a line.
+// The direction of a motor in a run, by itself or on a line.
 int8_t bushd_mcu_run_direction(const bushd_mcu* mcu, uint8_t m);
 
 #endif

@@ -73,10 +73,10 @@ typedef struct bushd_mcu_config {
   int32_t pulse_ns;  // how long STEP pulses last; 0: half a slot; less: so much shorter than that
   uint16_t disabled_capabilities;  // BUSHD_CAN_* below 1 << 16 that it does not have: not in
                                    // the identity, and refused
-  // Of motors 0 .. current_motors-1, whose windings' currents the port controls; all zero.
+  // For motors 0 .. current_motors-1, whose windings' currents the port controls; all zero.
   bushd_mcu_currents* currents;
   uint8_t current_motors;  // at most BUSHD_MAX_CURRENT_MOTORS
-  // Of motors 0 .. velocity_motors-1, that may move locally by the velocity loop; all zero.
+  // For motors 0 .. velocity_motors-1, that may move locally by the velocity loop; all zero.
   bushd_mcu_velocity* velocity;
   uint8_t velocity_motors;     // at most BUSHD_MAX_VELOCITY_MOTORS
   bushd_mcu_scratch* scratch;  // NULL: it has no BUSHD_SCRATCH_BANK

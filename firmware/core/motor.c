@@ -178,7 +178,7 @@ void bushd_mcu_summarise_queue(bushd_mcu* mcu, uint32_t tick) {
   queue_summary->runs_until = tick + (uint32_t)run_ticks;
 }
 
-// Of motors that are to move on when their queued ticks end.
+// The low water of motors that are to move on when their queued ticks end.
 static void watch_low_water(bushd_mcu* mcu) {
   if (mcu->stream.queue_summary.moves == 0) return;
   const int32_t queued =
@@ -227,8 +227,8 @@ __attribute__((noinline)) static void forget_starts(bushd_mcu* mcu, uint32_t tic
   }
 }
 
-// Of a motor whose steps the queue alone does not decide; false if they are those of a run, exact
-// to a slot.
+// The displacement of a motor whose steps the queue alone does not decide; false if they are those
+// of a run, exact to a slot.
 static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* displacement) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   if (in_run_at(mcu, motor, tick)) return false;

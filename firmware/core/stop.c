@@ -26,10 +26,10 @@ static last_way last_way_of(const bushd_mcu_motor* motor) {
   return way;
 }
 
-// Of a delay that is told as 65535 time units, and may be longer: in the fine format the last
-// displacement, or the time between two of 1/256 step, tells by how much. One that is less than
-// twice as long may be a table's own. Whether the running step, of which `progress`/256 are over,
-// takes too long to be waited for then.
+// Whether the running step, of which `progress`/256 are over, takes too long to be waited for. Its
+// delay is told as 65535 time units, and may be longer: in the fine format the last displacement,
+// or the time between two of 1/256 step, tells by how much. One that is less than twice as long may
+// be a table's own.
 static bool waits_too_long(const bushd_mcu* mcu, uint8_t m, uint8_t progress) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
   const last_way way = last_way_of(motor);
@@ -77,7 +77,7 @@ static bool start_waits(const bushd_mcu* mcu, uint8_t m, uint32_t next, uint32_t
   return ticks_after(next, near_tick(start->tick, next)) <= 0;
 }
 
-// Of a motor in a run, which goes on without `next`, or of one whose run waits.
+// Ends a run that goes on without `next`, or one that waits.
 static void end_in_silence(bushd_mcu* mcu, uint8_t m, bool runs, uint32_t next) {
   uint32_t from = next;
   uint32_t rest_from;
@@ -114,7 +114,7 @@ void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu) {
   }
 }
 
-// Of the motion that is under way at `next`: a start may wait behind it.
+// The rest of the motion that is under way at `next`; a start may wait behind it.
 typedef struct rest_of_stream {
   uint32_t until;  // the first tick that is not known to be its
   bool goes_on;    // beyond that

@@ -10,7 +10,7 @@ typedef struct bushd_mcu bushd_mcu;
 
 void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);
-// Of a motor in a stream; `delay` is that of the running step, 0: it rests at once.
+// Ramps a motor in a stream down; `delay` is that of the running step, 0: it rests at once.
 void bushd_mcu_ramp_down_stream(bushd_mcu* mcu, uint8_t m, uint16_t delay);
 // Stops it from `next` on, the first tick that is not prepared.
 void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode mode, uint32_t next);

@@ -175,8 +175,8 @@ static void open_motor(bushd_mcu* mcu, uint8_t m, const bushd_mcu_tick_range* ra
   bushd_mcu_note_start(mcu, m, range->first_tick);
 }
 
-// Of a range's ticks, as offsets from its first: those from `begin` on are not known yet, but for
-// the out-of-order range's.
+// The gap in a range of ticks, as offsets from its first: those from `begin` on are not known yet,
+// but for the out-of-order range's.
 typedef struct gap {
   uint16_t begin;
   uint16_t out_of_order_begin;

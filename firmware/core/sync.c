@@ -37,7 +37,7 @@ static int64_t span_ns(const bushd_mcu* mcu, uint32_t from_tick, uint32_t from_n
   return (int64_t)ticks_after(tick, from_tick) * mcu->tick_ns + ns - from_ns;
 }
 
-// Of the present tick, as the corrected clock shows it; may lie outside of the tick.
+// The time in the present tick, as the corrected clock shows it; may lie outside of the tick.
 static int64_t corrected_ns(const bushd_mcu* mcu, int32_t time_in_tick_ns) {
   const bushd_mcu_clock* clock = &mcu->clock;
   const int64_t by_rate = (int64_t)clock->rate_now_ns * time_in_tick_ns / mcu->tick_ns;

@@ -30,8 +30,8 @@ uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction)
 // so many steps are counted.
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
                                bushd_delay shortest_delay);
-// Of a motor in a run: by the shortest way that its table allows. One that was stopped otherwise
-// since stays so.
+// Ramps a motor in a run down, by the shortest way that its table allows. One that was stopped
+// otherwise since stays so.
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);
 
 #endif

@@ -14,7 +14,7 @@ typedef struct bushd_mcu bushd_mcu;
 // at a time.
 typedef struct bushd_mcu_travel {
   uint8_t stage;      // bushd_travel_stage; in the same place as that of homing
-  uint8_t motor;      // likewise
+  uint8_t motor;      // in the same place as that of homing
   int8_t direction;   // of the run that is made, or was made last
   uint8_t edge;       // at which it begins, 0: at once
   uint8_t sensor;     // of a step

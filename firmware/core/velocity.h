@@ -25,7 +25,7 @@ typedef struct bushd_mcu_velocity_settings {
   int32_t acceleration;
 } bushd_mcu_velocity_settings;
 
-// Of a motor; memory of the port (bushd_mcu_config.velocity).
+// The velocity loop of a motor; memory of the port (bushd_mcu_config.velocity).
 typedef struct bushd_mcu_velocity {
   bushd_mcu_velocity_settings settings;
   // While its mode is BUSHD_MCU_VELOCITY.
@@ -45,7 +45,7 @@ uint16_t bushd_mcu_moved_by_velocity(const bushd_mcu* mcu);
 // as they allow, and as `most`, in 1/64 step/s, does: from rest, or if it moves by the loop
 // already, by way of zero if need be.
 void bushd_mcu_steer(bushd_mcu* mcu, uint8_t m, int8_t direction, int32_t most);
-// Of one that moves by the loop: down to rest.
+// Brings a motor that moves by the loop to rest.
 void bushd_mcu_brake(bushd_mcu* mcu, uint8_t m);
 // Where it goes: +1, -1; 0 if it only comes to rest.
 int8_t bushd_mcu_velocity_heading(const bushd_mcu* mcu, uint8_t m);

@@ -76,7 +76,7 @@
 #define TRIGGER_FLAG INTF2
 #define TRIGGER_FALLING (1 << ISC21)
 #define TRIGGER_RISING (1 << ISC21 | 1 << ISC20)
-// Of the comparators: their outputs fall when the current is reached.
+// Edges of the comparators: their outputs fall when the current is reached.
 #define BOARD_EDGES (1 << ISC01 | 1 << ISC11)
 
 // Timer 3 is the clock, what the line waits by (compare A) and that of the position compare pulse

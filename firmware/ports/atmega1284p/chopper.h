@@ -20,7 +20,7 @@ void chopper_init(void);
 // them at least.
 void chopper_set(void* context, uint8_t motor, uint16_t ma, bool fast_decay);
 
-// Of the core.
+// What the core keeps of its one motor.
 extern bushd_mcu_currents chopper_currents[1];
 
 #endif

@@ -24,7 +24,7 @@ TIMER1_COMPA_vect:
     cpse DATA_LOW, WANTED
     rjmp other_outputs
 outputs_are_set:
-    ; Of the second port, which this chip has not.
+    ; The byte of the second port, which this chip has not.
     ld DATA_LOW, Z+
     movw SLOT_LOW, r30
     movw r30, SAVED_LOW

@@ -16,7 +16,7 @@
 #define CHANGE_CYCLES 92u
 // Until the first slot.
 #define START_CYCLES 400u
-// Of a tick without steps: the last slot, and how many of them there are at most. The longest tick
+// A tick without steps: its last slot, and how many of them there are at most. The longest tick
 // is one of BUSHD_MAX_TICK_NS that is nearly doubled to come into step with the bus.
 #define SHORT_SLOT_CYCLES 256u
 #define MAX_EMPTY_SLOTS 11u
@@ -40,7 +40,8 @@ volatile uint8_t emission_committed;
 uint32_t emission_begun_at;
 uint32_t emission_next_start;
 
-// Of ticks of few slots: where STEP rests, or the levels that the slot_buffer before has left.
+// The masks of ticks of few slots: where STEP rests, or the levels that the slot_buffer before has
+// left.
 static uint16_t idle_masks[MAX_EMPTY_SLOTS];
 
 // A tick, and what its length is made of.
@@ -50,11 +51,11 @@ typedef struct prepared_tick {
   int32_t extra_ns;  // longer than a plain tick
 } prepared_tick;
 
-// Of the main loop.
+// Used by the main loop.
 EMISSION_TICKS static prepared_tick prepared[2];
 static prepared_tick* given = prepared;      // waits or was taken last
 static const bushd_slot_buffer* next_plane;  // NULL: the core's present tick has the last one
-// Of a tick without adjustment, from residue 0.
+// The length of a tick without adjustment, from residue 0.
 static uint32_t plain_cycles;
 static uint16_t plain_residue;
 static uint32_t core_start;  // of the core's present tick
@@ -87,8 +88,8 @@ static void set_plane(emission_tick* tick, const bushd_slot_buffer* slot_buffer,
   tick->begun = begun_flags(slot_buffer->outputs);
 }
 
-// Of few slots, so that the time is left to the main loop. The last one is as short as may be: in
-// it the next tick is taken.
+// Gives a tick few slots, so that the time is left to the main loop. The last one is as short as
+// may be: in it the next tick is taken.
 static void set_empty(emission_tick* tick, uint16_t direction, uint8_t begun, uint32_t cycles) {
   const uint32_t body = cycles - SHORT_SLOT_CYCLES;
   // Not divided but where ticks are so long that it does not matter.

@@ -65,7 +65,7 @@ void line_init(void) {
   UCSR0B = 1 << TXEN0 | 1 << RXEN0 | 1 << RXCIE0;
 }
 
-// Of the one that is taken next. False if too many wait for all to have theirs.
+// The time of the delimiter that is taken next. False if too many wait for all to have theirs.
 static bool delimiter_time(uint32_t* time) {
   if ((uint8_t)(line_stamps_in - stamps_out) > LINE_DELIMITERS) return false;
   *time = clock_at(line_stamps[stamps_out % LINE_DELIMITERS]);
@@ -85,7 +85,7 @@ static inline bool has_reply(void) {
   return (TIMSK3 & WAITING) != 0 || is_sending();
 }
 
-// Of the buffer. What others answer finds room before an answer that waits. A master that speaks
+// Room in the buffer. What others answer finds it before an answer that waits. A master that speaks
 // then waits for it no more: it gives way as soon as the frame needs its place.
 static uint16_t room_for(const bushd_receiver* receiver, uint8_t more) {
   if (!has_reply()) return sizeof receiver->buffer;

@@ -5,7 +5,7 @@
 // Frames that may wait while a tick is prepared.
 #define LINE_DELIMITERS 16
 
-// Of line_bytes: where the next one goes, and the first that was not taken. They wrap.
+// Places in line_bytes: where the next byte goes, and the first that was not taken. They wrap.
 // GPIOR2 holds the reset cause before that (boot_tests.h).
 #define LINE_IN GPIOR1
 #define LINE_OUT GPIOR2

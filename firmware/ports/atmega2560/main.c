@@ -107,7 +107,7 @@ static void port_keep_enable(void* context, bool on) {
   identity_keep_enable(on ? mcu.config.outputs.enabled : 0);
 }
 
-// Of several flags the gravest counts.
+// The gravest of several flags counts.
 static bushd_reset_cause reset_cause(void) {
   const uint8_t flags = boot_cause();
   if (flags & 1 << PORF) return BUSHD_RESET_POWER_ON;

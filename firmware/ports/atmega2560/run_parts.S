@@ -201,7 +201,7 @@ bushd_run_share:
     mov r24, r18
     ret
 
-; Of the part in r24 and r25, which stays on the stack.
+; Loads the part in r24 and r25, which stays on the stack.
 load_part:
     movw r30, r24
     ldd r10, Z+PART_PLACE

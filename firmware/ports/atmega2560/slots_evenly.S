@@ -9,7 +9,7 @@
 ;   nowhere whole but in the middle, at 64: this step is one of the second half
 
 #define SLOTS 128
-; Of half of the masks.
+; Bytes of half of the masks.
 #define HALF_BYTES SLOTS
 
     ; The carry is shifted into the slot's mask.

@@ -7,7 +7,7 @@
 #define COMPARE_TIMER TIMER(3)
 #define SHORTEST_CYCLES 40u
 
-// Of the interrupts.
+// Used by the interrupts.
 static bool rises;
 static uint32_t width;  // of the pulse that rises; 0: it falls in another tick
 

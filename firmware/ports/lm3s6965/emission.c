@@ -15,7 +15,7 @@
 #define MARGIN_CYCLES 250u
 // What a timer is set to at least.
 #define SHORTEST_CYCLES 40
-// Of a tick without steps: from its only half slot, in which the next tick is taken, to its end.
+// The end of a tick without steps: from its only half slot, in which the next tick is taken.
 #define TAKE_CYCLES 500u
 
 typedef struct emission_tick {
@@ -32,7 +32,7 @@ typedef struct emission_tick {
 // What becomes of the slot_buffer that the core has prepared.
 typedef enum plane_state { PLANE_NONE, PLANE_WAITS, PLANE_TAKEN } plane_state;
 
-// Of the interrupts.
+// Used by the interrupts.
 _Static_assert(offsetof(emission_slot_state, end) == SLOT_END, "as in emission_slots.S");
 _Static_assert(offsetof(emission_slot_state, rest) == SLOT_REST, "as in emission_slots.S");
 emission_slot_state emission_slot = {
@@ -49,7 +49,7 @@ static volatile plane_state state;
 static volatile bool begun;
 static uint32_t begun_at;
 
-// Of the main loop.
+// Used by the main loop.
 static const bushd_slot_buffer* slot_buffer;
 static uint16_t directions;  // as latched last
 static uint32_t core_start;  // of the core's present tick
@@ -142,7 +142,7 @@ static emission_tick tick_of(const bushd_slot_buffer* of, uint32_t cycles) {
   return tick;
 }
 
-// Of one slot, in which nothing happens: the time is left to the main loop.
+// A tick of one slot, in which nothing happens: the time is left to the main loop.
 static emission_tick empty_tick(const uint16_t* mask, uint32_t cycles) {
   const emission_tick tick = {
       .mask = mask, .end = mask + 1, .half_slot = cycles - TAKE_CYCLES, .cycles = cycles};

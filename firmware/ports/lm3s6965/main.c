@@ -100,7 +100,7 @@ static void port_set_trigger(void* context, bushd_edge edge) {
   trigger_await(edge);
 }
 
-// Of several flags the gravest counts.
+// The gravest of several flags counts.
 static bushd_reset_cause reset_cause(void) {
   const uint32_t flags = SYSCTL_RESC;
   SYSCTL_RESC = 0;

@@ -83,7 +83,7 @@
 #define FLASH_FMD REGISTER(0x400FD004)
 #define FLASH_FMC REGISTER(0x400FD008)
 
-// Of the core.
+// Registers of the core.
 #define SYST_CSR REGISTER(0xE000E010)
 #define SYST_RVR REGISTER(0xE000E014)
 #define SYST_CVR REGISTER(0xE000E018)

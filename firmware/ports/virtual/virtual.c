@@ -152,7 +152,7 @@ static uint16_t last_levels(const bushd_virtual* v) {
   return levels ? v->slot_buffer->step[v->config.mcu.slots - 1] : v->rest.step_low;
 }
 
-// Of the tick that ends.
+// Gives the samples of the tick that ends.
 static void give_samples(bushd_virtual* v) {
   if (v->config.current == NULL || !bushd_mcu_wants_samples(&v->mcu)) return;
   for (int64_t at_ns = 0; at_ns < v->tick_length_ns; at_ns += BUSHD_VIRTUAL_SAMPLE_NS) {

@@ -34,8 +34,8 @@ typedef enum bushd_virtual_signal {
   BUSHD_VIRTUAL_STEP = 0,
   BUSHD_VIRTUAL_DIR = 1,
   BUSHD_VIRTUAL_EN = 2,          // one per MCU, index 0
-  BUSHD_VIRTUAL_COMMON_DIR = 3,  // likewise
-  BUSHD_VIRTUAL_COMPARE = 4      // likewise
+  BUSHD_VIRTUAL_COMMON_DIR = 3,  // one per MCU, index 0
+  BUSHD_VIRTUAL_COMPARE = 4      // one per MCU, index 0
 } bushd_virtual_signal;
 
 typedef struct bushd_virtual_config {
