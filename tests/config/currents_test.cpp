@@ -16,7 +16,7 @@ using test::of_mcu;
 using test::of_motor;
 using testing::HasSubstr;
 
-// Of "theta", on an MCU with this emission; on line 33.
+// Currents of "theta", on an MCU with this emission; on line 33.
 std::string with(const std::string& currents, const std::string& emission = "phases") {
   return of_mcu("emission = \"" + emission + "\"\n", of_motor("currents = " + currents + "\n"));
 }

@@ -15,7 +15,7 @@ using test::kGood;
 using test::replaced;
 using testing::HasSubstr;
 
-// Of "slit", output 15 of "roof:255"; from line 37 on.
+// Inputs of "slit", output 15 of "roof:255"; from line 37 on.
 std::string with_motor_inputs(const std::string& keys) {
   return replaced(kGood, "output = 15\n", "output = 15\n" + keys);
 }

@@ -15,7 +15,7 @@ using test::error_of;
 using test::of_motor;
 using testing::HasSubstr;
 
-// Of "theta".
+// The velocity of "theta".
 std::string with_velocity(const std::string& velocity,
                           const std::string& before = "local = true\n") {
   return of_motor(before + "velocity = " + velocity + "\n");

@@ -76,7 +76,7 @@ class Faults : public testing::TestWithParam<Target> {
     return payload;
   }
 
-  // Of more steps than a test waits for.
+  // A run of more steps than a test waits for.
   void start_run() {
     const bushd_table_run_entry entry{kMotor, 0, 1, 5000, 0};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);

@@ -266,7 +266,7 @@ void PulseBench::clear_faults() {
   run_for(0.15);
 }
 
-// Of a run that is stopped in its ramp-down, the step under way may count as the last one of equal
+// The step under way of a run that is stopped in its ramp-down may count as the last one of equal
 // codes: those before it are as many places farther from the end than they were planned at.
 std::size_t PulseBench::most_left_out(std::size_t to_go) const {
   std::size_t most = 0;

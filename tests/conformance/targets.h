@@ -60,7 +60,7 @@ struct Target {
 
 // Those whose image and simulator were there at build time.
 std::vector<Target> targets();
-// Of these, those that have all of these capabilities (BUSHD_CAN_*), and those that deny one. A
+// Targets that have all of these capabilities (BUSHD_CAN_*), and those that deny one. A
 // test that needs a capability belongs to a suite of the former, and so is never skipped.
 std::vector<Target> targets_with(std::uint32_t capabilities);
 std::vector<Target> targets_without(std::uint32_t capabilities);

@@ -25,7 +25,7 @@ class Bench : public daemon::Outputs {
     std::vector<std::pair<std::int64_t, api::Reply>> answers;
   };
   api::Asker asker(std::int64_t number = 1) const { return {client, number}; }
-  // Of the last answer.
+  // What the last answer says.
   std::string refusal() const;
   api::Completed completed() const;
   MotorId motor(const std::string& name) const;

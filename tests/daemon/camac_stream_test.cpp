@@ -259,7 +259,7 @@ TEST(CamacStreaming, LimitsOfSpeedAndBacklashHold) {
   EXPECT_FALSE(lab.has_result(other));
 }
 
-// Of the history it is a move of its module; the log of moves has its codes.
+// The history has it as a move of its module; the log of moves has its codes.
 TEST(CamacStreaming, IsKeptLikeOtherMoves) {
   CamacLab lab;
   lab.keep_positions();

@@ -103,7 +103,7 @@ TEST_F(EmergencyAway, OutlivesTheDaemonWithoutAStore) {
   expect_bound();
 }
 
-// Of which nobody else tells.
+// Nobody else tells of it.
 TEST_F(EmergencyAway, OutlivesTheDaemonInTheStore) {
   lab.keep_positions();
   connect();

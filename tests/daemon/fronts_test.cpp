@@ -441,7 +441,7 @@ TEST_F(SocketFrontTest, WhatComesAfterItsClientHasGoneIsNobodys) {
   asker.answer(api::Accepted{});
 }
 
-// Of a program that has taken all places, everybody can stop the motors still.
+// Everybody can still stop motors when a program has taken all places.
 TEST_F(SocketFrontTest, WithoutAPlaceAClientMayStopAndIsToldWhoHasThem) {
   std::vector<Client> greedy;
   const std::size_t all = control::Places::Limits().of_process;

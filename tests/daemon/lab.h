@@ -158,7 +158,7 @@ class Lab : public daemon::Outputs, private state::Backend {
 
   daemon::Core& core() { return *core_; }
   sim::Bus& bus(std::size_t index) { return *buses_[index].bus; }
-  // Of kind "serial-pulse".
+  // The drive of a bus of kind "serial-pulse".
   sim::PulseDrive& drive(std::size_t index) { return *buses_[index].drive; }
   // What the drivers of such ports can do, from the next time that one is opened.
   link::PulseStatus pulse_driver = {.any_rate = true, .empty = true};

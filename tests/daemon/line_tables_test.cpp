@@ -165,8 +165,8 @@ TEST_P(UploadedLine, IsCountedAlikeWhereverItIsStopped) {
   expect_clean(lab);
 }
 
-// Of one MCU they stand already when those of the other one, which has not heard that they wait no
-// more, have begun and are to stop farther along the line.
+// The motors of one MCU stand already when those of the other one, which has not heard that they
+// wait no more, have begun and are to stop farther along the line.
 TEST_P(UploadedLine, IsCountedAlikeIfAnMcuBeginsLate) {
   for (int i = 2; i < 24; ++i) {
     SCOPED_TRACE(i);
@@ -405,7 +405,7 @@ TEST(WaitingLines, DoNotBeginTowardsALimitThatHasClosed) {
   EXPECT_EQ(lab.shaft_steps("m03"), 0);
 }
 
-// Of a long table people would notice it.
+// People would notice it with a long table.
 TEST(WaitingLines, DoNotWaitLong) {
   std::string codes;
   for (int code = 4999; code > 1000; code -= 2) codes += std::to_string(code) + ", ";

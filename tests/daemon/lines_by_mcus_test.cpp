@@ -12,8 +12,8 @@ TEST(LinesByMcus, AllMotorsAreOnThemToAStep) {
   }
 }
 
-// Of motors with one table the line's is that one, unless their ways are nearly as long. Then they
-// get it first, if they take any.
+// The table of a line of motors with one table is that one, unless their ways are nearly as long.
+// Then they get it first, if they take any.
 TEST(LinesByMcus, OneFrameTellsAnMcuAllOfIt) {
   struct Case {
     const char* manner;

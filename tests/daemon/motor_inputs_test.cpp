@@ -17,8 +17,8 @@ constexpr std::uint8_t kPositive = 9;
 constexpr std::uint8_t kNegative = 14;
 constexpr std::uint8_t kHome = 3;
 constexpr std::int64_t kEnd = 5000;
-// Of bushd2-constant. At cruise, 0.4 ms, a tick has 6.4 steps: 6 ms of bounce, a tick for
-// debouncing and two until the MCU acts make 35, and then comes the ramp, of 238 codes.
+// The way by the table bushd2-constant. At cruise, 0.4 ms, a tick has 6.4 steps: 6 ms of bounce, a
+// tick for debouncing and two until the MCU acts make 35, and then comes the ramp, of 238 codes.
 constexpr std::int64_t kOverrun = 35 + 238;
 // Bounce, the tick up to the next reading, two more readings, and the tick that is prepared by then
 // and that which is made: 6 ms and five ticks, less than two slow steps of 10 ms.

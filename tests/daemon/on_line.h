@@ -95,7 +95,7 @@ inline void expect_clean(Lab& lab, const std::vector<std::string>& mcus = {"hall
 
 inline const std::vector<std::string> kMotors{"m01", "m02", "m03", "m04"};
 inline const std::vector<std::int64_t> kSteps{3000, -1201, 17, 0};
-// Of a line that the MCUs make themselves: its table is that of the motors.
+// Steps of a line that the MCUs make themselves: its table is that of the motors.
 inline const std::vector<std::int64_t> kInMcus{3000, -3000, 171, 3000};
 
 inline void expect_on_line_all_the_way(const char* manner, const std::vector<std::int64_t>& steps,

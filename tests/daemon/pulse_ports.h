@@ -61,8 +61,8 @@ struct PulseLab : Lab {
     return {all.begin() + static_cast<std::ptrdiff_t>(from), all.end()};
   }
 
-  // Of a motor's run from rest to rest: the interval before its step j is at least A(j-1), D(N-j)
-  // and the cruise delay. Times are whole ns, so an interval is exact to one.
+  // Expects a motor's run from rest to rest: the interval before its step j is at least A(j-1),
+  // D(N-j) and the cruise delay. Times are whole ns, so an interval is exact to one.
   void expect_table(const std::vector<std::int64_t>& made) const {
     const auto all = pulse_codes();
     const auto side = [&](std::size_t i) {
@@ -76,7 +76,7 @@ struct PulseLab : Lab {
     }
   }
 
-  // Of anything that it does: no interval is shorter than the cruise delay.
+  // Expects no interval shorter than the cruise delay, whatever the motor does.
   void expect_no_faster(std::size_t drive_index) {
     const auto made = times(drive_index);
     for (std::size_t j = 1; j < made.size(); ++j) {

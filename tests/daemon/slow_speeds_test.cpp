@@ -121,7 +121,7 @@ TEST_P(SlowSpeeds, AStopWaitsForHalfASecondAtMost) {
   EXPECT_EQ(judge(lab), 0) << said();
 }
 
-// Of what the MCU does by itself: in an emergency, and when nothing more comes.
+// What the MCU does by itself in an emergency, and when nothing more comes.
 TEST_P(SlowSpeeds, AnEmergencyAndSilenceMakeNoStepThatIsFarAway) {
   // Bytes of a coarse stream tell no parts of a step: the MCU may make the one that it is in.
   const int unseen = std::string(GetParam()) == "coarse" ? 1 : 0;

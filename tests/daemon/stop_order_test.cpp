@@ -74,7 +74,8 @@ struct Desk {
                               }};
 };
 
-// Of motors m01 and m02; the last of these begins the motion. `round`: trajectories have numbers.
+// Requests for motors m01 and m02; the last of these begins the motion. `round`: trajectories have
+// numbers.
 struct Kind {
   const char* name;
   std::function<std::vector<api::Request>(std::int64_t round)> requests;

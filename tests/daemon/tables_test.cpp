@@ -100,7 +100,7 @@ TEST(UseTable, MoveUnderWayKeepsItsTableAndNoneBeginsByTheOldOne) {
   EXPECT_EQ(lab.shaft_steps("m01"), 2500);
 }
 
-// Of a group move the parts may end long before its result.
+// The parts of a group move may end long before its result.
 TEST(UseTable, ResultTellsTheTableOfTheMoveAlsoIfItHasChangedSince) {
   Lab lab(two_groups(2, 2), kGlacier);
   lab.connect();

@@ -203,7 +203,7 @@ OF_FD(int, flock, (int fd, int how), (fd, how), note_fd("flock", fd))
 OF_FD(int, tcdrain, (int fd), (fd), note_fd("tcdrain", fd))
 OF_FD(int, tcsetattr, (int fd, int when, const struct termios* to), (fd, when, to),
       note_fd("tcsetattr", fd))
-// Of a file it may write back, of a tty it waits for what is not sent.
+// It may write a file back, and waits for what a tty has not sent.
 OF_FD(int, close, (int fd), (fd), const mode_t kind = kind_of(fd);
       if (kind == S_IFREG || kind == S_IFCHR) note_fd("close", fd))
 

@@ -20,7 +20,7 @@ class Bushctl(EndToEndTest):
         ran = self.command("move", "--wait", "a0", "300", "b0", "-7")
         by = r" by bushd2-constant \([0-9a-f]{8}\)\n"
         self.assertRegex(ran.stdout, f"a0: reached, stands at 300{by}b0: reached, stands at -7{by}")
-        # Of a group move one motor is stopped, the other arrives.
+        # One motor of a group move is stopped, the other arrives.
         move = self.start_move("a0", FAR, "b0", 100)
         self.wait_until_travelled(600, "a0")
         self.command("stop", "a0")
@@ -146,7 +146,7 @@ class Bushctl(EndToEndTest):
                 ran = self.bushctl(*arguments)
                 self.assertEqual(ran.returncode, 1)
                 self.assertIn(reason, ran.stderr)
-        # Of a refused group nothing has moved.
+        # Nothing has moved of a group that was refused.
         self.command("stop", "--wait")
         self.assertEqual(self.positions()["b0"], 0)
 

@@ -141,7 +141,7 @@ class Hostile(EndToEndTest):
         chance = random.Random(seed)
         for number in range(100, 110):
             for _ in range(BATCH):
-                # Of motors that do not exist: what is still a command after that is refused, so none may move.
+                # The motors do not exist: what is still a command after that is refused, so none may move.
                 mutant = bytearray(self.payload(number=number, motors=(b"nobody", b"none"), steps=(5, 6)))
                 for _ in range(chance.randrange(1, 4)):
                     mutant[chance.randrange(8, len(mutant))] = chance.choice((0, 1, 0x7F, 0x80, 0xFF))

@@ -20,7 +20,7 @@ class Moves(EndToEndTest):
         long = {name: -signs[name] * (900 + 97 * i) for i, name in enumerate(MOTORS)}
         self.command("move", "--wait", *[word for pair in long.items() for word in pair])
 
-        # Of two that move, one is stopped; the other goes on to its target.
+        # One of two that move is stopped; the other goes on to its target.
         stopped = self.start_move("a0", FAR)
         other = self.start_move("b1", -5000)
         self.wait_until_travelled(1500, "a0")

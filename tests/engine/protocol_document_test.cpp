@@ -158,7 +158,7 @@ class ExampleMcu {
     return sent_;
   }
 
-  // Of the last answer.
+  // The delay of the last answer.
   int delay_us() const { return delay_us_; }
 
   void pass_ticks(int count) {

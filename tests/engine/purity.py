@@ -16,7 +16,7 @@ import sys
 import tomllib
 
 FREESTANDING = {"stdint.h", "stdbool.h", "stddef.h", "limits.h", "string.h"}
-# Of these rooms docs/rooms.toml says which others they use.
+# docs/rooms.toml says which other rooms these use.
 ROOMS_FILE = pathlib.Path(__file__).resolve().parents[2] / "docs/rooms.toml"
 FREESTANDING_ROOMS = ("lib/engine", "firmware/core")
 

@@ -154,7 +154,7 @@ class Reference {
     const Wide delay = made < steps_.size() ? steps_[made].delay : begun_->delay;
     return static_cast<uint64_t>(delay / (Wide{law_.unit_ns} * 256));
   }
-  // Of a delay that is a code.
+  // A delay that is a code.
   uint16_t delay_at(uint64_t ns) const { return static_cast<uint16_t>(long_delay_at(ns)); }
 
  private:

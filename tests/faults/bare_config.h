@@ -29,7 +29,7 @@ inline constexpr std::size_t kBareBoardMotors = 3;
 bushd::Result<bushd::config::Config> with_bare(const bushd::config::Config& config,
                                                const BareOptions& options, std::uint64_t seed);
 
-// Of the motor of a serial port, by its index in the configuration: its home switch at CD.
+// The home switch at CD of the motor of a serial port, by its index in the configuration.
 std::optional<bushd::sim::SwitchOptions> bare_home_switch(const bushd::config::Config& config,
                                                           std::size_t motor, std::uint64_t seed);
 

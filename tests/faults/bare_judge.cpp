@@ -338,7 +338,7 @@ void BareJudge::completed(TimeNs now_ns, Open& open, const api::Completed& resul
   }
   const auto* all = std::get_if<std::vector<api::MotorResult>>(&result.detail);
   if (!open.is_motion) return;
-  // Of a jog, what its own client changes is answered at once.
+  // What its own client changes of a jog is answered at once.
   if (all == nullptr && open.text == "jog") return;
   if (all == nullptr || all->size() != open.motors.size()) {
     return violated_(now_ns, "not a result for each motor: " + open.text);

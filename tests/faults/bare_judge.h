@@ -40,7 +40,7 @@ class BareJudge final : public bushd::sim::EdgeSink {
   using TimeNs = bushd::sim::TimeNs;
   using Violated = std::function<void(TimeNs now_ns, const std::string& what)>;
 
-  // Of `config` the motors from `first_motor` on. `keeps`: positions outlive the daemon.
+  // Judges the motors of `config` from `first_motor` on. `keeps`: positions outlive the daemon.
   BareJudge(const bushd::config::Config& config, std::size_t first_motor, bool keeps,
             Recent& recent, Violated violated);
 
@@ -81,7 +81,7 @@ class BareJudge final : public bushd::sim::EdgeSink {
   std::string open_text() const;
   // At rest, as far as can be seen from its steps and the last state.
   bool rests(std::size_t motor) const;
-  // Of its MCU, as said last.
+  // The state of its MCU, as said last.
   bushd::api::McuState seen(std::size_t motor) const { return motors_[motor - first_].seen; }
   bool is_trusted(std::size_t motor) const { return motors_[motor - first_].trusted; }
   std::int64_t position(std::size_t motor) const { return motors_[motor - first_].position; }

@@ -33,7 +33,7 @@ class BareWorld {
 
   bool has(bushd::BusId bus) const { return bus.value >= first_bus_; }
   bool has(bushd::McuId mcu) const { return mcu.value >= first_mcu_; }
-  // Of the log of moves: about one of these motors.
+  // Whether a line of the log of moves is about one of these motors.
   bool has(const std::string& json_line) const;
   void send(TimeNs now_ns, bushd::BusId bus, std::span<const std::uint8_t> bytes);
   void pulse(TimeNs now_ns, bushd::BusId bus, const bushd::link::PulseOrder& order);

@@ -262,7 +262,7 @@ Request Clients::move_or_retarget() {
   return move(static_cast<std::size_t>(random_.between(1, 4)));
 }
 
-// Of one that is there: of others it says what will be.
+// Whether an MCU that is there says so; the detail of others says what will be.
 bool Clients::says(const char* detail) const {
   return std::any_of(witness_.states().begin(), witness_.states().end(), [&](const auto& state) {
     return state && state->state != bushd::api::McuState::kOffline &&

@@ -40,7 +40,7 @@ class Clients {
   bool emergency() const { return says("emergency"); }
 
   const CommandCounts& sent() const { return sent_by_kind_; }
-  // Of a flood of requests, by this client of the flood's own.
+  // One request of a flood, by this client of the flood's own.
   Request one_of_flood(std::size_t client);
 
  private:
@@ -79,7 +79,7 @@ class Clients {
   Request pause_or_hold();
   Request change_settings();
   Request of_program();
-  // Of motors at rest without backlash; one, if there are none.
+  // Some motors at rest without backlash; one, if there are none.
   std::vector<Choice> some_at_rest(std::int64_t most);
   Request move_along_path();
   Request first_of_parts(Request path);

@@ -56,7 +56,7 @@ Request Clients::set_of_user() {
   return request;
 }
 
-// Of a motor at rest, or a change in flight.
+// A move of a motor at rest, or a change in flight.
 Request Clients::move_at_speed() {
   Request request = random_.one_in(3) ? move_of_user() : move_or_retarget();
   const std::int64_t steps_per_s = random_.magnitude(300, 4000);
@@ -86,9 +86,10 @@ Request Clients::move_with_legs() {
   return request;
 }
 
-// Of motors without backlash, as far as there are any: what the legs of a line are the witness does
-// not know. At rest, but for a few: those are refused, or a line of one motor gets another end.
-// Every second one is of motors with one table and equal ways: MCUs that can make it themselves.
+// A line of motors without backlash, as far as there are any: the witness does not know what the
+// legs of a line are. The motors are at rest, but for a few: those are refused, or a line of one
+// motor gets another end. Every second line is of motors with one table and equal ways, so that
+// MCUs can make it themselves.
 Request Clients::move_along_line() {
   Request request = move(static_cast<std::size_t>(random_.between(2, 6)));
   const bool equal = random_.one_in(2);
@@ -161,7 +162,7 @@ std::vector<std::string> Clients::motors_with(bool bushd::api::MotorState::* fla
   return found;
 }
 
-// Of one to eight of these; of all, now and then.
+// A request for one to eight of these motors; for all, now and then.
 Request Clients::of_some(Ask ask, std::vector<std::string> motors) {
   Request request = make(ask);
   if (random_.one_in(8)) return request;

@@ -93,7 +93,7 @@ Wrong Crates::of_one_address(TimeNs now_ns, const Request& request,
   return responses.empty() ? Wrong("no word at all: " + text_of(request)) : std::nullopt;
 }
 
-// Of all stations only that of BUSHD-2 answers: with its memory, which has no Q while L is raised,
+// Only the station of BUSHD-2 answers of all: with its memory, which has no Q while L is raised,
 // and then with its registers.
 Wrong Crates::scanned(TimeNs now_ns, const Request& request,
                       const std::vector<Response>& responses) {

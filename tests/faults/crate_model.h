@@ -107,7 +107,7 @@ class Crates {
   std::optional<bool> flag_ = false;
   bool published_ = false;
   std::optional<Start> start_;
-  // Of the motion that has ended last by all of its steps, until its statuses are cleared.
+  // Steps of the motion that has ended last by all of its steps, until its statuses are cleared.
   std::optional<std::int64_t> steps_told_;
   std::uint64_t starts_ = 0;
   std::uint64_t ended_by_lam_ = 0;

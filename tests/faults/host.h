@@ -47,7 +47,7 @@ class Host final : public bushd::daemon::Outputs {
 
   // Is lost if no daemon runs.
   void receive(const Message& message);
-  // Of the daemon that runs, or of the last one.
+  // The number of the daemon that runs, or of the last one.
   std::int64_t run_number() const { return run_number_; }
   // Since when it has been running without a pause; nothing if it does not.
   std::optional<TimeNs> runs_since_ns() const;

@@ -44,7 +44,7 @@ class Inputs {
   bushd::sim::Plant& plant_;
   Witness& witness_;
   std::vector<TimeNs> limit_until_ns_;      // by motor; 0: not pressed
-  std::vector<TimeNs> emergency_until_ns_;  // by MCU; likewise
+  std::vector<TimeNs> emergency_until_ns_;  // by MCU; 0: not pressed
   std::vector<bool> trigger_;               // by MCU: its level
   // By motor: what it runs into.
   std::vector<std::vector<bushd::sim::SwitchOptions>> switches_;

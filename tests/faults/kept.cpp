@@ -10,7 +10,7 @@ namespace state = bushd::state;
 using bushd::daemon::Core;
 
 constexpr std::uint32_t kKeptStream = 405;  // of randomness
-// Of a good disk.
+// The times of a good disk.
 constexpr bushd::sim::TimeNs kFastestNs = 50'000;
 constexpr bushd::sim::TimeNs kSlowestNs = 20'000'000;
 

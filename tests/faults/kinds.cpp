@@ -34,7 +34,7 @@ constexpr std::array<KindInfo, kFaultKinds> kFaults = {{
     {"late-repeats", 0, "a request is repeated up to half an hour later", 300},
     {"stale-repeats", 0, "a request that an earlier daemon has received is repeated", 100},
     {"floods", 0, "50 .. 2000 requests at once, of up to 200 clients", 4},
-    {"crowds", 0, "likewise, of up to 2000 clients", 2},
+    {"crowds", 0, "50 .. 2000 requests at once, of up to 2000 clients", 2},
     {"second-daemons", 12, "another daemon for the same MCUs starts, for 0.1 .. 30 s"},
     {"power-cuts", 0, "the PC loses power for 10 ms .. 3 s, mostly with some MCUs or all", 20},
     {"disk-faults", 0, "the disk fails, or takes up to 2 s for a thing, for 10 ms .. 5 s", 20},

@@ -28,7 +28,7 @@ constexpr std::uint32_t kHomeSpeedStream = 407;
 constexpr std::uint32_t kRequiredStream = 410;
 constexpr std::uint32_t kLineStream = 414;
 constexpr std::uint32_t kSwitchStream = 500;  // and the next ones, one for each motor
-constexpr std::uint32_t kLimitStream = 5000;  // likewise
+constexpr std::uint32_t kLimitStream = 5000;  // and the next ones, one for each motor
 
 // Every choice is drawn, also where the way is given: so a run told all its ways is the same run.
 bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
@@ -53,7 +53,7 @@ const std::optional<bushd::config::Input>& limit_of(const bushd::config::Motor& 
   return positive ? motor.inputs.positive : motor.inputs.negative;
 }
 
-// Of every second one, in its own unit.
+// Gives every second motor a speed, in its own unit.
 void add_home_speed(bushd::config::Motor& motor, bushd::sim::Random& random) {
   const std::int64_t steps_per_s = random.magnitude(600, 4'000);
   if (random.one_in(2)) return;

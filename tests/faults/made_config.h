@@ -40,15 +40,15 @@ void furnish(bushd::config::Config& config, const FaultRates& faults, const Comm
 // of their own at both ends.
 void add_homes(bushd::config::Config& config, std::uint64_t seed);
 void add_switches(bushd::config::Config& config, std::uint64_t seed);
-// Of such a motor, by its index: where the plant has its switch.
+// Where the plant has the switch of such a motor, by its index.
 std::optional<bushd::sim::SwitchOptions> home_switch(const bushd::config::Config& config,
                                                      std::size_t motor, std::uint64_t seed);
 
-// Likewise those limits of it that are not its home switch.
+// Where the plant has those of its limits that are not its home switch.
 std::vector<bushd::sim::SwitchOptions> limit_switches(const bushd::config::Config& config,
                                                       std::size_t motor, std::uint64_t seed);
 
-// Of all MCUs; they ramp or stop immediately.
+// Gives all MCUs emergency inputs; they ramp or stop immediately.
 void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed);
 
 // At one end of most motors, at both of the others.

@@ -39,7 +39,7 @@ class Mail {
   // One that this daemon has got already, or an earlier one has.
   std::string repeat(bushd::sim::Random& random) { return repeat(random, false); }
   std::string repeat_stale(bushd::sim::Random& random) { return repeat(random, true); }
-  // Of so many clients at most.
+  // Requests of so many clients at most.
   std::string flood(TimeNs now_ns, bushd::sim::Random& random, std::int64_t clients);
 
   void run(TimeNs now_ns);

@@ -40,7 +40,7 @@ class ModuleRegisters {
   }
   // Precondition: is_memory(naf).
   Wrong memory_cycle(TimeNs now_ns, const Naf& naf, const Response& response);
-  // Of the address or the control register.
+  // A read of the address or the control register.
   Wrong read(const Naf& naf, const Response& response) const;
   void write(const Naf& naf);
   void count_up() { address_ = (address_ + 1) % memory_.size(); }

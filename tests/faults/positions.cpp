@@ -12,7 +12,7 @@ namespace {
 // beyond its bytes, and they follow each other in 50 ms at most: less than 1 s. Bytes that came
 // late are no answers, but the reports in them are read: 60 ms for each of the delays.
 constexpr bushd::sim::TimeNs kMaxAgeNs = 1'500'000'000;
-// Of reports, per MCU: polls come every 10 ms at most, and a state may be as old as the longest
+// Reports kept per MCU: polls come every 10 ms at most, and a state may be as old as the longest
 // pause and kMaxAgeNs together.
 constexpr std::size_t kReportsKept = 1024;
 

@@ -23,7 +23,7 @@ constexpr std::int64_t kLongestProgram = 2000;  // steps: four seconds at most
 // hundredths of it for each step.
 constexpr std::int64_t kSlowestProgram = 33;
 constexpr std::int64_t kSlowestCode = 250;  // F_start, as of all tables here
-constexpr int kStartHz = 100;               // likewise
+constexpr int kStartHz = 100;               // of all tables here
 
 // Never faster than the table, and never accelerating more: by that every step is judged.
 std::uint16_t stretched(const bushd_table& table, std::size_t k, std::int64_t hundredths) {
@@ -178,8 +178,8 @@ void Programs::random_cycles(Cycles& cycles) {
   look(cycles);
 }
 
-// Of one address, and of a row of them. Words are written into registers only: what is at the
-// memory's address others may have changed meanwhile.
+// Blocks at one address, and at a row of them. Words are written into registers only: others may
+// have changed meanwhile what is at the memory's address.
 void Programs::other_modes(Request& request) {
   using Mode = bushd::camac::BlockMode;
   constexpr std::array kModes = {Mode::kQStop, Mode::kRepeat, Mode::kScan};

@@ -32,7 +32,7 @@ class Programs {
   // The same of BUSHD-1, whose motor stands there, as the plant counts. `open`: a start may be
   // under way.
   Request next_of_shutter(std::int64_t stands, bool open);
-  // Of the module.
+  // Motors of the module.
   std::size_t any_motor();
   std::size_t motors() const;
 

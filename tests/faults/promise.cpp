@@ -13,7 +13,7 @@ namespace {
 namespace api = bushd::api;
 namespace lcm = bushd::lcm;
 
-// Of requests, with what was said to them: more than a client of bushfaults repeats.
+// Requests that are kept, with what was said to them: more than a client of bushfaults repeats.
 constexpr std::size_t kKept = 20'000;
 
 // The answer without its time.

@@ -66,7 +66,7 @@ struct Request {
   std::vector<std::int64_t> points{};  // of a path, or a trajectory, row by row, in millionths
   std::vector<double> point_speeds{};  // of a path of one motor: to each point
   bool exact = false;                  // a path: with a rest at each point
-  // Of a path in parts, all of which know all points: which rows this one tells; 0: to the last.
+  // The rows that this part of a path tells, all of whose parts know all points; 0: to the last.
   std::size_t first_row = 0;
   std::size_t end_row = 0;
   std::int64_t trajectory = 0;           // its number; kMoveTo: to be followed
@@ -100,7 +100,7 @@ struct Request {
     return is_stop() || ask == Ask::kPause || ask == Ask::kHold || ask == Ask::kDisarm ||
            (ask == Ask::kJog && speed_micro == 0 && !renew);
   }
-  // Of motors that then have a part in it, each with a result of its own.
+  // The motors then have a part in it, each with a result of its own.
   bool is_move() const { return ask == Ask::kMoveBy || ask == Ask::kMoveTo || ask == Ask::kArm; }
   bool names(const std::string& motor) const {
     return std::find(motors.begin(), motors.end(), motor) != motors.end();

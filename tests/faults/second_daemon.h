@@ -27,7 +27,7 @@ namespace bushfaults {
 class SecondDaemon final : public bushd::daemon::Outputs {
  public:
   using TimeNs = bushd::sim::TimeNs;
-  // Of the first daemon.
+  // What is known of the first daemon.
   struct First {
     std::optional<TimeNs> runs_since_ns;  // without a pause; nothing: it does not run
     TimeNs said_state_ns;                 // on its network, the last time

@@ -83,7 +83,7 @@ class Units {
     std::int64_t approach_micro = 0;  // a second; 0: no slower
   };
   void change(Motor& motor, Settings settings);
-  // Of a step, in units of time, rounded up.
+  // The delay of a step, in units of time, rounded up.
   std::int64_t delay(std::size_t motor, std::int64_t speed_micro,
                      std::int64_t micro_per_step) const;
   std::int64_t delay(std::size_t motor, const Request& request) const;

@@ -12,7 +12,7 @@ namespace {
 
 namespace api = bushd::api;
 
-// Of those that have ended; motors ask for no older ones.
+// So many requests that have ended are kept; motors ask for no older ones.
 constexpr std::size_t kFinishedKept = 2000;
 
 }  // namespace

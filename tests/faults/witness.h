@@ -123,7 +123,7 @@ class Witness {
     std::int64_t stands = 0;   // as the plant counts
     bool moves_on = false;     // by another move; then nobody knows where exactly that began
     bool paused = false;       // it may be no end, and no other line be written when it comes
-    bool legs_follow = false;  // likewise: the next one may not be begun
+    bool legs_follow = false;  // it may be no end: the next leg may not be begun
     bool agrees(const bushd::api::MotorResult& result) const;
   };
   struct Range {
@@ -163,7 +163,7 @@ class Witness {
     bool moves() const { return move && !over; }
     bool stands_paused() const { return move && over && pauses; }
   };
-  // Of the request that has begun to jog.
+  // The request that has begun to jog.
   struct JogOpen {
     TimeNs renewed_ns;
     std::int64_t keepalive_ms;
@@ -178,7 +178,7 @@ class Witness {
     TimeNs due_since_ns = 0;  // or since it was resumed
     bool accepted = false;
     bool finished = false;  // refused, or its result has come
-    // Of moves, by motor: where the plant stood (nothing if it moved) and must stand in the end,
+    // By motor, for moves: where the plant stood (nothing if it moved) and must stand in the end,
     // how it ended, and when it made its first step, if it began at rest, did and ended as planned.
     std::vector<std::optional<std::int64_t>> from{};
     std::vector<std::optional<std::int64_t>> target{};

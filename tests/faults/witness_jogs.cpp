@@ -250,7 +250,7 @@ void Witness::configure_accepted(Asked& asked) {
   for (const std::string& name : request.motors) {
     const Motor& motor = *find(name);
     const auto limits = units_.limits(index_of(motor));
-    // Of one that is not online nothing is said.
+    // Nothing is said of one that is not online.
     const auto& state = states_[motor.mcu];
     const bool known = trusted(motor) && offset(motor) && state->state != api::McuState::kOffline &&
                        state->state != api::McuState::kBusy;

@@ -110,8 +110,8 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
 // What a relative move counts from, as the plant counts.
 std::optional<std::int64_t> Witness::base_of(const Motor& motor) const {
   if (!motor.move || (motor.over && !motor.pauses)) return plant_steps(motor);
-  // Of several motors nobody has told whether one that was to wait for the trigger still does.
-  // Likewise one that rests may be paused, or have come to its end while others move.
+  // Nobody has told of several motors whether one that was to wait for the trigger still does. One
+  // that rests may be paused, or have come to its end while others move.
   const Asked& asked = asked_.at(*motor.move);
   const bool begun = asked.began.empty() || asked.began[asked.index_of(motor.name)];
   if (asked.request.motors.size() > 1 && (motor.over || !begun)) return std::nullopt;
@@ -174,7 +174,7 @@ void Witness::keep_within(TimeNs now_ns, Motor& motor) {
   motor.range->high = std::max(motor.range->high, before->high);
 }
 
-// Of a fault with "; set: m01, m02; not set: m03" in its reason only those that are set.
+// A fault with "; set: m01, m02; not set: m03" in its reason sets only those that it says.
 void Witness::position_set(const Request& request, const api::Completed& completed) {
   std::string names = completed.reason;
   names.erase(0, std::min(names.find("; set: "), names.size()));
@@ -328,7 +328,7 @@ void Witness::run_begins(TimeNs now_ns, Motor& motor) {
   if (waited && asked.request.line) pause_with_others(motor, asked);
 }
 
-// Of its line some have begun earlier, and may be paused: it is, too.
+// Some motors of its line have begun earlier, and may be paused: it is, too.
 void Witness::pause_with_others(Motor& motor, const Asked& asked) {
   for (const std::string& name : asked.request.motors) {
     const Motor& other = *find(name);

@@ -126,7 +126,7 @@ bool Witness::refused_for_good_reason(const Asked& asked, const Motor& motor, st
   return end < limits->low || end > limits->high;
 }
 
-// Of a run: from the first step to the last, which came before this is told.
+// The speed of a run, from the first step to the last, which came before this is told.
 void Witness::check_speed(TimeNs now_ns, const Motor& motor, const Asked& asked,
                           std::size_t index) {
   const std::size_t of = index_of(motor);

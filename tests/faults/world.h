@@ -40,7 +40,7 @@ struct Options {
   std::size_t motors = 32;
   std::size_t mcus = 2;
   std::size_t absent_mcus = 0;  // of these, the last ones
-  std::size_t late_mcus = 0;    // likewise, those before
+  std::size_t late_mcus = 0;    // those before the absent ones
   bool strict_known = false;
   Ways ways;
   FaultRates fault_rates = usual_fault_rates();
@@ -113,8 +113,8 @@ class World {
   std::vector<bushd::sim::Random> chance_;                     // by fault kind
   std::array<TimeNs, kFaultKinds> next_fault_ns_{};
   std::unique_ptr<Overheard> overheard_;  // once the MCUs are on the bus
-  std::unique_ptr<Inputs> inputs_;        // likewise
-  std::unique_ptr<SecondDaemon> second_;  // likewise
+  std::unique_ptr<Inputs> inputs_;        // once the MCUs are on the bus
+  std::unique_ptr<SecondDaemon> second_;  // once the MCUs are on the bus
   FaultCounts faults_{};
   std::map<std::string, std::uint64_t> mornings_;
   TimeNs now_ns_ = 0;

@@ -67,7 +67,7 @@ class Emergency : public Streams {
 INSTANTIATE_TEST_SUITE_P(Formats, Emergency,
                          testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
-// Of speeds that the coarse format cannot tell: below a step in four ticks.
+// Speeds that the coarse format cannot tell: below a step in four ticks.
 class FineEmergency : public Emergency {};
 INSTANTIATE_TEST_SUITE_P(Formats, FineEmergency, testing::Values(BUSHD_FORMAT_FINE), format_name);
 

@@ -37,7 +37,7 @@ inline std::vector<Wide> times_of(const Reference& run, std::uint32_t increment,
   return times;
 }
 
-// Of an MCU with four motors; the run is of `law`, in bank 0, as are their tables.
+// Lines of an MCU with four motors; the run is of `law`, in bank 0, as are their tables.
 class OfLines : public Streams {
  protected:
   OfLines() : Streams({.queue_ticks = 256}) {}

@@ -193,7 +193,7 @@ class Rig {
   const std::vector<int>& history(std::uint8_t motor) const { return history_[motor]; }
   void forget_history();
   bool enabled() const { return enabled_; }
-  // Of STEP, DIR and EN, as the port was told last.
+  // The levels of STEP, DIR and EN, as the port was told last.
   const bushd_set_outputs& levels() const { return levels_; }
   int enable_calls() const { return enable_calls_; }
   bool enable_kept() const { return enable_kept_; }

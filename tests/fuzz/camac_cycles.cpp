@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kOperations = 600;  // of a programme
 constexpr std::size_t kOperationBytes = 4;
-// Of camac_modules.cpp: what makes no cycle.
+// Kinds of operations in camac_modules.cpp; those below kFirstCycle make no cycle.
 constexpr unsigned kKinds = 8;
 constexpr unsigned kFirstCycle = 3;
 

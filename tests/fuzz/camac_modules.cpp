@@ -91,7 +91,7 @@ class Rig {
   }
   void check() {
     BUSHD_REQUIRE(bushd2_.is_moving() == world_.moves);
-    // Of a single step, or a travel, the module may know the end first: it is its last event.
+    // The module may know the end of a single step, or a travel, first: it is its last event.
     world_.shutter_moves = world_.shutter_moves && bushd1_.is_moving();
     BUSHD_REQUIRE(bushd1_.is_moving() == world_.shutter_moves);
     const std::uint32_t requests = crate_.requests();

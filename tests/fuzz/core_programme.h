@@ -40,7 +40,7 @@ class Programmed {
   virtual ~Programmed() = default;
 
   virtual Sight sight() = 0;
-  // Of the table that is there; 0: none.
+  // The CRC of the table that is there; 0: none.
   virtual std::uint32_t table_crc(std::uint8_t bank) = 0;
 
   virtual void begin() = 0;  // the first boot; before all else

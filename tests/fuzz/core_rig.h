@@ -57,7 +57,7 @@ class CoreRig : public Programmed {
 
   void boot();          // again and again
   void boot_is_over();  // what was kept is there again
-  // Of bytes that were handed over to the core.
+  // What must hold when bytes have been handed over to the core.
   void check_after_frames();
   void check_transmission(Bytes wire);
   // A walk through what is kept (bushd_mcu_nvm_scan_next) stands within it.

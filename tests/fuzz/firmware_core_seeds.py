@@ -154,7 +154,7 @@ MOVE = {0: ticks(START, 2, 3, (150, 150), (0x81, 0x82, 0x81, 0x83, 2, 2, 2, 2, 0
 MORE = {0: ticks(0, 7, 3, (0, 0), (0x81, 1)), 1: ticks(FINE, 3, 3, (0, 0), (256, -128))}
 REPLACEMENT = ticks(REPLACE | FINE, 4, 1, (0,), (128, 64), epoch=1)
 
-# Of motor 0 the limits are the inputs 0 and 1.
+# The limits of motor 0 are the inputs 0 and 1.
 SHUTTER = inputs(positive=1, negative=1) + frame(MOTOR_INPUTS, bytes([0, 0, 1, 0]))
 SEEDS = {
     "noise": noise(bytes(range(256))[:200]),

@@ -36,7 +36,7 @@ class ReceiveBuffer : public testing::Test {
   void limit(int bytes) const {
     ASSERT_EQ(setsockopt(receiver_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes), 0);
   }
-  // Of so many sent at once.
+  // How many are kept of so many that are sent at once.
   int kept(int datagrams) const {
     const std::string datagram(2000, 'x');
     for (int i = 0; i < datagrams; ++i) {

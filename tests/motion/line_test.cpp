@@ -30,7 +30,7 @@ struct Line {
   std::uint32_t tick_ns = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
 
-  // Of the run's position the part of a step counts too.
+  // The part of a step counts in the run's position too.
   const bushd_table& own() const { return *tables.back()->view(); }
   // The envelope as the reference has tables.
   Law law() const {

@@ -33,7 +33,7 @@ inline std::unique_ptr<motion::Path> path_through(
   return path;
 }
 
-// Of a run, in segments: step `first` .. of each, by their delays.
+// A run in segments: step `first` .. of each, by their delays.
 struct Ran {
   std::size_t segment;
   std::uint32_t first;

@@ -32,7 +32,7 @@ struct Edge {
   int direction;
 };
 
-// Of displacements in 1/256 step, as an MCU makes them.
+// The edges of displacements in 1/256 step, as an MCU makes them.
 std::vector<Edge> edges_of(const std::vector<std::int16_t>& ticks, std::uint32_t tick_ns) {
   std::vector<Edge> edges;
   std::int16_t remainder = 0;

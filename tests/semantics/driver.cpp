@@ -30,7 +30,7 @@ class Pulses final : public sim::EdgeSink {
   }
   void settled(sim::TimeNs) override {}
   std::int64_t steps(std::size_t mcu, std::uint8_t output) { return pins_[{mcu, output}].steps; }
-  // Of its last step; 0: it has made none.
+  // The direction of its last step; 0: it has made none.
   int direction(std::size_t mcu, std::uint8_t output) { return pins_[{mcu, output}].last; }
 
  private:

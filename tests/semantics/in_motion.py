@@ -49,7 +49,7 @@ class InMotion:
         if refused is not None:
             return self.finish(motors, {name: {aim} for name, aim in aims.items()}, number)
         others = [m for m in motors if m is not moving]
-        # Of a motor that moves on, nobody knows when it has taken the new target.
+        # Nobody knows when a motor that moves on has taken the new target.
         end = self.driver.do("end", number=answer["number"])
         expect(end["result"] == "reached", f"{end['result']}: {end['reason']}")
         first = self.driver.do("end", number=number)

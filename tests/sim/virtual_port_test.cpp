@@ -35,7 +35,7 @@ struct Rig {
 
   void identify(std::int64_t end_ns, std::uint16_t window_units = 0) {
     std::uint8_t wire[BUSHD_FRAME_MAX_WIRE];
-    // Of two windows the second one.
+    // The second one of two windows.
     bushd_identify message = {0, 2, window_units};
     while (bushd_identify_window(port.config.mcu.unique_id, message.salt, 2) != 1) ++message.salt;
     std::uint8_t payload[BUSHD_FRAME_MAX_PAYLOAD];

@@ -31,7 +31,7 @@ PARTS = {
     "displacements": [],
 }
 SHORTER = {"version": "protocol_version", "firmware": "firmware_version"}  # names in the drawings
-# Of one byte and told in words.
+# Messages of one byte that are told in words.
 WITHOUT_DRAWING = {"control", "emergency", "acknowledgement", "get_tables"}
 
 

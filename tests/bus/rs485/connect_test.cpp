@@ -337,7 +337,7 @@ TEST(Connect, PortLostIsOfflineWithItsCauseAndSendsNothing) {
   bus.connect();
 }
 
-// Of a pattern, the port at which nothing answers makes way for the next match.
+// A port of a pattern at which nothing answers makes way for the next match.
 TEST(Connect, ABusIsHeardOnceAnMcuHasAnsweredSinceThePortWasOpened) {
   FakeBus bus(2);
   EXPECT_FALSE(bus.master->heard());

@@ -83,7 +83,7 @@ class FakeSource : public link::TickSource {
       [](std::uint8_t motor, link::Tick tick) {
         return static_cast<std::int16_t>((tick * 7 + motor) % 1000);
       };
-  // Of the step running at the end of `tick - 1`.
+  // The delay of the step running at the end of `tick - 1`.
   std::function<std::uint16_t(std::uint8_t motor, link::Tick tick)> delay =
       [](std::uint8_t, link::Tick tick) { return static_cast<std::uint16_t>(100 + tick % 100); };
 

@@ -41,7 +41,7 @@ bool is_accepted(const Line& line) {
          fieldbus::kMaxLineLoad;
 }
 
-// Of each rate the shortest tick that is accepted, one in between, and the longest.
+// The shortest tick that is accepted at each rate, one in between, and the longest.
 std::vector<Line> lines() {
   std::vector<Line> all;
   for (const std::uint32_t baud : {9'600u, 19'200u, 38'400u, 57'600u, 115'200u, 230'400u, 460'800u,
@@ -121,7 +121,7 @@ class Moving {
     }
   }
 
-  // Of motors by MCU, all at once.
+  // Stops motors, by MCU, all at once.
   void stop(const std::vector<link::ToReplace>& together) {
     asked_us_ = bus.now_us;
     stops_.clear();
@@ -247,8 +247,8 @@ TEST(StopTime, IsWithinWhatIsStated) {
   }
 }
 
-// Of the others of each MCU, and of the other MCUs: those of the first stop need ticks, and their
-// MCUs are not yet known to have taken it.
+// The other motors of each MCU are stopped, and those of other MCUs: the motors of the first stop
+// need ticks, and their MCUs are not yet known to have taken it.
 TEST(StopTime, IsLongerByAPollAndARoundWhileAnotherChangeIsNotConfirmed) {
   on_every_line(0, [&](const Line& line, Moving& moving, std::mt19937& random) {
     const int half = line.motors / 2;

@@ -21,7 +21,7 @@
 
 namespace bushd::test::matrix {
 
-// Of each motor what there is to try: homing, limits, a step sensor, backlash and settling, local
+// What there is to try of motors: homing, limits, a step sensor, backlash and settling, local
 // inputs, a keypad, modules of a crate, and an MCU that disables its drivers at rest.
 std::string installation(const std::string& manner);
 inline const std::vector<std::string> kMotors{"a", "b", "c", "program", "shutter", "d", "e"};

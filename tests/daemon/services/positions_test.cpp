@@ -71,7 +71,7 @@ TEST(Positions, AreSetAtRestOnlyAndWithinTheirRange) {
   EXPECT_EQ(bench.of("m01").position_steps(), 1);
 }
 
-// Of those that are set, some may be, and offsets are none of the MCU's.
+// Some of those that are to be set may be set, and offsets are none of the MCU's.
 TEST(Positions, SetByHalvesAreSaidAndOffsetsStayThen) {
   test::Lab lab(with_unit(test::hall(2, 2)));
   lab.connect();

@@ -135,7 +135,7 @@ bool host_send(const uint8_t* reply, uint8_t* wire, size_t* size) {
     *size = 0;
     return false;
   }
-  // Of an address the chip has 16 bits.
+  // The chip has 16 bits of an address.
   const uint16_t at = (uint16_t)(LINE_SENDING_LOW | LINE_SENDING_HIGH << 8);
   const uint16_t offset = (uint16_t)(at - (uint16_t)(uintptr_t)reply);
   if (offset >= BUSHD_MCU_MAX_REPLY) abort();

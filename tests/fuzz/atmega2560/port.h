@@ -16,7 +16,7 @@ extern "C" {
 // A reset: all but the EEPROM is as after power-on.
 void host_reset(void);
 void host_blank_eeprom(void);
-// Of what is kept, as its head says. Precondition: it is whole.
+// Size and CRC of what is kept, as its head says. Precondition: it is whole.
 uint16_t host_nvm_size(void);
 uint32_t host_nvm_crc(void);
 // Where nvm_poll stands.

@@ -14,7 +14,7 @@ extern "C" {
 // A reset: all but the flash is as after power-on.
 void host_reset(void);
 void host_blank_flash(void);
-// Of what is kept, as its head says. Precondition: it is whole, and was found.
+// Size and CRC of what is kept, as its head says. Precondition: it is whole, and was found.
 uint32_t host_nvm_size(void);
 uint32_t host_nvm_crc(void);
 // Where nvm_poll stands.

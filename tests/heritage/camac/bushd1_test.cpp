@@ -1,4 +1,5 @@
-// BUSHD-1, likewise.
+// BUSHD-1. What the report of 1985 says, by the numbers of docs/camac.md, is in the names' order
+// there.
 #include "heritage/camac/bushd1.h"
 
 #include <gtest/gtest.h>

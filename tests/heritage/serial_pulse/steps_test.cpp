@@ -121,8 +121,8 @@ TEST(StepsOnALine, TicksAreNotAheadOfThem) {
   });
 }
 
-// Of two motors with tables of their own, by the envelope of both, and also where the run is made
-// to ramp down: neither has two steps closer together than its own table allows.
+// Two motors with tables of their own go by the envelope of both, also where the run is made to
+// ramp down: neither has two steps closer together than its own table allows.
 TEST(StepsOnALine, KeepToTheTableOfEachMotor) {
   holds("no interval is shorter than the motor's table has it", [] {
     const OwnTable own[2];

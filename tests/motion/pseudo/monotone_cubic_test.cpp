@@ -10,7 +10,7 @@
 namespace bushd::pseudo {
 namespace {
 
-// Of scipy 1.17.1, PchipInterpolator, at sixteenths of the way.
+// Values of scipy 1.17.1, PchipInterpolator, at sixteenths of the way.
 TEST(MonotoneCubic, IsThatOfFritschAndButland) {
   struct Known {
     std::vector<double> x;

@@ -58,7 +58,7 @@ class Chopper : public McuAlone {
     ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 0, 0));
   }
 
-  // Of what was recorded since `forget`.
+  // Figures of what was recorded since `forget`.
   Figures figures() const;
   void forget() {
     recorder_.samples.clear();

@@ -27,7 +27,7 @@ struct Load {
   double goal_steps_per_s;
 };
 
-// Of the slots of a tick, each two half slots of whole cycles; they leave a margin in it:
+// The length of a tick's slots, each two half slots of whole cycles; they leave a margin in it:
 // firmware/ports/lm3s6965/emission.h.
 constexpr TimeNs slots_ns(TimeNs tick_ns) {
   constexpr TimeNs kTimerCycleNs = 20;

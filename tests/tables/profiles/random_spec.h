@@ -63,7 +63,7 @@ inline tables::profiles::Spec random_pto_spec() {
   return spec;
 }
 
-// Of the accelerating side.
+// The greatest acceleration of the accelerating side.
 inline double greatest_acceleration(const tables::profiles::Spec& spec) {
   if (spec.accel.acceleration) return *spec.accel.acceleration;
   if (spec.accel.time_s) return (spec.max_hz - spec.start_hz) / *spec.accel.time_s;

@@ -78,7 +78,7 @@ Observations good() {
   return seen;
 }
 
-// Of what is not in order: "error port: ... -> ...".
+// What is not in order: "error port: ... -> ...".
 std::vector<std::string> complaints(const Observations& seen) {
   std::vector<std::string> out;
   for (const Finding& found : diagnose(seen)) {

@@ -137,7 +137,8 @@ TEST_F(JogKeysTest, AnArrowPressedOnceJogsUntilAnotherKey) {
   EXPECT_EQ(read("x"), Course::kStopping);
 }
 
-// Of a connection that stood still, or of this program: whether the key is still held shows soon.
+// A burst comes of a connection that stood still, or of this program: whether the key is still held
+// shows soon.
 TEST_F(JogKeysTest, WhatComesInABurstWasHeld) {
   EXPECT_EQ(read(times(20, kRight)), Course::kRight);
   EXPECT_EQ(later(599), Course::kRight);

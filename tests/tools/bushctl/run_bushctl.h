@@ -53,7 +53,7 @@ Request only(const FakeDaemon& daemon) {
   return std::get<Request>(requests.at(0));
 }
 
-// Of motors without a unit.
+// Amounts of motors without a unit.
 inline std::vector<api::MotorAmount> user(
     const std::vector<std::pair<std::string, double>>& motors) {
   std::vector<api::MotorAmount> out;

@@ -65,7 +65,7 @@ class WatchOfManyMotors : public testing::Test {
   std::vector<std::string> lines(std::size_t columns = kColumns) {
     return table.lines(status, columns, kRows);
   }
-  // Of the rows of motors.
+  // The names in the rows of motors.
   std::vector<std::string> names() {
     std::vector<std::string> out;
     for (const std::string& line : lines()) {

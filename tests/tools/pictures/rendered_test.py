@@ -20,7 +20,7 @@ from terminal_picture import rendering
 PICTURES = sorted((SOURCE / "docs/pictures").glob("*.svg"))
 # A letter of DejaVu Sans Mono is 0.602 of its size wide, so 0.03 px wider than a column.
 WIDER = 0.03
-# Of a cell's sides, px: what smoothed edges of its neighbours may reach into, and half of how far the last letter of a long word stands
+# A part of a cell's sides, px: what smoothed edges of its neighbours may reach into, and half of how far the last letter of a long word stands
 # to the right of its column.
 EDGE = 1.2
 # The largest difference of a colour's parts that is no ink: what smoothing leaves beyond the edge.
