@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "bus/line_budget.h"
+#include "bus/bus_budget.h"
 #include "config/motor_inputs.h"
 #include "engine/emission.h"
 #include "engine/run.h"
@@ -203,7 +203,7 @@ Result<void> check_table_banks(const Loading& loading) {
 // What would help, by itself: the lowest faster rate, the shortest longer tick.
 std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
   const auto fits = [&](std::uint32_t baud, std::uint32_t tick_us) {
-    return fieldbus::line_load(baud, tick_us * 1000u, bus.format, motors) <= fieldbus::kMaxLineLoad;
+    return fieldbus::bus_load(baud, tick_us * 1000u, bus.format, motors) <= fieldbus::kMaxBusLoad;
   };
   std::string remedy;
   for (const std::uint32_t baud : kBaudRates) {
@@ -221,8 +221,8 @@ std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
     remedy += fmt::format("{}tick_us = {} or more", remedy.empty() ? "" : ", or ", high);
   }
   if (bus.format == BUSHD_FORMAT_FINE &&
-      fieldbus::line_load(bus.baud, bus.tick_ns(), BUSHD_FORMAT_COARSE, motors) <=
-          fieldbus::kMaxLineLoad) {
+      fieldbus::bus_load(bus.baud, bus.tick_ns(), BUSHD_FORMAT_COARSE, motors) <=
+          fieldbus::kMaxBusLoad) {
     remedy += fmt::format("{}format = \"coarse\"", remedy.empty() ? "" : ", or ");
   }
   return remedy.empty() ? "Spread the MCUs over more buses" : "Use " + remedy;
@@ -239,13 +239,13 @@ Result<void> check_line(const Loading& loading, std::size_t index) {
         std::count_if(config.motors.begin(), config.motors.end(),
                       [&](const Motor& motor) { return motor.mcu == McuId{i}; })));
   }
-  const double load = fieldbus::line_load(bus.baud, bus.tick_ns(), bus.format, motors);
-  if (load <= fieldbus::kMaxLineLoad) return {};
+  const double load = fieldbus::bus_load(bus.baud, bus.tick_ns(), bus.format, motors);
+  if (load <= fieldbus::kMaxBusLoad) return {};
   return fail(loading.buses[index].error(
       "tick_us",
       fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the bus at {} baud; "
                   "allowed: {:.0f} %. {}",
-                  bus.tick_us, load * 100, bus.baud, fieldbus::kMaxLineLoad * 100,
+                  bus.tick_us, load * 100, bus.baud, fieldbus::kMaxBusLoad * 100,
                   line_remedy(bus, motors))));
 }
 

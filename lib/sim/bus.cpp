@@ -12,8 +12,8 @@ constexpr TimeNs kSettlingPeriodNs = 10'000'000;
 
 }  // namespace
 
-Bus::Bus(std::uint32_t baud, EdgeSink* sink) : baud_(baud), sink_(sink), line_(baud) {
-  line_.add_talker();
+Bus::Bus(std::uint32_t baud, EdgeSink* sink) : baud_(baud), sink_(sink), wire_(baud) {
+  wire_.add_talker();
 }
 
 std::size_t Bus::add_mcu(const McuOptions& options) {
@@ -26,7 +26,7 @@ std::size_t Bus::add_mcu(const McuOptions& options) {
 std::size_t Bus::add_mcu(const MakeMcu& make) {
   assert(second_master_ == kMaster);
   const std::size_t index = mcus_.size();
-  line_.add_talker();
+  wire_.add_talker();
   deaf_until_ns_.push_back(0);
   Mcu::Driver& driver = *this;  // here, where the private base is known
   mcus_.push_back(make(index, driver, sink_));
@@ -35,21 +35,21 @@ std::size_t Bus::add_mcu(const MakeMcu& make) {
 
 void Bus::master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns) {
   assert(at_ns >= now_ns_);
-  line_.send(kMaster, bytes, at_ns);
+  wire_.send(kMaster, bytes, at_ns);
 }
 
 void Bus::add_second_master() {
   assert(second_master_ == kMaster);
-  second_master_ = line_.add_talker();
+  second_master_ = wire_.add_talker();
 }
 
 void Bus::second_master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns) {
   assert(second_master_ != kMaster && at_ns >= now_ns_);
-  line_.send(second_master_, bytes, at_ns);
+  wire_.send(second_master_, bytes, at_ns);
 }
 
 void Bus::transmit(std::size_t mcu, TimeNs start_ns, const std::uint8_t* wire, std::size_t size) {
-  line_.send(mcu + 1, {wire, size}, start_ns);
+  wire_.send(mcu + 1, {wire, size}, start_ns);
 }
 
 std::uint8_t Bus::talker_address(std::size_t talker) const {
@@ -58,7 +58,7 @@ std::uint8_t Bus::talker_address(std::size_t talker) const {
 }
 
 TimeNs Bus::next_event_ns() const {
-  TimeNs next_ns = line_.next_end_ns();
+  TimeNs next_ns = wire_.next_end_ns();
   for (const auto& mcu : mcus_) next_ns = std::min(next_ns, mcu->next_event_ns());
   return next_ns;
 }
@@ -83,7 +83,7 @@ void Bus::run_ticks_until(TimeNs t_ns) {
   }
 }
 
-void Bus::deliver(const LineByte& byte) {
+void Bus::deliver(const WireByte& byte) {
   corrupted_bytes_ += byte.corrupted;
   if (byte.collision) {
     ++collisions_;
@@ -94,7 +94,7 @@ void Bus::deliver(const LineByte& byte) {
   }
   for (std::size_t i = 0; i < mcus_.size(); ++i) {
     const std::size_t talker = i + 1;
-    if (talker == byte.talker || line_.drives(talker, byte.start_ns, byte.end_ns)) continue;
+    if (talker == byte.talker || wire_.drives(talker, byte.start_ns, byte.end_ns)) continue;
     if (byte.end_ns <= deaf_until_ns_[i]) continue;
     mcus_[i]->receive(byte.value, byte.end_ns);
     if (on_mcu_byte && mcus_[i]->running()) on_mcu_byte(i, byte.value, byte.end_ns);
@@ -114,7 +114,7 @@ void Bus::settle(TimeNs t_ns) {
 void Bus::advance_to(TimeNs t_ns) {
   assert(t_ns >= now_ns_);
   for (;;) {
-    const TimeNs end_ns = line_.next_end_ns();
+    const TimeNs end_ns = wire_.next_end_ns();
     if (sink_ != nullptr && next_settling_ns_ <= now_ns_) settle(now_ns_);
     const TimeNs limit_ns = std::min(end_ns, t_ns);
     const TimeNs until_ns =
@@ -122,7 +122,7 @@ void Bus::advance_to(TimeNs t_ns) {
     run_ticks_until(until_ns);
     now_ns_ = until_ns;
     if (end_ns <= until_ns) {
-      deliver(line_.take());
+      deliver(wire_.take());
     } else if (until_ns == t_ns) {
       break;
     }
@@ -136,7 +136,7 @@ void Bus::deafen(std::size_t mcu, TimeNs until_ns) {
 
 void Bus::reboot(std::size_t mcu, TimeNs down_ns) {
   Mcu& rebooted = *mcus_[mcu];
-  line_.silence(mcu + 1, now_ns_);
+  wire_.silence(mcu + 1, now_ns_);
   rebooted.reset(now_ns_, now_ns_ + down_ns,
                  static_cast<std::uint16_t>(rebooted.boot_number() + 1));
 }

@@ -1,8 +1,8 @@
-// A bus in simulated time: one master's port, a line, and MCUs that run the firmware core. No I/O
+// A bus in simulated time: one master's port, a wire, and MCUs that run the firmware core. No I/O
 // and no clock: time is moved by the caller, and the same calls always give the same result.
 //
 // Who hears what: an MCU hears every byte of the others and of the master, at the end of its stop
-// bit, unless it drives the line itself meanwhile (its receiver is off then) or is in reset. The
+// bit, unless it drives the wire itself meanwhile (its receiver is off then) or is in reset. The
 // master's port hears every byte of the MCUs (and of a second master) and not its own.
 //
 // Order of events: by time. What happens at the same ns goes thus: boots and tick boundaries, in
@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "sim/edge.h"
-#include "sim/line.h"
 #include "sim/virtual_mcu.h"
+#include "sim/wire.h"
 
 namespace bushd::sim {
 
@@ -35,7 +35,7 @@ class Bus : private Mcu::Driver {
       std::function<std::unique_ptr<Mcu>(std::size_t index, Mcu::Driver& driver, EdgeSink* sink)>;
   std::size_t add_mcu(const MakeMcu& make);
 
-  // Bytes for the line at `at_ns` (>= now_ns()), or as soon as those given before are sent. The
+  // Bytes for the wire at `at_ns` (>= now_ns()), or as soon as those given before are sent. The
   // master does not listen before it talks.
   void master_send(std::span<const std::uint8_t> bytes, TimeNs at_ns);
 
@@ -61,8 +61,8 @@ class Bus : private Mcu::Driver {
   TimeNs now_ns() const { return now_ns_; }
   // When something happens next, if nothing comes from outside.
   TimeNs next_event_ns() const;
-  // When the line falls silent, if nothing more is sent; in the past if it is silent.
-  TimeNs line_busy_until_ns() const { return line_.busy_until_ns(); }
+  // When the wire falls silent, if nothing more is sent; in the past if it is silent.
+  TimeNs wire_busy_until_ns() const { return wire_.busy_until_ns(); }
 
   // Resets an MCU now: what it was sending breaks off, and it boots with the next boot number when
   // `down_ns` have passed.
@@ -71,7 +71,7 @@ class Bus : private Mcu::Driver {
   // From now until then this MCU alone hears nothing: disturbances are not the same everywhere.
   void deafen(std::size_t mcu, TimeNs until_ns);
   // The master falls silent now: the byte on the bus breaks off, those behind it are dropped.
-  void break_off_master() { line_.silence(kMaster, now_ns_); }
+  void break_off_master() { wire_.silence(kMaster, now_ns_); }
 
   std::size_t mcu_count() const { return mcus_.size(); }
   Mcu& node(std::size_t index) { return *mcus_[index]; }
@@ -92,13 +92,13 @@ class Bus : private Mcu::Driver {
   std::uint8_t talker_address(std::size_t talker) const;
   TimeNs stride(TimeNs until_ns);
   void run_ticks_until(TimeNs t_ns);
-  void deliver(const LineByte& byte);
+  void deliver(const WireByte& byte);
   void settle(TimeNs t_ns);
 
   std::uint32_t baud_;
   std::size_t second_master_ = kMaster;  // as a talker; kMaster: there is none
   EdgeSink* sink_;
-  Line line_;
+  Wire wire_;
   std::vector<std::unique_ptr<Mcu>> mcus_;
   std::vector<TimeNs> deaf_until_ns_;  // by MCU
   TimeNs now_ns_ = 0;

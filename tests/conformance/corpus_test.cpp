@@ -100,7 +100,7 @@ class ImageReplay final : public fuzz::Programmed {
 
   void feed(fuzz::Bytes bytes) override {
     bus_.master_send(bytes, bus_.now_ns());
-    advance(bus_.line_busy_until_ns() - bus_.now_ns());
+    advance(bus_.wire_busy_until_ns() - bus_.now_ns());
   }
 
   void frame(std::uint8_t address, std::uint8_t type, fuzz::Bytes payload,

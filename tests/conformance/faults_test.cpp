@@ -47,7 +47,7 @@ class Faults : public testing::TestWithParam<Target> {
   void tell(bushd_type type, const Bytes& payload) {
     master_.post(kVirtual, static_cast<std::uint8_t>(type), payload);
     master_.post(kReal, static_cast<std::uint8_t>(type), payload);
-    bus_.advance_to(bus_.line_busy_until_ns());
+    bus_.advance_to(bus_.wire_busy_until_ns());
   }
   void tell_damaged(bushd_type type, const Bytes& payload) {
     for (const std::uint8_t address : {kVirtual, kReal}) {
@@ -55,12 +55,12 @@ class Faults : public testing::TestWithParam<Target> {
       wire[wire.size() / 2] ^= 0x40;
       bus_.master_send(wire, bus_.now_ns());
     }
-    bus_.advance_to(bus_.line_busy_until_ns());
+    bus_.advance_to(bus_.wire_busy_until_ns());
   }
   // To both in one frame.
   void broadcast(bushd_type type, const Bytes& payload) {
     master_.post(BUSHD_ADDRESS_BROADCAST, static_cast<std::uint8_t>(type), payload);
-    bus_.advance_to(bus_.line_busy_until_ns());
+    bus_.advance_to(bus_.wire_busy_until_ns());
   }
 
   // One of kFrames of a move that makes a step a tick.
@@ -273,7 +273,7 @@ class GoldenFrames : public testing::TestWithParam<Target> {
     for (int round = 0; round < 2; ++round) {
       for (const Bytes& wire : wires()) {
         bus.master_send(wire, bus.now_ns());
-        bus.advance_to(bus.line_busy_until_ns() + 40'000'000);
+        bus.advance_to(bus.wire_busy_until_ns() + 40'000'000);
       }
     }
     std::vector<Answer> answers;

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 #include "daemon/lab.h"
 #include "daemon/motor_keys.h"
 

@@ -11,8 +11,8 @@
 #include "kinds.h"
 #include "programs.h"
 #include "request.h"
-#include "sim/line.h"
 #include "sim/random.h"
+#include "sim/wire.h"
 #include "witness.h"
 
 namespace bushfaults {

@@ -15,7 +15,7 @@
 #include "heritage/camac/bushd2.h"
 #include "module_registers.h"
 #include "request.h"
-#include "sim/line.h"
+#include "sim/wire.h"
 
 namespace bushfaults {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "request.h"
-#include "sim/line.h"
 #include "sim/random.h"
+#include "sim/wire.h"
 
 namespace bushfaults {
 

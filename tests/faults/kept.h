@@ -13,8 +13,8 @@
 #include "config/config.h"
 #include "daemon/core/core.h"
 #include "sim/disk/sim_disk.h"
-#include "sim/line.h"
 #include "sim/random.h"
+#include "sim/wire.h"
 #include "state/keeper.h"
 #include "state/store.h"
 

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "bus/line_budget.h"
+#include "bus/bus_budget.h"
 #include "programs.h"
 #include "sim/random.h"
 #include "tables/table_file.h"
@@ -98,8 +98,8 @@ bushd::Result<bushd::config::Config> make_installation(std::size_t motors, std::
   bushd::config::Bus bus = make_bus(ways, seed);
   for (const std::uint32_t baud : kBauds) {
     if (baud < kUsualBaud && !ways.slow_line.value_or(false)) continue;
-    if (bushd::fieldbus::line_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
-        bushd::fieldbus::kMaxLineLoad) {
+    if (bushd::fieldbus::bus_load(baud, bus.tick_ns(), bus.format, motors_of_mcu) >
+        bushd::fieldbus::kMaxBusLoad) {
       continue;
     }
     bus.baud = baud;

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "bus/line_budget.h"
+#include "bus/bus_budget.h"
 #include "config/config.h"
 #include "engine/run.h"
 #include "fuzz/fuzz.h"
@@ -46,8 +46,8 @@ void check_speeds(const config::Config& config) {
     for (std::size_t m = 0; m < config.mcus.size(); ++m) {
       if (config.mcus[m].bus.value == b) motors.push_back(motors_of_mcu[m]);
     }
-    BUSHD_REQUIRE(fieldbus::line_load(bus.baud, bus.tick_ns(), bus.format, motors) <=
-                  fieldbus::kMaxLineLoad);
+    BUSHD_REQUIRE(fieldbus::bus_load(bus.baud, bus.tick_ns(), bus.format, motors) <=
+                  fieldbus::kMaxBusLoad);
   }
 }
 

@@ -27,7 +27,7 @@ constexpr std::size_t kMcus = 2;
 constexpr std::uint8_t kMotors = 3;
 constexpr std::uint32_t kTickNs = 2'560'000;
 constexpr std::uint16_t kBootNumber = 4660;
-constexpr std::int64_t kMinPatienceUs = 10'000;  // docs/protocol.md, Line
+constexpr std::int64_t kMinPatienceUs = 10'000;  // docs/protocol.md, Wire
 
 enum class Op : std::uint8_t {
   kNoise,     // count, bytes

@@ -90,7 +90,7 @@ class FrameMaster {
     bus_.master_send(wire(address, type, ++sequence_, payload), bus_.now_ns());
   }
 
-  // The same, and lets time pass until the line is silent.
+  // The same, and lets time pass until the wire is silent.
   void send(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
     post(address, type, payload);
     drain();
@@ -99,9 +99,9 @@ class FrameMaster {
   void drain() {
     TimeNs silent_ns;
     do {
-      silent_ns = std::max(bus_.line_busy_until_ns(), bus_.now_ns());
+      silent_ns = std::max(bus_.wire_busy_until_ns(), bus_.now_ns());
       bus_.advance_to(silent_ns + patience_ns);
-    } while (bus_.line_busy_until_ns() > silent_ns);
+    } while (bus_.wire_busy_until_ns() > silent_ns);
   }
 
   // The reply to a request; nothing if none came.

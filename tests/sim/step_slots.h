@@ -12,7 +12,7 @@
 
 #include "engine/message.h"
 #include "sim/edge.h"
-#include "sim/line.h"
+#include "sim/wire.h"
 
 namespace bushd::sim {
 

@@ -314,11 +314,11 @@ Result<void> Simulator::hand_out_replies() {
 bool Simulator::line_takes_more(TimeNs now_ns) const {
   const TimeNs backlog_ns =
       kBacklogBytes * bushd::sim::kBitsPerByte * bushd::sim::kNsPerSecond / setup_.baud;
-  return bus_.line_busy_until_ns() - now_ns < backlog_ns;
+  return bus_.wire_busy_until_ns() - now_ns < backlog_ns;
 }
 
 TimeNs Simulator::sleep_ns(TimeNs now_ns) const {
-  const TimeNs busy_ns = bus_.line_busy_until_ns() - now_ns;
+  const TimeNs busy_ns = bus_.wire_busy_until_ns() - now_ns;
   if (busy_ns > 0) return std::clamp(busy_ns, kShortestSleepNs, kBusySleepNs);
   // When an image answers is not known before it does.
   return has_images_ ? kBusySleepNs : kIdleSleepNs;

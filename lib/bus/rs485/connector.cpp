@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 #include "bus/rs485/faults.h"
 #include "bus/rs485/mcu_fit.h"
 #include "bus/rs485/unique_id.h"

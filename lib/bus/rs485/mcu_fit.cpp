@@ -5,7 +5,7 @@
 #include <bit>
 #include <string>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 #include "engine/velocity.h"
 
 namespace bushd::link {

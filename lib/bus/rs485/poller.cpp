@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 
 namespace bushd::link {
 namespace {

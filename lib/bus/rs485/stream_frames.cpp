@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 #include "bus/rs485/stream_scheduler.h"
 
 namespace bushd::link {

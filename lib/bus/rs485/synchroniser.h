@@ -14,7 +14,7 @@
 #include <deque>
 #include <optional>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 #include "bus/rs485/bus_clock.h"
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/frame_writer.h"

@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "sim/line.h"
 #include "sim/mcu.h"
 #include "sim/qemu/lockstep.h"
 #include "sim/qemu/memory_map.h"
+#include "sim/wire.h"
 
 namespace bushd::sim {
 

@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "bus/line_budget.h"
+#include "bus/bus_budget.h"
 #include "bus/rs485/slave.h"
 #include "source_path.h"
 
@@ -37,8 +37,8 @@ std::ostream& operator<<(std::ostream& out, const Line& line) {
 bool is_accepted(const Line& line) {
   const std::vector<std::uint8_t> motors(static_cast<std::size_t>(line.mcus),
                                          static_cast<std::uint8_t>(line.motors));
-  return fieldbus::line_load(line.baud, line.tick_us * 1000, line.format, motors) <=
-         fieldbus::kMaxLineLoad;
+  return fieldbus::bus_load(line.baud, line.tick_us * 1000, line.format, motors) <=
+         fieldbus::kMaxBusLoad;
 }
 
 // The shortest tick that is accepted at each rate, one in between, and the longest.

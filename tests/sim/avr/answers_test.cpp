@@ -17,7 +17,7 @@ TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
   for (int i = 0; i < 1000; ++i) {
     pass(random.between(0, TimeNs{kTickNs}));
     master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0});
-    const TimeNs asked_ns = bus_.line_busy_until_ns();
+    const TimeNs asked_ns = bus_.wire_busy_until_ns();
     master_.frames.clear();
     master_.drain();
     ASSERT_EQ(master_.frames.size(), 1u);

@@ -1,6 +1,6 @@
 // The budget refuses configurations, so it must not promise what the line cannot keep; and it
 // should not refuse what it could.
-#include "bus/line_budget.h"
+#include "bus/bus_budget.h"
 
 #include <gtest/gtest.h>
 
@@ -16,36 +16,36 @@
 namespace bushd::fieldbus {
 namespace {
 
-TEST(LineBudget, ByHand) {
+TEST(BusBudget, ByHand) {
   // 16 fine motors: 6 ticks a frame; 1 delimiter + 9 + 9 + 2 x 16 + 6 x 32 = 243 bytes every 15.36
   // ms. Every 50 ms a poll, 10 + 1 + 3 bytes and 1 ms, and a report, 10 + 78 + 96 bytes and 0.6 ms.
   // A time mark: 10 + 19 bytes every 500 ms.
   const std::array<std::uint8_t, 1> one = {16};
   const double bytes_per_s = 243 / 0.01536 + (14 + 184) / 0.05 + 29 / 0.5;
-  EXPECT_NEAR(line_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one),
+  EXPECT_NEAR(bus_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one),
               bytes_per_s * 10 / 500'000 + 1.6 / 50, 1e-9);
   // Two MCUs without motors are still asked.
   const std::array<std::uint8_t, 2> idle = {0, 0};
-  EXPECT_NEAR(line_load(1'000'000, 2'560'000, BUSHD_FORMAT_COARSE, idle),
+  EXPECT_NEAR(bus_load(1'000'000, 2'560'000, BUSHD_FORMAT_COARSE, idle),
               ((11 + 2 * (3 + 10 + 78)) / 0.05 + 29 / 0.5) * 10 / 1e6 + 2.2 / 50, 1e-9);
   // One coarse motor: 16 ticks a frame, 1 + 9 + 9 + 2 + 16 bytes every 16 ms.
   const std::array<std::uint8_t, 1> single = {1};
-  EXPECT_NEAR(line_load(250'000, 1'000'000, BUSHD_FORMAT_COARSE, single),
+  EXPECT_NEAR(bus_load(250'000, 1'000'000, BUSHD_FORMAT_COARSE, single),
               (37 / 0.016 + (14 + 10 + 84) / 0.05 + 29 / 0.5) * 10 / 250'000 + 1.6 / 50, 1e-9);
 }
 
-TEST(LineBudget, GrowsWithEverythingThatCosts) {
+TEST(BusBudget, GrowsWithEverythingThatCosts) {
   const std::vector<std::uint8_t> few = {4, 4};
   const std::vector<std::uint8_t> more = {4, 5};
-  const double load = line_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, few);
-  EXPECT_LT(load, line_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, more));
-  EXPECT_LT(load, line_load(250'000, 2'560'000, BUSHD_FORMAT_FINE, few));
-  EXPECT_LT(load, line_load(500'000, 2'000'000, BUSHD_FORMAT_FINE, few));
-  EXPECT_GT(load, line_load(500'000, 2'560'000, BUSHD_FORMAT_COARSE, few));
+  const double load = bus_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, few);
+  EXPECT_LT(load, bus_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, more));
+  EXPECT_LT(load, bus_load(250'000, 2'560'000, BUSHD_FORMAT_FINE, few));
+  EXPECT_LT(load, bus_load(500'000, 2'000'000, BUSHD_FORMAT_FINE, few));
+  EXPECT_GT(load, bus_load(500'000, 2'560'000, BUSHD_FORMAT_COARSE, few));
 }
 
 // In ticks of 2560 us, with 16 motors on each MCU.
-TEST(LineBudget, ConfigurationDocumentHasTheSameLoads) {
+TEST(BusBudget, ConfigurationDocumentHasTheSameLoads) {
   std::ifstream file(test::source_path("docs/configuration.md"));
   const std::string document{std::istreambuf_iterator<char>(file), {}};
   for (const std::uint32_t baud : {115'200u, 230'400u, 500'000u, 1'000'000u}) {
@@ -53,9 +53,9 @@ TEST(LineBudget, ConfigurationDocumentHasTheSameLoads) {
     for (const bushd_format format : {BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE}) {
       for (const std::size_t mcus : {1u, 2u, 4u}) {
         const double load =
-            line_load(baud, 2'560'000, format, std::vector<std::uint8_t>(mcus, std::uint8_t{16}));
-        row += " | " + (load > kMaxLineLoad ? std::string("refused")
-                                            : std::to_string(std::lround(load * 100)) + " %");
+            bus_load(baud, 2'560'000, format, std::vector<std::uint8_t>(mcus, std::uint8_t{16}));
+        row += " | " + (load > kMaxBusLoad ? std::string("refused")
+                                           : std::to_string(std::lround(load * 100)) + " %");
       }
     }
     EXPECT_NE(document.find(row + " |\n"), std::string::npos) << row;

@@ -1,8 +1,8 @@
-#include "bus/line_budget.h"
+#include "bus/bus_budget.h"
 
 #include <algorithm>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 
 namespace bushd::fieldbus {
 namespace {
@@ -14,8 +14,8 @@ constexpr double kPollEntryBytes = 3.0;
 
 }  // namespace
 
-double line_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
-                 std::span<const std::uint8_t> motors_per_mcu) {
+double bus_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
+                std::span<const std::uint8_t> motors_per_mcu) {
   const double tick_s = tick_ns * 1e-9;
   const bool fine = format == BUSHD_FORMAT_FINE;
   const double bytes_per_us = baud / 10.0 * 1e-6;

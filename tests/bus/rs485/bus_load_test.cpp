@@ -1,14 +1,14 @@
 // The budget of the bus against what master and slaves really put on it.
 #include <vector>
 
-#include "bus/line_budget.h"
+#include "bus/bus_budget.h"
 #include "bus/rs485/slave.h"
 
 namespace bushd::test {
 namespace {
 
 // All motors accelerate, so running delays change from frame to frame, for ten seconds.
-TEST(LineBudget, IsACloseUpperBoundOfWhatIsSent) {
+TEST(BusBudget, IsACloseUpperBoundOfWhatIsSent) {
   for (const bushd_format format : {BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE}) {
     for (const int slaves : {1, 2}) {
       for (const int motors : {1, 3, 8, 16}) {
@@ -33,7 +33,7 @@ TEST(LineBudget, IsACloseUpperBoundOfWhatIsSent) {
         const double quiet_s = 20 * (1e-3 + slaves * 0.6e-3);
         const double sent = bytes * 10 / FakeBus::kBaud / 10.0 + quiet_s;
         const std::vector<std::uint8_t> all(bus.slaves.size(), static_cast<std::uint8_t>(motors));
-        const double budget = fieldbus::line_load(FakeBus::kBaud, FakeBus::kTickNs, format, all);
+        const double budget = fieldbus::bus_load(FakeBus::kBaud, FakeBus::kTickNs, format, all);
         EXPECT_LE(sent, budget * 1.002) << "one frame more or less: 0.2 % of ten seconds";
         EXPECT_GE(sent, budget * 0.9) << format << ' ' << slaves << ' ' << motors;
         EXPECT_EQ(bus.count<link::StartMissed>(), 0);

@@ -1,4 +1,4 @@
-// Times of the protocol that a line's budget and its master share (docs/protocol.md, Line).
+// Times of the protocol that the budget of a bus and its master share (docs/protocol.md, Wire).
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ inline constexpr std::int64_t kSyncPeriodUs = 500'000;
 inline constexpr unsigned kMaxTicksPerFrame = 16;
 inline constexpr std::int64_t kMaxFrameUs = 150'000;
 // From a poll's end to the first answer, and from one answer to the next: what an MCU may need to
-// begin and to let the line go.
+// begin and to let the bus go.
 inline constexpr std::int64_t kFirstWindowUs = 1'000;
 inline constexpr std::int64_t kWindowGuardUs = 600;
 

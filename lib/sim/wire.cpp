@@ -1,4 +1,4 @@
-#include "sim/line.h"
+#include "sim/wire.h"
 
 #include <algorithm>
 #include <cassert>
@@ -11,12 +11,12 @@ constexpr std::uint8_t kCorruption = 0xA5;
 
 }  // namespace
 
-std::size_t Line::add_talker() {
+std::size_t Wire::add_talker() {
   talkers_.emplace_back();
   return talkers_.size() - 1;
 }
 
-TimeNs Line::send(std::size_t talker, std::span<const std::uint8_t> bytes, TimeNs at_ns) {
+TimeNs Wire::send(std::size_t talker, std::span<const std::uint8_t> bytes, TimeNs at_ns) {
   Talker& t = talkers_[talker];
   if (at_ns > t.free_ns) {
     t.origin_ns = t.free_ns = at_ns;
@@ -37,7 +37,7 @@ TimeNs Line::send(std::size_t talker, std::span<const std::uint8_t> bytes, TimeN
   return t.free_ns;
 }
 
-void Line::silence(std::size_t talker, TimeNs now_ns) {
+void Wire::silence(std::size_t talker, TimeNs now_ns) {
   Talker& t = talkers_[talker];
   while (!t.waiting.empty() && t.waiting.back().start_ns >= now_ns) t.waiting.pop_back();
   if (!t.waiting.empty()) t.waiting.front().broken_off = true;
@@ -49,20 +49,20 @@ void Line::silence(std::size_t talker, TimeNs now_ns) {
 
 // A byte that is looked at ends now, so whatever could overlap it is the one taken last or the one
 // on the line: both bytes are of the same length.
-const Line::Byte* Line::overlap(const Talker& talker, TimeNs start_ns, TimeNs end_ns) {
+const Wire::Byte* Wire::overlap(const Talker& talker, TimeNs start_ns, TimeNs end_ns) {
   if (talker.last.end_ns > start_ns && talker.last.start_ns < end_ns) return &talker.last;
   if (talker.waiting.empty()) return nullptr;
   const Byte& present = talker.waiting.front();
   return present.start_ns < end_ns && present.end_ns > start_ns ? &present : nullptr;
 }
 
-LineByte Line::take() {
+WireByte Wire::take() {
   assert(next_end_ns_ != kNever);
   Talker& from = talkers_[next_talker_];
   const Byte byte = from.waiting.front();
   from.waiting.pop_front();
   from.last = byte;
-  LineByte taken{byte.start_ns, byte.end_ns, byte.value, next_talker_, byte.broken_off, {}};
+  WireByte taken{byte.start_ns, byte.end_ns, byte.value, next_talker_, byte.broken_off, {}};
   for (std::size_t i = 0; i < talkers_.size(); ++i) {
     if (i == next_talker_) continue;
     const Byte* other = overlap(talkers_[i], byte.start_ns, byte.end_ns);
@@ -80,17 +80,17 @@ LineByte Line::take() {
   return taken;
 }
 
-bool Line::drives(std::size_t talker, TimeNs from_ns, TimeNs until_ns) const {
+bool Wire::drives(std::size_t talker, TimeNs from_ns, TimeNs until_ns) const {
   return overlap(talkers_[talker], from_ns, until_ns) != nullptr;
 }
 
-TimeNs Line::busy_until_ns() const {
+TimeNs Wire::busy_until_ns() const {
   TimeNs until_ns = 0;
   for (const Talker& talker : talkers_) until_ns = std::max(until_ns, talker.free_ns);
   return until_ns;
 }
 
-void Line::find_next() {
+void Wire::find_next() {
   next_end_ns_ = kNever;
   for (std::size_t i = 0; i < talkers_.size(); ++i) {
     if (talkers_[i].waiting.empty() || talkers_[i].waiting.front().end_ns >= next_end_ns_) continue;

@@ -26,7 +26,7 @@ struct Collision {
   std::size_t talker[2];  // in the order in which their bytes began
 };
 
-struct LineByte {
+struct WireByte {
   TimeNs start_ns;
   TimeNs end_ns;
   std::uint8_t value;  // as heard
@@ -35,10 +35,10 @@ struct LineByte {
   std::optional<Collision> collision;  // set on the first byte that shows a new one
 };
 
-class Line {
+class Wire {
  public:
   // Precondition: baud > 0.
-  explicit Line(std::uint32_t baud) : baud_(baud) {}
+  explicit Wire(std::uint32_t baud) : baud_(baud) {}
 
   // Talkers are numbered from 0.
   std::size_t add_talker();
@@ -56,7 +56,7 @@ class Line {
 
   // Takes that byte off the bus. Of bytes that end together, that of the lower talker comes first.
   // Precondition: there is one. O(talkers).
-  LineByte take();
+  WireByte take();
 
   // Does the talker drive the line at any time within (from_ns, until_ns)? Right for the present
   // byte only: the past is forgotten. O(1).
