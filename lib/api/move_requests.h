@@ -145,18 +145,17 @@ struct MovePath {
   }
 };
 
-// Motors of one bus, at rest, follow positions in time. The rows of an array come in parts, each
-// a request of its own, which is answered when the array has been checked as far as it is known:
-// kDone if all of its motors can follow it, with a MovePlan after the last row, otherwise kFault,
-// and the array is dropped. The first row is where the motors stand. kRun begins the motion.
-// Further rows may be told while it runs; an array that comes to its end in motion, or without its
-// last row, ramps its motors down by their tables.
-// Result of kRun: as of Move.
+// Motors of one bus, at rest, follow a trajectory: positions in time. Its rows come in parts, each
+// a request of its own, which is answered when the trajectory has been checked as far as it is
+// known: kDone if all of its motors can follow it, with a MovePlan after the last row, otherwise
+// kFault, and the trajectory is dropped. The first row is where the motors stand. kRun begins the
+// motion. Further rows may be told while it runs; a trajectory that comes to its end in motion, or
+// without its last row, ramps its motors down by their tables. Result of kRun: as of Move.
 struct Follow {
   enum class Part { kRows, kLastRows, kRun };
   static constexpr std::size_t kMostMotors = 127;
-  static constexpr std::size_t kMostRows = 100'000;       // of an array
-  static constexpr std::size_t kMostNumbers = 1'000'000;  // positions of an array
+  static constexpr std::size_t kMostRows = 100'000;       // of a trajectory
+  static constexpr std::size_t kMostNumbers = 1'000'000;  // positions of a trajectory
 
   Part part = Part::kRows;
   std::int64_t array = 0;  // its number, the client's own

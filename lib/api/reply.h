@@ -100,7 +100,7 @@ struct MovePlan {
   // Of the motion alone: no polls, synchronisation and repeats.
   struct Traffic {
     std::int64_t frames = 0;
-    std::int64_t bytes = 0;  // on the line
+    std::int64_t bytes = 0;  // on the bus
   };
   std::int64_t duration_us = 0;  // from the first tick to the end of the last one
   std::int64_t ticks = 0;

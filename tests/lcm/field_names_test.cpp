@@ -404,7 +404,7 @@ TEST(FieldNames, State) {
   EXPECT_EQ(motor.line_fraction, 0.5);
   EXPECT_EQ(motor.line_left_s, 2);
   EXPECT_EQ(told(Motor{}).motors.at(0).on_line, 0);
-  // Of the five that are true or false each alone.
+  // Each of the five that are true or false, alone.
   const std::vector<std::pair<bool Motor::*, std::int8_t motor_t::*>> flags{
       {&Motor::moving, &motor_t::moving},
       {&Motor::enabled, &motor_t::enabled},
