@@ -89,9 +89,9 @@ struct MoveLine {
   bool dry_run = false;                // from rest only: result kDone with a MovePlan
   std::optional<Speed> speed{};        // no motor exceeds it; none: as fast as tables allow
   std::optional<double> duration_s{};  // not shorter than this; refused if it cannot be so slow
-  // Of CAMAC modules, no front end tells it: what a motor that is alone moves by, in place of its
-  // own table. Its MCU need not have it, and ramps the motor down by the own one when the link is
-  // lost; so no delay of this move may be shorter than any of that.
+  // What a motor that is alone moves by, in place of its own table; CAMAC modules tell it, and no
+  // front end does. Its MCU need not have it, and ramps the motor down by the own one when the link
+  // is lost; so no delay of this move may be shorter than any of that.
   tables::TablePtr by = {};
 
   static constexpr std::size_t kMostMotors = 127;
@@ -122,8 +122,8 @@ struct MovePath {
   std::int32_t first_row = 0;  // of this request; as many as have been taken before
   std::vector<double>
       positions{};  // of all motors, row by row, in their units; not above kMostValues
-  // Of a single motor only: its speed is not exceeded on the way to that row; 0: as below. None, or
-  // as many as rows.
+  // Speeds that a single motor does not exceed on the way to each row; 0: as below. None, or as
+  // many as rows.
   std::vector<double> speeds{};
   Corners corners = Corners::kContinuous;
   bool dry_run = false;          // result kDone with a MovePlan
@@ -159,11 +159,11 @@ struct Follow {
 
   Part part = Part::kRows;
   std::int64_t array = 0;  // its number, the client's own
-  // Of all parts alike:
+  // Alike in all parts:
   MotorNames motors{};  // at least one, none twice
   bool cubic = false;   // between rows; else linear
   double stretch = 1;   // all times are so many times as long, 0.001..1000
-  // Of kRows and kLastRows:
+  // In kRows and kLastRows:
   std::vector<double> time_s{};     // each later than the one before, below 10^8
   std::vector<double> positions{};  // user units, row by row: one for each motor
 

@@ -10,7 +10,7 @@
 
 namespace bushd::api {
 
-// Of motors by their names, or with @ in front, of groups by theirs.
+// Whether this names motors by a pattern of their names or, with @ in front, groups by theirs.
 inline bool is_name_pattern(const std::string& name) {
   return name.starts_with('@') || name.find_first_of("*?[") != std::string::npos;
 }

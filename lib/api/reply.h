@@ -97,7 +97,7 @@ struct MovePlan {
     std::int64_t duration_us = 0;  // to its last step
     double peak_steps_per_s = 0;
   };
-  // Of the motion alone: no polls, synchronisation and repeats.
+  // Frames of the motion alone: no polls, synchronisation and repeats.
   struct Traffic {
     std::int64_t frames = 0;
     std::int64_t bytes = 0;  // on the bus
@@ -107,7 +107,7 @@ struct MovePlan {
   std::optional<Traffic> traffic{};  // none: it is too much to be counted
   std::string limited_by{};          // of a line: the motor that makes it take so long
   std::vector<Motor> motors{};       // in the request's order, each leg of a motor by itself
-  // Of a path of at most kMostPoints: when each of its points is reached, from the first tick on.
+  // When each point of a path of at most kMostPoints is reached, from the first tick on.
   std::vector<std::int64_t> points_us{};
   static constexpr std::size_t kMostPoints = 2048;
   static void fields(auto& self, auto& visit) {

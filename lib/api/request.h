@@ -211,8 +211,8 @@ struct GetTable {
 struct SetTable {
   std::string table{};  // NAME
   tables::TableContent content{};
-  // Of the table that this one was made from, as GetTable told it (its revision is in the content);
-  // if the table is another by now it is left alone. "": the table is new.
+  // The hash of the table that this one was made from, as GetTable told it (its revision is in the
+  // content); if the table is another by now it is left alone. "": the table is new.
   std::string expected_hash{};
 
   static constexpr std::string_view kName = "set table";

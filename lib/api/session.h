@@ -19,7 +19,7 @@ enum class Transport {
   kCamac  // none: a module of a crate, in the daemon itself
 };
 
-// Of the process at the other end of a socket, as the kernel tells it.
+// Who is at the other end of a socket, as the kernel tells it.
 struct Credentials {
   std::int32_t pid = 0;
   std::uint32_t uid = 0;

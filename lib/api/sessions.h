@@ -38,15 +38,15 @@ class Sessions {
     // themselves, so that a flood of hellos forgets nobody who works.
     std::size_t sessions = 768;
     std::size_t idle_sessions = 256;
-    // Of answers kept. Beyond, the oldest of that session goes; for all sessions together, the
-    // oldest of the session that keeps most.
+    // Answers that are kept. Beyond, the oldest of that session goes; for all sessions together,
+    // the oldest of the session that keeps most.
     std::size_t bytes_per_session = 1024 * 1024;  // that of 2048 motors takes half of it
     std::size_t bytes = 16 * 1024 * 1024;
   };
   // What an answer takes beside its own memory.
   static constexpr std::size_t kBytesPerAnswer = 160;
-  // Of a session: requests that have ended motion, whose numbers are remembered. Of more, those
-  // before the oldest one count as asked before all that were.
+  // Requests of a session that have ended motion, whose numbers are remembered. Where there are
+  // more, those before the oldest one count as asked before all that were.
   static constexpr std::size_t kMostStops = 64;
 
   // `seed` tells this run of the daemon from others: sessions of two runs differ unless the seeds
@@ -81,7 +81,7 @@ class Sessions {
   void record(std::int64_t session, std::int64_t number, const Reply& reply);
 
   std::size_t count() const { return sessions_.size(); }
-  // Of all answers kept; at most Limits::bytes.
+  // Bytes of all answers kept; at most Limits::bytes.
   std::size_t bytes() const { return bytes_; }
 
  private:

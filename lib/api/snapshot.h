@@ -277,7 +277,7 @@ struct CamacLam {
 class Publisher {
  public:
   virtual ~Publisher() = default;
-  // `mcu` numbers the snapshots of one kind from 0, `bus` likewise: each one replaces the one
+  // `mcu` and `bus` number the snapshots of one kind from 0: each one replaces the one
   // before of its number. Numbers beyond those of MCUs are of computed axes.
   virtual void publish(McuId mcu, const StateSnapshot& state) = 0;
   virtual void publish(McuId mcu, const Description& description) = 0;

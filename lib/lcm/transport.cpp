@@ -16,7 +16,7 @@
 namespace bushd::lcm {
 namespace {
 
-// Of LCM's wire format.
+// The longest name of a channel in LCM's wire format.
 constexpr std::size_t kMaxChannelName = LCM_MAX_CHANNEL_NAME_LENGTH;
 
 // "" for URLs that are none of multicast.

@@ -60,7 +60,7 @@ def amounts(
         raise TypeError("write one of to=POSITION and by=DISTANCE")
     value = to if to is not None else by
     if isinstance(value, Mapping) != (motors is None):
-        raise TypeError('write move("NAME", to=POSITION) or move(to={"NAME": POSITION}), by= likewise')
+        raise TypeError('write move("NAME", to=POSITION) or move(to={"NAME": POSITION}), or the same with by=')
     if isinstance(value, Mapping):
         return Amounts(dict(value), to is not None, unit)
     assert value is not None and motors is not None
@@ -94,7 +94,7 @@ def result_of(exchange: Exchange, check: bool) -> model.Result:
 
 
 def move_result_of(exchange: Exchange, check: bool) -> model.MoveResult:
-    """Likewise of a motion; raises MoveFailed."""
+    """The result of a motion; raises MoveFailed."""
     plain = result_of(exchange, check=False)
     result = model.MoveResult(plain.outcome, plain.reason, exchange.detail.motors)
     if check and not result.outcome.succeeded:
