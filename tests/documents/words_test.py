@@ -21,15 +21,15 @@ def is_in(name, places):
 
 
 def read(path):
-    """The lines of a text; nothing of other files."""
+    """A text; nothing of other files."""
     try:
-        return path.read_text().splitlines()
+        return path.read_text()
     except UnicodeDecodeError:
-        return []
+        return ""
 
 
 def texts():
-    """(name, lines) of all texts of the tree but those about the words themselves."""
+    """(name, text) of all texts of the tree but those about the words themselves."""
     for room in ROOMS:
         top = SOURCE / room
         for path in [top] if top.is_file() else sorted(top.rglob("*")):
@@ -61,13 +61,13 @@ class Words(unittest.TestCase):
                     self.assertTrue((SOURCE / place).exists(), "there is no such file or folder")
 
     def test_no_forbidden_word_is_written(self):
-        rules = [(re.compile(word["pattern"]), word["instead"], word.get("where", ROOMS), word.get("but", [])) for word in self.words]
+        rules = [(re.compile(word["pattern"], re.MULTILINE), word["instead"], word.get("where", ROOMS), word.get("but", [])) for word in self.words]
         found = []
-        for name, lines in texts():
-            here = [(pattern, instead) for pattern, instead, where, but in rules if is_in(name, where) and not is_in(name, but)]
-            for number, line in enumerate(lines, 1):
-                found += [f"{name}:{number}: {match[0].strip()!r}: write {instead}"
-                          for pattern, instead in here if (match := pattern.search(line))]
+        for name, text in texts():
+            for pattern, instead, where, but in rules:
+                if is_in(name, where) and not is_in(name, but):
+                    found += [f"{name}:{text.count(chr(10), 0, match.end()) + 1}: {match[0].strip()!r}: write {instead}"
+                              for match in pattern.finditer(text)]
         self.assertEqual(found, [], "\n" + "\n".join(found))
 
 
