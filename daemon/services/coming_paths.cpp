@@ -177,7 +177,7 @@ Result<void> ComingPaths::add_points(Incoming& incoming, const api::MovePath& re
                           motion::Motor::kMaxPosition));
 }
 
-// Of the way to a point of a motor with speeds.
+// The shortest delay on the way to a point of a motor with speeds.
 Result<bushd_delay> ComingPaths::shortest_delay_to(Incoming& incoming, std::int64_t point,
                                                    double speed) const {
   const MotorId id = incoming.motors.front();

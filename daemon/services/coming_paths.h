@@ -46,7 +46,7 @@ class ComingPaths {
     std::vector<MotorId> motors{};
     AlongPath along{};
     std::vector<bushd_delay> shortest_delays{};  // of each motor's steps
-    // Of each motor's way: the points farthest up and down, 0 where it stands.
+    // The points farthest up and down on each motor's way, 0 where it stands.
     struct End {
       std::int32_t point;
       std::int64_t steps;

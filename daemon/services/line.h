@@ -77,7 +77,7 @@ struct Line {
   std::uint32_t longest() const;
   std::int64_t position_at(std::size_t motor, std::uint32_t step) const;
   double most_steps_per_s(std::size_t motor) const;
-  // Of a motor's share of a run before: whether it was of the same way, or path.
+  // Whether a motor's share of a run before was of the same way, or path.
   bool is_of(const motion::LineShare& share) const;
   // A motor's share of a run between these steps.
   motion::LineShare share(std::size_t motor, std::uint32_t from, std::uint32_t to);

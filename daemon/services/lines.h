@@ -96,7 +96,7 @@ class Lines final : public Service {
   std::optional<WantedTable> table_to_upload(const api::MoveLine& request, bool armed) const;
   std::optional<WantedTable> table_to_upload(const Line& line, bool armed) const;
   bool may_get_tables(const std::vector<MotorId>& motors, bool armed) const;
-  // Of these of its motors, by place: from where their runs have led to this step.
+  // Begins the run of these of its motors, by place, from where their runs have led to this step.
   void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                  const std::vector<std::size_t>& indices, std::uint32_t to);
 

@@ -149,7 +149,7 @@ bool Lines::waits(MotorId motor, std::uint64_t number) const {
   return armed != nullptr && armed->on_line && armed->on_line->line == number;
 }
 
-// Of its MCUs: in the first reports after the edge some have begun and others are yet to tell.
+// Some of its MCUs have begun in the first reports after the edge, and others are yet to tell.
 bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, const Line& line,
                            Triggered& trigger) {
   std::vector<MotorId> begun;  // and not over
