@@ -12,8 +12,8 @@
 
 typedef struct bushd_mcu bushd_mcu;
 
-// Of up to four motors driven by phases. Rotors stay where they are while settings change, so the
-// phases do, until another sequence or staggered emission comes.
+// The windings of up to four motors driven by phases. Rotors stay where they are while settings
+// change, so the phases do, until another sequence or staggered emission comes.
 typedef struct bushd_mcu_windings {
   uint8_t sequence;  // that of the phases
   uint8_t phase[BUSHD_MOTORS_PER_MCU / BUSHD_PHASE_OUTPUTS];

@@ -97,7 +97,7 @@ typedef enum bushd_phase_sequence {
 
 #define BUSHD_PHASE_OUTPUTS 4u  // motor m has the outputs 4m .. 4m+3
 
-// Of bushd_emission.settle_us.
+// Values of bushd_emission.settle_us.
 #define BUSHD_SETTLE_MEASURED 0u  // the MCU measures it, by a step of a motor and its way back
 #define BUSHD_SETTLE_UNKNOWN UINT16_MAX  // T_step at least: pulses are spread over all of that
 
