@@ -16,6 +16,7 @@
 #include "config/currents.h"
 #include "config/emission_section.h"
 #include "config/home.h"
+#include "config/idle_section.h"
 #include "config/inputs.h"
 #include "config/keypad_section.h"
 #include "config/output_levels.h"
@@ -184,26 +185,6 @@ Result<void> read_buses(Loading* loading) {
     if (auto read = read_manners(reader, &bus); !read) return read;
     loading->config.buses.push_back(std::move(bus));
   }
-  return {};
-}
-
-// When its drivers are disabled at rest, and how long they take to hold when enabled.
-Result<void> read_idle(const TomlReader& reader, Mcu* mcu) {
-  constexpr double kLongestS = 1'000'000;
-  if (reader.has("idle_disable_s")) {
-    const std::string allowed = fmt::format("0: never, or up to {} s", kLongestS);
-    const auto seconds = reader.number("idle_disable_s", allowed);
-    if (!seconds) return fail(seconds.error());
-    if (!(*seconds >= 0) || *seconds > kLongestS) {
-      return fail(
-          reader.error("idle_disable_s", fmt::format("is {}; allowed: {}", *seconds, allowed)));
-    }
-    if (*seconds > 0) mcu->idle_disable_s = *seconds;
-  }
-  if (!reader.has("enable_settle_ms")) return {};
-  const auto settle = reader.integer("enable_settle_ms", 0, 60'000, "ms");
-  if (!settle) return fail(settle.error());
-  mcu->enable_settle_ms = static_cast<std::uint32_t>(*settle);
   return {};
 }
 

@@ -13,22 +13,6 @@ namespace {
 
 constexpr Tick kNever = INT64_MAX / 2;
 
-constexpr const char* kUnpowered = "its drivers were disabled by overcurrent while it moved";
-
-// Precondition: one of the two has stopped it.
-std::string stopper(const bushd_report& report, const std::string& mcu) {
-  const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
-  return commanded ? "an emergency stop" : "the emergency input of MCU " + mcu;
-}
-
-std::string stopped_immediately(const bushd_report& report, const std::string& mcu) {
-  return "it was stopped immediately by " + stopper(report, mcu) + " and may have overrun";
-}
-
-bool has_bit(unsigned mask, Output output) {
-  return (mask >> output.value & 1) != 0;
-}
-
 }  // namespace
 
 std::string Motor::busy_text() const {
@@ -152,8 +136,8 @@ bool Motor::stops_immediately(const bushd_report& report) const {
 }
 
 void Motor::take_limits(const bushd_report& report) {
-  forbidden_up_ = has_bit(report.forbidden_positive, output());
-  forbidden_down_ = has_bit(report.forbidden_negative, output());
+  forbidden_up_ = has_bit(report.forbidden_positive, output().value);
+  forbidden_down_ = has_bit(report.forbidden_negative, output().value);
 }
 
 // Positions are counts since the MCU's boot: a boot whose positions nobody has seen has lost them.
@@ -187,7 +171,7 @@ std::vector<Event> Motor::report(const Report& report) {
       std::exchange(position_, report.of_mcu.motor[output().value].position_steps);
   take_limits(report.of_mcu);
   if (has_plan()) follow(report, events);
-  const bool by_itself = autonomous_ || has_bit(report.of_mcu.autonomous, output());
+  const bool by_itself = autonomous_ || has_bit(report.of_mcu.autonomous, output().value);
   // Whoever has asked for homing knows what the position of the motor is.
   if (by_itself) follow_count(before);
   follow_autonomous(report.of_mcu, free && position_ != before);
@@ -203,7 +187,7 @@ void Motor::follow_asked_for() {
 
 // No move has led to where it stands.
 void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
-  const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output()));
+  const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output().value));
   if (before && !autonomous_) {
     if (stops_immediately(report)) uncertain_reason_ = stopped_immediately(report, setup_.mcu);
     if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) uncertain_reason_ = kUnpowered;
@@ -211,14 +195,14 @@ void Motor::follow_autonomous(const bushd_report& report, bool moved_without_pla
   const bool free = is<Resting>() || is<Local>();
   // The bit alone may be that of a plan of this daemon's that has just ended.
   moved_by_other_ =
-      free && has_bit(report.moving, output()) && (moved_by_other_ || moved_without_plan);
+      free && has_bit(report.moving, output().value) && (moved_by_other_ || moved_without_plan);
   if (free) rest();
 }
 
 void Motor::follow(const Report& report, std::vector<Event>& events) {
-  const bool moving = has_bit(report.of_mcu.moving, output());
+  const bool moving = has_bit(report.of_mcu.moving, output().value);
   if (is<Armed>() && !follow_armed(report, events)) return;
-  if (has_bit(report.of_mcu.autonomous, output())) {
+  if (has_bit(report.of_mcu.autonomous, output().value)) {
     // So it had no ticks of the move, and takes none.
     events.emplace_back(
         ended(Outcome::kStopped, "the local inputs of MCU " + setup_.mcu +
@@ -386,134 +370,6 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
                               "a fault of " + name + " disarmed it; 'bushctl status' tells which"));
   }
   return false;
-}
-
-// The way it goes is barred, and the MCU has not begun, or goes by a ramp of its own.
-void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
-  // On a path or a trajectory it may have turned round since it came to its switch.
-  int direction = axis_.direction();
-  if (axis_.line() && axis_.line()->track) {
-    if (!forbidden(direction)) direction = -direction;
-    if (!forbidden(direction)) return;
-  } else {
-    if (axis_.goes(-direction) && forbidden(-direction)) direction = -direction;
-    if (!forbidden(direction) || !axis_.goes(direction)) return;
-  }
-  const bool moving = has_bit(report.of_mcu.moving, output());
-  const bool given_up =
-      !moving && report.tick >= axis_.start_tick() && axis_.velocity_steps_per_s() != 0;
-  // Its own ramp may be a step longer than what was planned.
-  const bool outlasts = moving && report.tick >= axis_.end_tick();
-  if (!given_up && !outlasts && axis_.executed_steps() == position_) return;
-  moving_now().limit = direction;
-  events.emplace_back(event::Drop{});
-}
-
-// It stands.
-event::Ended Motor::end_at_limit() {
-  if (!axis_.stopping() && further_.empty() && position_ == axis_.target_steps()) {
-    return reached();
-  }
-  if (axis_.stopping() && !is_paused() && position_ == axis_.executed_steps()) {
-    return stopped();
-  }
-  std::string reason =
-      "stopped by " + switch_at(moving()->limit) + ", stands at " + std::to_string(position_);
-  if (setup_.limit_immediate && position_ != axis_.from_steps()) {
-    uncertain_reason_ = "it was stopped immediately at its limit switch and may have overrun";
-    reason += "; stopped immediately, it may have overrun, so check the position, and run " +
-              words::set_remedy(name());
-  }
-  return ended(Outcome::kLimit, std::move(reason));
-}
-
-// It stands, and not by its plan.
-event::Ended Motor::end_by_fault(const bushd_report& report) {
-  // One that has not made a step, or stood, cannot overrun.
-  const bool stepped = position_ != axis_.from_steps() && !rests_in_pause();
-  const std::string mcu = "MCU " + setup_.mcu;
-  if (moves() && moving()->position_mismatch) {
-    return ended(Outcome::kFault,
-                 *uncertain_reason_ + "; check the position, and run " + words::set_remedy(name()));
-  }
-  if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
-    const std::string why = mcu + " disabled its drivers because " + stop_cause(report);
-    if (stepped) uncertain_reason_ = kUnpowered;
-    return ended(Outcome::kFault,
-                 stepped
-                     ? why + "; check the position, and run " + words::set_remedy(name())
-                     : "it did not move: " + why + "; find the cause, run 'bushctl clear', then " +
-                           words::remedy("enable", name()));
-  }
-  if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
-    const std::string by = stopper(report, setup_.mcu);
-    const bool overran = stops_immediately(report) && stepped;
-    if (overran) uncertain_reason_ = stopped_immediately(report, setup_.mcu);
-    return ended(Outcome::kStopped,
-                 overran ? "stopped immediately by " + by +
-                               "; it may have overrun, so check the position, and run " +
-                               words::set_remedy(name())
-                         : "stopped by " + by);
-  }
-  if (is<Armed>()) {
-    return ended(Outcome::kLink, mcu + " disarmed it by itself because " + stop_cause(report));
-  }
-  return ended(Outcome::kLink, mcu + " ran it down by itself because " + stop_cause(report));
-}
-
-std::optional<event::Ended> Motor::starts_late(const bushd_report& report) {
-  const bool ran_down = report.faults != 0;  // says the next report
-  // No tick is missed of a move that was cancelled before its start.
-  const bool cancelled = axis_.end_tick() <= axis_.start_tick();
-  take_limits(report);
-  const bool limited = forbidden_up_ || forbidden_down_;  // says the next report
-  if (ran_down || cancelled || limited) return std::nullopt;
-  return end(Outcome::kLink, did_not_start());
-}
-
-std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {
-  if (!has_plan()) return std::nullopt;
-  return ended(outcome, std::move(reason));
-}
-
-event::Ended Motor::ended(Outcome outcome, std::string reason) {
-  const bool was_armed = is<Armed>();
-  const OnLine* on_line = as<OnLine>();
-  const bool was_paused = rests_in_pause() || (on_line != nullptr && on_line->stands);
-  further_.clear();
-  pause_ = Pause::kNo;
-  jogs_ = false;
-  axis_.finish();
-  rest();
-  return {.outcome = outcome,
-          .reason = std::move(reason),
-          .was_armed = was_armed,
-          .was_paused = was_paused};
-}
-
-event::Ended Motor::reached() {
-  event::Ended event = ended(Outcome::kReached, "stands at its target");
-  event.by_plan = true;
-  return event;
-}
-
-event::Ended Motor::ran_out() {
-  event::Ended event = ended(
-      Outcome::kStopped, axis_.trajectory()->trajectory->closed()
-                             ? "its trajectory ended in motion; ramped down by its table"
-                             : "no further rows of its trajectory came; ramped down by its table");
-  event.by_plan = true;
-  return event;
-}
-
-event::Ended Motor::stopped() {
-  event::Ended event = ended(Outcome::kStopped, "stopped on request");
-  event.by_plan = true;
-  return event;
-}
-
-std::string Motor::did_not_start() const {
-  return "its first ticks did not reach MCU " + setup_.mcu + " in time; it did not move";
 }
 
 }  // namespace bushd::motion

@@ -101,4 +101,13 @@ bool forbids(const bushd_report& report, unsigned output, int direction) {
   return (mask >> output & 1) != 0;
 }
 
+std::string stopper(const bushd_report& report, const std::string& mcu) {
+  const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
+  return commanded ? "an emergency stop" : "the emergency input of MCU " + mcu;
+}
+
+std::string stopped_immediately(const bushd_report& report, const std::string& mcu) {
+  return "it was stopped immediately by " + stopper(report, mcu) + " and may have overrun";
+}
+
 }  // namespace bushd::motion

@@ -17,5 +17,16 @@ std::string system_inputs_words(std::uint8_t inputs);  // as in mcu_state_t
 std::string switch_at(int direction);
 // Whether a limit switch inhibits the direction (+1, -1) of the motor at this output.
 bool forbids(const bushd_report& report, unsigned output, int direction);
+// What has stopped a motor immediately. Precondition: an emergency has.
+std::string stopper(const bushd_report& report, const std::string& mcu);
+// Why it is uncertain then where it stands.
+std::string stopped_immediately(const bushd_report& report, const std::string& mcu);
+inline constexpr const char* kUnpowered =
+    "its drivers were disabled by overcurrent while it moved";
+
+// Whether the bit of this output is set.
+constexpr bool has_bit(unsigned mask, unsigned output) {
+  return (mask >> output & 1) != 0;
+}
 
 }  // namespace bushd::motion
