@@ -3,7 +3,7 @@
 #define BUSHD_FIRMWARE_CORE_ACCESS_H
 
 #include "firmware/core/bits.h"
-#include "firmware/core/mcu.h"
+#include "firmware/core/mcu_state.h"
 
 // The first tick that can still be changed: the next one is already prepared.
 static inline uint32_t bushd_mcu_first_open(const bushd_mcu* mcu) {

@@ -1,6 +1,6 @@
 #include "firmware/core/keypad.h"
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/mcu_state.h"
 
 enum { FORWARD = 0x00, REVERSE = 0xFF, SLOWER = 0xFE, STOP = 0xFD };
 enum { TEXT = 5, LAST_AMOUNT = (BUSHD_KEYPAD_SLOWEST - BUSHD_KEYPAD_FIRST) / BUSHD_KEYPAD_SLOWER };

@@ -17,37 +17,17 @@
 
 #include "engine/frame.h"
 #include "engine/message.h"
-#include "engine/run.h"
-#include "engine/run_slots.h"
-#include "engine/table.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-#include "firmware/core/currents.h"
-#include "firmware/core/emission.h"
-#include "firmware/core/homing.h"
-#include "firmware/core/limits.h"
-#include "firmware/core/line_run.h"
-#include "firmware/core/local.h"
-#include "firmware/core/motor.h"
 #include "firmware/core/port.h"
-#include "firmware/core/position_compare.h"
-#include "firmware/core/requests.h"
 #include "firmware/core/slot_buffer.h"
-#include "firmware/core/stream.h"
-#include "firmware/core/sync.h"
-#include "firmware/core/tables.h"
-#include "firmware/core/travel.h"
-#include "firmware/core/trigger.h"
-#include "firmware/core/velocity.h"
-#ifdef __cplusplus
-}
-#endif
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+typedef struct bushd_mcu bushd_mcu;  // mcu_state.h
+typedef struct bushd_mcu_currents bushd_mcu_currents;
+typedef struct bushd_mcu_velocity bushd_mcu_velocity;
+typedef struct bushd_mcu_scratch bushd_mcu_scratch;
 
 #define BUSHD_FIRMWARE_VERSION 2u
 #define BUSHD_BOOT_TICK_NS 2560000u  // tick length until the host configures one
@@ -91,101 +71,8 @@ typedef struct bushd_mcu_config {
   bushd_set_outputs outputs;
 } bushd_mcu_config;
 
-// Read-only for ports and tests; everything in here is the core's, and each part its module's.
-typedef struct bushd_mcu {
-  bushd_port port;
-  bushd_mcu_config config;
-  uint32_t tick;  // the tick being emitted
-  uint32_t tick_ns;
-  uint32_t uptime;  // ticks since boot, whatever their numbers
-  uint8_t state;    // bushd_state
-  uint8_t faults;
-  uint8_t flags;
-  uint8_t failed_tests;  // BUSHD_TEST_*
-  bushd_format format;
-  uint8_t front;  // slot_buffer[front] is being emitted
-  uint16_t ramp_downs;
-  uint16_t low_water_ticks;
-  uint16_t direction;   // of the slot_buffer prepared last; 1: positive
-  uint16_t autonomous;  // motors that move by homing, travel or local inputs
-  uint16_t homed;
-  bushd_run_tick run_tick[BUSHD_TABLE_BANKS];         // in the terms of each table
-  bushd_set_inputs inputs;                            // settings
-  bushd_mcu_switches switches[BUSHD_MOTORS_PER_MCU];  // settings
-  bushd_mcu_stream stream;
-  bushd_mcu_line line;
-  bushd_mcu_reception reception;
-  bushd_mcu_limits limits;
-  union {  // one of both at a time; the stage tells which
-    bushd_mcu_homing homing;
-    bushd_mcu_travel travel;
-  };
-  bushd_mcu_local local;
-  bushd_mcu_clock clock;
-  bushd_mcu_emission emission;
-  bushd_mcu_trigger_input trigger;
-  bushd_mcu_position_compare position_compare;
-  bushd_slot_buffer slot_buffer[2];
-  bushd_mcu_motor motor[BUSHD_MOTORS_PER_MCU];
-  bushd_mcu_table_memory tables;
-  bushd_receiver receiver;
-  bushd_mcu_answer answer;
-} bushd_mcu;
-
-// Who may use the receiver's buffer. Nobody else writes to it until the owner is another one: rows
-// of a frame that was taken are read from it, and an answer may be made at its end
-// (bushd_mcu_config.reply). What a port does with an answer that it was handed is its own.
-typedef enum bushd_mcu_buffer_owner {
-  BUSHD_MCU_BUFFER_RECEIVER = 0,
-  BUSHD_MCU_BUFFER_ROWS = 1,
-  BUSHD_MCU_BUFFER_ANSWER = 2
-} bushd_mcu_buffer_owner;
-static inline bushd_mcu_buffer_owner bushd_mcu_owner_of_buffer(const bushd_mcu* mcu) {
-  if (mcu->stream.rows.next < mcu->stream.rows.ticks.count) return BUSHD_MCU_BUFFER_ROWS;
-  return mcu->answer.size != 0 ? BUSHD_MCU_BUFFER_ANSWER : BUSHD_MCU_BUFFER_RECEIVER;
-}
-
 // Starts in state BUSY with EN low, unless it is to be high at boot; a control message raises it.
 void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_config* config);
-
-// What a port may keep over resets: pieces of memory, from index 0 on until one is empty. Later
-// ones may be as long as earlier ones say. The first one is bushd_mcu_config.outputs, which a port
-// reads before bushd_mcu_boot too. They hold addresses: only the same program may get them
-// back, between bushd_mcu_boot and the first tick, the earlier ones first, and then
-// bushd_mcu_nvm_restored.
-typedef struct bushd_mcu_nvm_region {
-  void* at;
-  uint16_t size;
-} bushd_mcu_nvm_region;
-bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
-// Bytes of all pieces together, with this much table memory and all motors.
-#define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                     \
-  (sizeof(bushd_set_outputs) + sizeof(uint32_t) + sizeof(bushd_format) +                        \
-   sizeof(bushd_set_inputs) + BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) +               \
-   sizeof(bushd_emission) + sizeof(bushd_local) + BUSHD_TABLE_BANKS * sizeof(bushd_mcu_table) + \
-   sizeof(uint8_t) + sizeof(uint16_t) + (code_count) * sizeof(uint16_t) +                       \
-   BUSHD_MOTORS_PER_MCU * sizeof(int8_t) + BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +  \
-   BUSHD_MAX_VELOCITY_MOTORS * sizeof(bushd_mcu_velocity_settings))
-void bushd_mcu_nvm_restored(bushd_mcu* mcu);
-
-// For a port that goes through all pieces a little at a time, again and again.
-typedef struct bushd_mcu_nvm_scan {
-  uint8_t index;  // of the piece
-  uint16_t offset;
-  uint16_t size;         // of all bytes so far
-  uint32_t crc;          // register after them
-  uint32_t crc_before;   // of the scan before
-  uint16_t same_uptime;  // since when it is the same
-} bushd_mcu_nvm_scan;
-void bushd_mcu_nvm_begin_scan(bushd_mcu_nvm_scan* scan);
-// The next bytes, up to `most` (>= 1); empty at the end. Pieces may change between two calls: of
-// one that has become shorter than the scan has come, nothing is left. Never more bytes in all than
-// BUSHD_MCU_NVM_MAX_BYTES.
-bushd_mcu_nvm_region bushd_mcu_nvm_scan_next(bushd_mcu* mcu, bushd_mcu_nvm_scan* scan,
-                                             uint16_t most);
-// At the end of a scan: whether what is kept has stayed the same for so long that it may be
-// written. A master that begins changes one thing after the other.
-bool bushd_mcu_nvm_is_quiet(const bushd_mcu* mcu, bushd_mcu_nvm_scan* scan);
 
 // One byte from the line. `time_in_tick_ns` is when its stop bit ended, counted from the start of
 // the present tick (negative: in one before); only used at delimiters. O(1), O(frame) at a

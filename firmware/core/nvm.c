@@ -1,4 +1,6 @@
 // What outlives a reset, if the port keeps it: tables, who runs which, and settings.
+#include "firmware/core/nvm.h"
+
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
 #include "firmware/core/drivers.h"

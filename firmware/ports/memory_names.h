@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/mcu_state.h"
 
 // For use within a function.
 #define NAME_BYTES(name, at, size)                                                     \

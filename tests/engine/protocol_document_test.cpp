@@ -16,7 +16,7 @@
 
 #include "engine/frame.h"
 #include "engine/message_text.h"
-#include "firmware/core/mcu.h"
+#include "firmware/core/mcu_state.h"
 #include "source_path.h"
 
 namespace bushd::test {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "engine/reference.h"
-#include "firmware/core/mcu.h"
+#include "firmware/core/nvm.h"
 
 namespace bushd::test {
 

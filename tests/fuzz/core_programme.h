@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/nvm.h"
 #include "fuzz/fuzz.h"
 
 namespace bushd::fuzz {

@@ -7,7 +7,7 @@
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_KEYPAD_LINE_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_KEYPAD_LINE_H
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/mcu_state.h"
 
 // Once a tick: the bytes that have come. What came behind one that was lost counts as a broken
 // line. O(1), short.

@@ -8,7 +8,7 @@
 #ifndef BUSHD_FIRMWARE_PORTS_ATMEGA2560_NVM_H
 #define BUSHD_FIRMWARE_PORTS_ATMEGA2560_NVM_H
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/nvm.h"
 #include "firmware/ports/atmega2560/eeprom.h"
 
 #define NVM_HEAD_BYTES 11u

@@ -13,7 +13,7 @@
 #ifndef BUSHD_FIRMWARE_PORTS_LM3S6965_NVM_H
 #define BUSHD_FIRMWARE_PORTS_LM3S6965_NVM_H
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/nvm.h"
 
 typedef enum nvm_found {
   NVM_NOTHING,  // or another program's

@@ -20,7 +20,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/mcu_state.h"
 
 #ifdef __cplusplus
 extern "C" {

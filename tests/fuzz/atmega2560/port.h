@@ -4,7 +4,7 @@
 #ifndef BUSHD_FUZZ_ATMEGA2560_PORT_H
 #define BUSHD_FUZZ_ATMEGA2560_PORT_H
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/nvm.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -3,7 +3,7 @@
 #ifndef BUSHD_FUZZ_LM3S6965_PORT_H
 #define BUSHD_FUZZ_LM3S6965_PORT_H
 
-#include "firmware/core/mcu.h"
+#include "firmware/core/nvm.h"
 
 #ifdef __cplusplus
 extern "C" {
