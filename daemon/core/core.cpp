@@ -26,7 +26,8 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       local_inputs_(installation_),
       stops_(installation_, moves_, homing_, travels_, local_inputs_, open_moves_),
       jogs_(installation_, interlocks_, moves_, open_moves_),
-      pauses_(installation_, interlocks_, moves_, local_inputs_, open_moves_),
+      pauses_(installation_, interlocks_, moves_, open_moves_),
+      holds_(installation_, interlocks_, moves_, local_inputs_, open_moves_, kept_, outputs),
       lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
       trajectories_(installation_, interlocks_, journal_, moves_, open_moves_),
       emergency_stop_(installation_, interlocks_, homing_, open_moves_, kept_, outputs),
@@ -71,6 +72,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 &waiting_requests_,
                 &jogs_,
                 &pauses_,
+                &holds_,
                 &lines_,
                 &settings_,
                 &travels_,
@@ -97,6 +99,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
   kept_.set_listener([this] {
     emergency_stop_.take_kept();
     settings_.take_kept();
+    holds_.take_kept();
     camac_.take_kept();
   });
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
@@ -206,8 +209,8 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::Jog& r) { jogs_.request(now, asker, r); },
                  [&](const api::Pause& r) { pauses_.request(now, asker, r); },
                  [&](const api::Resume& r) { pauses_.request(now, asker, r); },
-                 [&](const api::Hold& r) { pauses_.request(now, asker, r); },
-                 [&](const api::Release& r) { pauses_.request(now, asker, r); },
+                 [&](const api::Hold& r) { holds_.request(now, asker, r); },
+                 [&](const api::Release& r) { holds_.request(asker, r); },
                  [&](const api::Configure& r) { settings_.request(asker, r); },
                  [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
                  [&](const api::MovePath& r) { lines_.request(asker, r); },

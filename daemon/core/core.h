@@ -19,6 +19,7 @@
 #include "daemon/services/dry_run.h"
 #include "daemon/services/emergency_stop.h"
 #include "daemon/services/health_publisher.h"
+#include "daemon/services/holds.h"
 #include "daemon/services/homing_queue.h"
 #include "daemon/services/idle_drivers.h"
 #include "daemon/services/jogs.h"
@@ -123,6 +124,7 @@ class Core {
   Stops stops_;
   Jogs jogs_;
   Pauses pauses_;
+  Holds holds_;
   Lines lines_;
   Trajectories trajectories_;
   EmergencyStop emergency_stop_;

@@ -1,5 +1,6 @@
 #include "daemon/services/kept_positions.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -48,7 +49,7 @@ void KeptPositions::use(const std::map<std::string, state::Kept>& kept, state::B
   backend_ = &backend;
   required_ = required;
   for (const auto& [name, of_name] : kept) {
-    if (state::is_no_motor(name)) others_[name] = of_name.settings;
+    if (std::ranges::find(names, name) == names.end()) others_[name] = of_name.settings;
   }
   if (in_use_) in_use_();
 }

@@ -50,9 +50,10 @@ class KeptPositions final : public Service {
   // What was set in operation in place of bushd.toml's keys; empty without a store.
   state::Settings settings(MotorId motor) const;
   void keep(MotorId motor, state::Settings settings);
-  // The same of what is no motor (state::is_no_motor).
+  // The same of what is no motor (state::is_no_motor), or is not configured any more.
   state::Settings settings(const std::string& name) const;
   void keep(const std::string& name, const state::Settings& settings);
+  std::map<std::string, state::Settings> settings_of_others() const { return others_; }
   // How much there was to keep so far, and how much of that is on the disk; why no more is.
   std::uint64_t told() const { return keeper_ ? keeper_->told() : 0; }
   std::uint64_t kept_up_to() const { return keeper_ ? keeper_->kept_up_to() : 0; }
@@ -125,7 +126,7 @@ class KeptPositions final : public Service {
   int reading_ = 0;                    // requests for histories
   bool required_ = true;
   ById<MotorId, Motor> motors_;
-  std::map<std::string, state::Settings> others_;  // of what is no motor
+  std::map<std::string, state::Settings> others_;  // of what is no motor of the configuration
   struct OfMcu {
     std::optional<Heard> heard{};
     bool reported = false;  // since the last step

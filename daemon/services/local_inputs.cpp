@@ -79,7 +79,12 @@ void LocalInputs::reports(std::int64_t, Mcu& mcu) {
 // A motor gets back to people when it rests: while it moves its MCU would refuse that.
 void LocalInputs::follow(Mcu& mcu) {
   Task& task = tasks_[mcu.id];
-  if (!mcu.online()) return;
+  if (!mcu.online()) {
+    // It does not get them with its configuration.
+    const unsigned more = held(mcu) & ~unsigned{task.inhibited};
+    if (more != 0) tell(mcu, static_cast<std::uint16_t>(task.inhibited | more));
+    return;
+  }
   const unsigned moving = mcu.report().moving | mcu.report().autonomous;
   const unsigned wanted = held(mcu) | task.stopping;
   const unsigned more = wanted & ~task.inhibited & ~(task.refused ? moving : 0u);

@@ -3,29 +3,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "words/remedy.h"
+#include "daemon/model/count_text.h"
 
 namespace bushd::daemon {
-namespace {
 
-std::string count_text(std::size_t motors) {
-  return std::to_string(motors) + (motors == 1 ? " motor" : " motors");
-}
-
-}  // namespace
-
-Pauses::Pauses(Installation& installation, Interlocks& interlocks, Moves& moves,
-               LocalInputs& local_inputs, OpenMoves& open_moves)
-    : installation_(installation),
-      interlocks_(interlocks),
-      moves_(moves),
-      open_(open_moves),
-      local_inputs_(local_inputs) {
-  interlocks_.add([this](MotorId motor) -> Result<void> {
-    if (!installation_[motor].is_held()) return {};
-    return fail("it is held; run " + words::remedy("release", installation_[motor].name()));
-  });
-}
+Pauses::Pauses(Installation& installation, const Interlocks& interlocks, Moves& moves,
+               OpenMoves& open_moves)
+    : installation_(installation), interlocks_(interlocks), moves_(moves), open_(open_moves) {}
 
 // What it does, which a pause leaves alone; "": nothing, or a motion that it pauses or ends.
 std::string Pauses::left_alone(MotorId id) const {
@@ -125,39 +109,6 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Re
   asker.answer(api::done("resumed: " + count_text(paused.size())));
 }
 
-// Those that wait for the trigger would begin by it: they wait no more.
-void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Hold& request) {
-  const auto [motors, unknown] = installation_.find_known(request.motors, true);
-  if (motors.empty()) return asker.answer(api::Refused{unknown});
-  asker.answer(api::Accepted{});
-  std::vector<MotorId> armed;
-  for (const MotorId motor : motors) {
-    installation_[motor].hold(true);
-    if (installation_[motor].is<motion::Armed>()) armed.push_back(motor);
-  }
-  open_.stopped_by(armed, text_of(asker));
-  moves_.stop(now_us, armed);
-  installation_.changed = true;
-  if (open_holds_.size() >= kMaxOpen) {
-    open_holds_.front().asker.answer(api::done("held; what their MCUs say is not waited for"));
-    open_holds_.pop_front();
-  }
-  open_holds_.push_back({.asker = asker, .motors = motors, .unknown = unknown});
-  answer_holds();
-}
-
-void Pauses::request(std::int64_t, const api::Asker& asker, const api::Release& request) {
-  const auto motors = installation_.find_with_groups(request.motors);
-  if (!motors) return asker.answer(api::Refused{motors.error().text()});
-  asker.answer(api::Accepted{});
-  const auto held = std::ranges::count_if(
-      *motors, [this](MotorId motor) { return installation_[motor].is_held(); });
-  for (const MotorId motor : *motors) installation_[motor].hold(false);
-  installation_.changed = true;
-  asker.answer(api::done(held == 0 ? "done; none of them was held"
-                                   : "released: " + count_text(static_cast<std::size_t>(held))));
-}
-
 void Pauses::Pausing::not_done(api::Outcome how, const std::string& what) {
   outcome = std::max(outcome, how);
   problems += "; " + what;
@@ -194,33 +145,7 @@ std::string Pauses::text_of_left(const Pausing& pausing) const {
   return text;
 }
 
-void Pauses::answer_holds() {
-  std::erase_if(open_holds_, [this](const Holding& holding) {
-    std::string not_held = holding.unknown.empty() ? "" : "; " + holding.unknown;
-    std::string offline;
-    for (const MotorId id : holding.motors) {
-      const motion::Motor& motor = installation_[id];
-      if (!local_inputs_.has_told(id)) return false;
-      if (!motor.is_held() || !installation_.drives()[id].moved_by_people()) continue;
-      if (const auto refusal = local_inputs_.refusal(id))
-        not_held += "; " + motor.name() + ": " + *refusal;
-      if (!installation_.mcu_of(id).online()) {
-        offline += "; MCU " + installation_.mcu_of(id).name() +
-                   " is offline: its local inputs may move " + motor.name() +
-                   " until it is online again";
-      }
-    }
-    const std::string text = "held: " + count_text(holding.motors.size()) + not_held + offline;
-    holding.asker.answer(
-        not_held.empty()
-            ? api::done(text)
-            : api::Completed{.outcome = api::Outcome::kFault, .reason = text, .detail = {}});
-    return true;
-  });
-}
-
 void Pauses::step(std::int64_t) {
-  answer_holds();
   std::erase_if(open_pauses_, [this](Pausing& pausing) {
     std::erase_if(pausing.motors,
                   [&](const auto& motor) { return has_ended(pausing, motor.first, motor.second); });

@@ -1,5 +1,5 @@
-// Motors that are paused on the way to their targets, and motors that are held back from moving at
-// all: what other systems call stop, pause, move, go.
+// Motors that are paused on the way to their targets: what other systems call stop, pause, move,
+// go.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,6 @@
 
 #include "daemon/model/interlocks.h"
 #include "daemon/model/service.h"
-#include "daemon/services/local_inputs.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 
@@ -22,14 +21,11 @@ class Pauses final : public Service {
   // Whose standstill is waited for at a time; beyond, motors are paused all the same.
   static constexpr std::size_t kMaxOpen = 256;
 
-  // It adds a check to the interlocks.
-  Pauses(Installation& installation, Interlocks& interlocks, Moves& moves,
-         LocalInputs& local_inputs, OpenMoves& open_moves);
+  Pauses(Installation& installation, const Interlocks& interlocks, Moves& moves,
+         OpenMoves& open_moves);
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Pause& request);
   void request(std::int64_t now_us, const api::Asker& asker, const api::Resume& request);
-  void request(std::int64_t now_us, const api::Asker& asker, const api::Hold& request);
-  void request(std::int64_t now_us, const api::Asker& asker, const api::Release& request);
 
   void step(std::int64_t now_us) override;
 
@@ -49,21 +45,12 @@ class Pauses final : public Service {
   bool settles(MotorId motor) const;
   bool has_ended(Pausing& pausing, MotorId motor, std::int64_t target) const;
   std::string text_of_left(const Pausing& pausing) const;
-  // Until their MCUs know of it: people may move them there.
-  struct Holding {
-    api::Asker asker;
-    std::vector<MotorId> motors;
-    std::string unknown;  // which names are, if any
-  };
-  void answer_holds();
 
   Installation& installation_;
-  Interlocks& interlocks_;
+  const Interlocks& interlocks_;
   Moves& moves_;
   OpenMoves& open_;
-  LocalInputs& local_inputs_;
   std::list<Pausing> open_pauses_;
-  std::list<Holding> open_holds_;
 };
 
 }  // namespace bushd::daemon

@@ -68,7 +68,7 @@ Result<void> Travels::may_travel(MotorId id, const bushd_travel& message) const 
   if (auto may = interlocks_.may_move(id); !may) return may;
   if (motor.has_plan()) return fail("moves, by another's request");
   if (motor.is_held()) {
-    return fail("it is held; run " + words::remedy("release", motor.name()) + " first");
+    return fail(motor.held_text() + "; run " + words::remedy("release", motor.name()) + " first");
   }
   if (!mcu.can_travel() || (message.edge != BUSHD_EDGE_NONE && !mcu.can_trigger())) {
     return fail("the firmware of MCU " + mcu.name() + " cannot do that by itself");

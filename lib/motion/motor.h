@@ -243,8 +243,13 @@ class Motor {
     if (now) asked_for_.reset();
   }
   bool jogs() const { return jogs_; }
-  void hold(bool now) { held_ = now; }
-  bool is_held() const { return held_; }
+  // No motion of it is to begin. `how`: by whom and since when, "by panel since ... UTC".
+  void hold(std::string how) { held_ = std::move(how); }
+  void release() { held_.reset(); }
+  bool is_held() const { return held_.has_value(); }
+  const std::optional<std::string>& held() const { return held_; }
+  // Precondition: it is held.
+  std::string held_text() const { return "it is held " + *held_; }
   void arm(std::uint8_t number, std::int64_t steps, bushd_delay shortest_delay = 0);
   void arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
                 bushd_delay shortest_delay);
@@ -341,7 +346,7 @@ class Motor {
   enum class Pause { kNo, kRamps, kStands, kOver };  // kOver: stopped where it stood
   Pause pause_ = Pause::kNo;
   bool jogs_ = false;
-  bool held_ = false;
+  std::optional<std::string> held_;
   std::optional<units::Steps> asked_for_;
   std::int64_t position_ = 0;
   std::optional<std::uint16_t> boot_number_;

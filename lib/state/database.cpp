@@ -249,7 +249,7 @@ Result<std::vector<std::string>> Database::slots() {
 }
 
 Result<void> Database::add_slots(std::uint64_t marks_id, const std::vector<std::string>& motors,
-                                 const std::map<std::string, Record>& records) {
+                                 const Batch& of_motors) {
   return transact([&]() -> Result<void> {
     Statement file(sqlite_, "UPDATE file SET marks_id = ?");
     if (auto set = file.bind(static_cast<std::int64_t>(marks_id)).run(); !set) return set;
@@ -259,8 +259,11 @@ Result<void> Database::add_slots(std::uint64_t marks_id, const std::vector<std::
     for (const std::string& motor : motors) {
       if (auto added = insert.bind(motor).run(); !added) return added;
     }
-    for (const auto& [motor, record] : records) {
+    for (const auto& [motor, record] : of_motors.records) {
       if (auto done = put(motor, record); !done) return done;
+    }
+    for (const auto& [motor, settings] : of_motors.settings) {
+      if (auto done = put(motor, settings); !done) return done;
     }
     return {};
   });

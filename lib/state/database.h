@@ -45,7 +45,7 @@ class Database {
   // Whose slots there are, in their order; motors that are new get the next.
   Result<std::vector<std::string>> slots();
   Result<void> add_slots(std::uint64_t marks_id, const std::vector<std::string>& motors,
-                         const std::map<std::string, Record>& records);
+                         const Batch& of_motors);
   // Motors may move from now on though their marks cannot be written; or not any more.
   Result<void> set_unguarded(bool unguarded);
   // If an earlier daemon has left that behind: no motor is at rest for certain.

@@ -56,7 +56,10 @@ struct Setting {
   std::string replaces{};
   friend bool operator==(const Setting&, const Setting&) = default;
 };
-using Settings = std::map<std::string, Setting>;  // by key: offset, direction, soft_limits
+using Settings = std::map<std::string, Setting>;  // by key: offset, direction, soft_limits, held
+
+// The key of a motor that is held; its value says by whom and since when, for people.
+inline constexpr const char* kHeldKey = "held";
 
 // Names with a slash are of something else that has settings: no motor has one.
 inline bool is_no_motor(const std::string& name) {

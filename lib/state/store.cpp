@@ -4,11 +4,18 @@
 #include <set>
 #include <utility>
 
+#include "state/rules.h"
+
 namespace bushd::state {
 namespace {
 
 constexpr const char* kRecordLost =
     "its kept position was lost with the database of the state store";
+
+std::string held_since(std::int64_t utime_us) {
+  return "by bushd since " + time_text(utime_us) +
+         ", when state.db, with who was held, was damaged or gone";
+}
 
 // What the slots of the database's own file say; others say nothing.
 std::map<std::string, std::uint64_t> motions_of(const Marks::Content& found,
@@ -74,16 +81,19 @@ Result<void> Store::read_marks(Disk& disk, const Opening& opening) {
     if (mark && !known) lost[mark->motor] = std::max(lost[mark->motor], mark->motion);
   }
   std::vector<std::string> added;
-  std::map<std::string, Record> lost_records;
+  Batch of_lost;
   for (const std::string& motor : opening.motors) {
     if (std::ranges::find(*slots, motor) != slots->end()) continue;
     added.push_back(motor);
     if (!lost.contains(motor) && !database_.begun_anew()) continue;
-    lost_records[motor] = {.trust = Trust::kUncertain, .reason = kRecordLost};
+    of_lost.records[motor] = {.trust = Trust::kUncertain, .reason = kRecordLost};
+    // Whether it was held nobody knows: it is the reading that moves less.
+    (*settings)[motor][kHeldKey].value = held_since(opening.utime_us);
+    of_lost.settings[motor] = (*settings)[motor];
   }
   const std::uint64_t id = own ? *own_id : std::max<std::uint64_t>(opening.random >> 1, 1);
   if (!own || !added.empty()) {
-    if (auto done = database_.add_slots(id, added, lost_records); !done) return done;
+    if (auto done = database_.add_slots(id, added, of_lost); !done) return done;
   }
   slots->insert(slots->end(), added.begin(), added.end());
 
@@ -92,7 +102,7 @@ Result<void> Store::read_marks(Disk& disk, const Opening& opening) {
     Kept& kept = kept_[motor];
     if (const auto record = records->find(motor); record != records->end()) {
       kept.record = record->second;
-    } else if (const auto begun = lost_records.find(motor); begun != lost_records.end()) {
+    } else if (const auto begun = of_lost.records.find(motor); begun != of_lost.records.end()) {
       kept.record = begun->second;
     }
     kept.settings = std::move((*settings)[motor]);

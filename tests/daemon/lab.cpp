@@ -161,8 +161,10 @@ void Lab::start_daemon() {
   }
 }
 
-void Lab::restart_daemon() {
+void Lab::restart_daemon(const std::function<void()>& meanwhile) {
   core_.reset();
+  store_.reset();
+  if (meanwhile) meanwhile();
   disk_.clear();
   state_jobs_.clear();
   for (SimulatedBus& bus : buses_) bus.received.clear();

@@ -129,8 +129,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   // The daemon does nothing for a while, as after SIGSTOP or on a very busy machine; what has
   // arrived meanwhile is the first that it reads.
   void pause_daemon(double seconds);
-  // The daemon is gone, and a new one starts on the same buses.
-  void restart_daemon();
+  // The daemon is gone, and a new one starts on the same buses. `meanwhile`: no daemon runs.
+  void restart_daemon(const std::function<void()>& meanwhile = {});
   // From now on positions are kept, on a disk of the simulation: the daemon is started again.
   void keep_positions();
   sim::SimDisk& disk() { return *state_disk_; }

@@ -206,7 +206,7 @@ TEST(Holds, RefuseWhatWouldBegin) {
         api::Request(api::Jog{.motor = "m01", .per_s = 100, .in_steps = true})}) {
     const Answer refused = lab.wait(lab.send(request));
     EXPECT_EQ(refused.result, "refused");
-    EXPECT_THAT(refused.reason, HasSubstr("m01: it is held; run 'bushctl release m01'"));
+    EXPECT_THAT(refused.reason, HasSubstr("m01: it is held by test since "));
   }
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m02"}, {100})).result, "reached");
   EXPECT_EQ(lab.wait(lab.send(api::Release{})).reason, "released: 1 motor");

@@ -76,7 +76,8 @@ void Witness::daemon_started(TimeNs now_ns) {
   finished_.clear();
   for (Motor& motor : motors_) {
     motor.move.reset();
-    motor.over = motor.stops = motor.pauses = motor.held = false;
+    motor.over = motor.stops = motor.pauses = false;
+    motor.held = offsets_kept_ && motor.held_on_disk;
     motor.idle_checks = 0;
     motor.held_at.reset();
     motor.stopped_at.reset();
@@ -111,6 +112,7 @@ void Witness::reply(TimeNs now_ns, const Key& key, std::size_t kind, const api::
   }
   if (const auto* completed = std::get_if<api::Completed>(&reply)) {
     if (completed->reason.empty()) violated(now_ns, "a result without a reason");
+    if (asked.request.ask == Ask::kHold) hold_done(key, *completed);
     if (asked.accepted) {
       finished(now_ns, key, asked, *completed);
     } else {

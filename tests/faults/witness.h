@@ -151,8 +151,10 @@ class Witness {
     std::optional<std::int64_t> run_from{};
     std::optional<Range> range{};  // that it does not leave, as the plant counts
     bool held = false;
-    TimeNs set_ns = -1;   // when somebody said where it stands, the last time
-    int idle_checks = 0;  // of the deadlines, while no motion of it was open
+    std::optional<Key> held_by{};  // the last time
+    bool held_on_disk = false;     // as that has been answered
+    TimeNs set_ns = -1;            // when somebody said where it stands, the last time
+    int idle_checks = 0;           // of the deadlines, while no motion of it was open
     std::optional<std::int64_t> held_at{};
     TimeNs asked_ns = -1;  // when somebody asked for a motion of it, the last time
     std::optional<std::int64_t> stopped_at{};  // where it stood when a stop was done, until then
@@ -283,6 +285,7 @@ class Witness {
   void stop_is_done(const Asked& asked, const std::string& reason);
   void pause_accepted(TimeNs now_ns, const Request& request);
   void hold_accepted(const Request& request);
+  void hold_done(const Key& key, const bushd::api::Completed& result);
   void paused(TimeNs now_ns, const Key& key, const std::string& reason);
   // CAMAC modules, which ask for motion themselves.
   void asked_by_module(TimeNs now_ns, const std::string& client, const std::string& what,

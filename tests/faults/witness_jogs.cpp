@@ -114,6 +114,8 @@ void Witness::hold_accepted(const Request& request) {
   for (Motor& motor : motors_) {
     if (!request.names_or_all(motor.name)) continue;
     motor.held = request.ask == Ask::kHold;
+    motor.held_by = key_of(request.id());
+    motor.held_on_disk = false;
     motor.held_at.reset();
     motor.idle_checks = 0;
     if (!motor.held || !motor.move) continue;
@@ -124,6 +126,15 @@ void Witness::hold_accepted(const Request& request) {
     asked.stops[i] = true;
     motor.stops = true;
     motor.target.reset();
+  }
+}
+
+// It outlives the daemon, if that has a store.
+void Witness::hold_done(const Key& key, const api::Completed& result) {
+  for (Motor& motor : motors_) {
+    if (motor.held && motor.held_by == key) {
+      motor.held_on_disk = result.outcome == api::Outcome::kDone;
+    }
   }
 }
 

@@ -190,6 +190,7 @@ void expect_lost(const Kept& kept) {
   const Verdict verdict = on_connecting(kept, seen);
   EXPECT_EQ(verdict.trust, Trust::kUncertain);
   EXPECT_THAT(verdict.reason, HasSubstr("was lost"));
+  EXPECT_THAT(kept.settings.at(kHeldKey).value, HasSubstr("by bushd since "));
 }
 
 TEST(Store, ADatabaseThatIsGoneIsNoticed) {
