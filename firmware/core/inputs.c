@@ -12,12 +12,19 @@
 #include "firmware/core/travel.h"
 #include "firmware/core/velocity.h"
 
-// `now_active`: a switch of the motor has just become so.
-static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
+// `changed`: a switch of the motor has just become active or inactive.
+static void follow_limit(bushd_mcu* mcu, uint8_t m, bool changed) {
   const uint32_t next = mcu->tick + 1u;
   const int8_t heading = bushd_mcu_heading(mcu, m, next);
   const bool homes = (bushd_mcu_homing_motor(mcu) & motor_bit(m)) != 0;
-  if (heading == 0 || !bushd_mcu_limit_stops(mcu, m, heading, now_active, homes)) return;
+  if (heading == 0) {
+    if (changed && !homes) {
+      bushd_mcu_stands_off_limit(mcu, m, bushd_mcu_last_direction(mcu, m));
+    }
+    return;
+  }
+  const bool now_active = changed && (bushd_mcu_at_limits(mcu) & motor_bit(m)) != 0;
+  if (!bushd_mcu_limit_stops(mcu, m, heading, now_active, homes)) return;
   const bool cuts = (mcu->inputs.limit_immediate & motor_bit(m)) != 0;
   if (homes) {
     bushd_mcu_homing_meets_limit(mcu, cuts);
@@ -36,11 +43,11 @@ static void follow_limit(bushd_mcu* mcu, uint8_t m, bool now_active) {
 }
 
 static void follow_limits(bushd_mcu* mcu, uint16_t pins) {
-  const uint16_t now_active = bushd_mcu_debounce_limits(mcu, pins);
-  uint16_t concerned = mcu->limits.at_positive | mcu->limits.at_negative |
-                       mcu->limits.hit_positive | mcu->limits.hit_negative;
+  const uint16_t changed = bushd_mcu_debounce_limits(mcu, pins);
+  uint16_t concerned =
+      bushd_mcu_at_limits(mcu) | mcu->limits.hit_positive | mcu->limits.hit_negative;
   for (uint8_t m = 0; concerned != 0; ++m, concerned = (uint16_t)(concerned >> 1)) {
-    if ((concerned & 1u) != 0) follow_limit(mcu, m, (now_active & motor_bit(m)) != 0);
+    if ((concerned & 1u) != 0) follow_limit(mcu, m, (changed & motor_bit(m)) != 0);
   }
 }
 

@@ -101,7 +101,8 @@ bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks)
 // How long each input has differed from what it counts as is counted for all of them at once: bit k
 // of input n's counter is bit n of bounces[k].
 uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins) {
-  const uint16_t before = mcu->limits.at_positive | mcu->limits.at_negative;
+  const uint16_t positive = mcu->limits.at_positive;
+  const uint16_t negative = mcu->limits.at_negative;
   const uint16_t differs = pins ^ mcu->limits.active;
   const uint16_t fresh = differs & (uint16_t)~mcu->limits.unsettled;
   uint16_t settled = differs;
@@ -116,24 +117,37 @@ uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins) {
   if (settled == 0) return 0;
   mcu->limits.active ^= settled;
   find_motors(mcu);
-  return (mcu->limits.at_positive | mcu->limits.at_negative) & (uint16_t)~before;
+  return (mcu->limits.at_positive ^ positive) | (mcu->limits.at_negative ^ negative);
+}
+
+uint16_t bushd_mcu_at_limits(const bushd_mcu* mcu) {
+  return mcu->limits.at_positive | mcu->limits.at_negative;
+}
+
+static void leave(bushd_mcu* mcu, uint8_t m, int8_t heading) {
+  const int8_t back = (int8_t)-heading;
+  const uint16_t bit = motor_bit(m);
+  if ((at_limit(mcu, back) & bit) == 0) *hit_towards(mcu, back) &= (uint16_t)~bit;
+}
+
+void bushd_mcu_stands_off_limit(bushd_mcu* mcu, uint8_t m, int8_t last_direction) {
+  leave(mcu, m, last_direction);
 }
 
 bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active, bool homes) {
   const uint16_t bit = motor_bit(m);
   const int8_t back = (int8_t)-heading;
   uint16_t* const ahead = hit_towards(mcu, heading);
-  uint16_t* const behind = hit_towards(mcu, back);
   if (!homes || !bushd_mcu_homes_at_limit(mcu, m, heading)) {
     const bool both_ends = (mcu->limits.both_ends & bit) != 0;
-    if (both_ends && now_active && (*behind & bit) == 0) *ahead |= bit;
+    if (both_ends && now_active && (*hit_towards(mcu, back) & bit) == 0) *ahead |= bit;
     if ((bushd_mcu_forbidden(mcu, heading) & bit) != 0) {
       *ahead |= bit;
       return true;
     }
   }
   const bool its_own = homes && bushd_mcu_homes_at_limit(mcu, m, back);
-  if (!its_own && (at_limit(mcu, back) & bit) == 0) *behind &= (uint16_t)~bit;
+  if (!its_own) leave(mcu, m, heading);
   return false;
 }
 

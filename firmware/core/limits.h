@@ -41,11 +41,16 @@ bool bushd_mcu_homes_at_limit(const bushd_mcu* mcu, uint8_t m, int8_t direction)
 // that are inhibited are given up where they begin.
 bool bushd_mcu_starts_into_limit(const bushd_mcu* mcu, const bushd_ticks* ticks);
 // Once a tick: the watched inputs as they are now. Returns motors of which a switch has become
-// active.
+// active, or inactive.
 uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins);
 // Whether its switch stops a motor that goes in this direction. One that goes away from it has left
 // it. `homes`: a limit that is the switch it looks for is not looked at.
 bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active, bool homes);
+// Motors with an active limit switch.
+uint16_t bushd_mcu_at_limits(const bushd_mcu* mcu);
+// A switch of a motor at rest has changed: one that it has gone away from with its last step, and
+// that is inactive, it has left.
+void bushd_mcu_stands_off_limit(bushd_mcu* mcu, uint8_t m, int8_t last_direction);
 // A motor that homes has come to its switch: if that is a limit, it inhibits the way on. It has
 // left it.
 void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction);

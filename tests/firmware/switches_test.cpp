@@ -90,6 +90,49 @@ TEST_P(Switches, AHitSwitchInhibitsUntilItIsLeft) {
   expect_forbidden(0, 0);
 }
 
+// The switch opens by the last step of the way back, and the motor stands when that counts.
+TEST_P(Switches, AHitSwitchThatTheLastStepLeavesInhibitsNoMore) {
+  for (const std::uint8_t debounce_ticks : std::to_array<std::uint8_t>({0, 1, 5, 15})) {
+    SCOPED_TRACE(int{debounce_ticks});
+    InputSettings settings = both();
+    settings.debounce_ticks = debounce_ticks;
+    ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}, settings));
+    const std::int64_t end = rig.pulses(kSwitched) + 20;
+    rig.sense = [this, end] {
+      const bool closed = rig.pulses(kSwitched) >= end;
+      return bushd_inputs{closed ? bit(9) : std::uint16_t{0}, 0};
+    };
+    ASSERT_EQ(start(kSwitched, 400), BUSHD_OK);
+    rig.pass_until_rest();
+    const int beyond = static_cast<int>(rig.pulses(kSwitched) - end);
+    ASSERT_GE(beyond, 0);
+    expect_forbidden(kSwitchedBit, 0);
+    rig.run_plan(plan(-beyond), kSwitched);
+    ASSERT_EQ(rig.pulses(kSwitched), end);
+    rig.pass(50);
+    expect_forbidden(kSwitchedBit, 0);
+    rig.run_plan(plan(-1), kSwitched);
+    rig.pass(debounce_ticks);
+    expect_forbidden(0, 0);
+    EXPECT_EQ(start(kSwitched, 5), BUSHD_OK);
+    rig.pass_until_rest();
+    rig.run_plan(plan(-100), kSwitched);
+  }
+}
+
+// Nobody has seen it leave one that it has overrun and that opens by itself.
+TEST_P(Switches, AHitSwitchThatOpensAtRestStillInhibits) {
+  ASSERT_NO_FATAL_FAILURE(wire({kSwitched, 9, 14, 3}));
+  ASSERT_EQ(start(kSwitched, 60), BUSHD_OK);
+  rig.pass(30);
+  rig.pins({bit(9), 0});
+  rig.pass_until_rest();
+  rig.pins({0, 0});
+  rig.pass(50);
+  expect_forbidden(kSwitchedBit, 0);
+  EXPECT_EQ(start(kSwitched, 5), BUSHD_E_FORBIDDEN);
+}
+
 TEST_P(Switches, LevelsAreThoseOfInputs) {
   InputSettings settings = both();
   settings.inverted = bit(9);  // a contact that opens
