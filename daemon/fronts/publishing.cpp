@@ -6,8 +6,6 @@
 namespace bushd::daemon {
 namespace {
 
-constexpr std::int64_t kNewestPeriodUs = 100'000;
-
 // The tick goes on while nothing else does.
 bool same(const api::StateSnapshot& a, const api::StateSnapshot& b) {
   return a.bus == b.bus && a.mcu == b.mcu && a.state == b.state && a.detail == b.detail &&
@@ -99,19 +97,31 @@ std::vector<const lcm::Packet*> Publishing::newest() {
 }
 
 void Publishing::publish_newest() {
+  newest_wanted_ = true;
+  step();
+}
+
+std::int64_t Publishing::next_wake_us() const {
+  return newest_wanted_ ? newest_due_us_ : INT64_MAX;
+}
+
+void Publishing::step() {
   const std::int64_t now_us = clocks_.now_us();
-  if (now_us - newest_sent_us_ < kNewestPeriodUs) return;
-  newest_sent_us_ = now_us;
+  if (!newest_wanted_ || now_us < newest_due_us_) return;
+  newest_wanted_ = false;
   if (refresh_) refresh_();
-  const auto again = [this](Topic topic, const auto& slots) {
+  std::int64_t messages = 0;
+  const auto again = [&](Topic topic, const auto& slots) {
     for (const auto& slot : slots) {
       if (!slot.packet) continue;
+      ++messages;
       for (Listener* listener : listeners_) listener->hear(topic, *slot.packet);
     }
   };
   again(Topic::kDescription, descriptions_);
   again(Topic::kState, states_);
   again(Topic::kHealth, healths_);
+  newest_due_us_ = now_us + std::min(messages * kNewestUsPerMessage, kNewestPeriodUs);
 }
 
 }  // namespace bushd::daemon

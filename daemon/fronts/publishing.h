@@ -57,8 +57,15 @@ class Publishing : public api::Publisher {
 
   // Description, state and health of everything, the state as it is now.
   std::vector<const lcm::Packet*> newest();
-  // The same to all listeners, but not more often than ten times a second.
+  // The same to all listeners: now, or as soon as what was published for the last who asked has had
+  // its time, kNewestUsPerMessage for each message and at most kNewestPeriodUs. All who ask
+  // meanwhile are answered by one.
+  static constexpr std::int64_t kNewestUsPerMessage = 2'000;
+  static constexpr std::int64_t kNewestPeriodUs = 100'000;
   void publish_newest();
+  // Publishes what is due; to be called at next_wake_us() at the latest.
+  void step();
+  std::int64_t next_wake_us() const;
 
  private:
   template <class Snapshot>
@@ -84,7 +91,8 @@ class Publishing : public api::Publisher {
   std::int64_t sequence_ = 0;
   std::int64_t dropped_ = 0;
   std::string trouble_;
-  std::int64_t newest_sent_us_ = INT64_MIN / 2;
+  std::int64_t newest_due_us_ = INT64_MIN;  // not before
+  bool newest_wanted_ = false;
 };
 
 }  // namespace bushd::daemon

@@ -174,6 +174,7 @@ Result<void> EventLoop::run() {
                                      (socket_front_ ? socket_front_->dropped() : 0));
     keep_up(now);
     lcm_watch_.step(now);
+    publishing_.step();
     if (socket_front_) socket_front_->step(now);
     tell_left_out(now);
     tell_systemd(now);
@@ -221,7 +222,8 @@ Result<void> EventLoop::handle_sources() {
 
 std::int64_t EventLoop::next_wake_us() const {
   if (!reception_.idle()) return 0;
-  std::int64_t wake = std::min({core_.next_wake_us(), next_keypad_wake_us(), alive_due_us_});
+  std::int64_t wake = std::min(
+      {core_.next_wake_us(), publishing_.next_wake_us(), next_keypad_wake_us(), alive_due_us_});
   for (const Port& port : ports_) {
     if (port.lost) return 0;
     if (port.opening) continue;
