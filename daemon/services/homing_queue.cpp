@@ -227,10 +227,7 @@ void HomingQueue::begin(Mcu& mcu) {
 
 // Now that it is its turn.
 Result<void> HomingQueue::may_begin(MotorId id) const {
-  const motion::Motor& motor = installation_[id];
-  if (motor.is_held()) {
-    return fail("it was held before it was its turn to be homed, " + *motor.held());
-  }
+  if (installation_[id].is_held()) return fail("it was held before it was its turn to be homed");
   if (auto may = interlocks_.may_begin(id); !may)
     return fail("not homed, because " + may.error().text());
   return {};

@@ -68,7 +68,7 @@ class Connector {
   // By turns: one that does not answer its request keeps nobody else waiting.
   bool send_request(std::int64_t now_us);
   // When the next MCU is to be looked for. Precondition: it is offline.
-  std::int64_t retry_due_us(McuIndex mcu) const { return links_[mcu].retry_due_us; }
+  std::int64_t retry_due_us(McuIndex mcu) const;
 
   // Answers.
   void identity(const bushd_identity& identity) { identities_.push_back(identity); }
@@ -128,6 +128,8 @@ class Connector {
   std::uint16_t salt_ = 0;
   std::vector<bushd_identity> identities_;  // that the last IDENTIFY was answered with
   std::size_t turn_ = 0;                    // whose request is sent next
+  std::size_t identify_turn_ = 0;           // who is looked for next
+  std::int64_t vain_due_us_ = 0;            // not before, if it was looked for in vain
   std::size_t part_turn_ = 0;               // whose part of a table, if nothing else is asked
 };
 
