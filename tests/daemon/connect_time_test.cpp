@@ -9,7 +9,7 @@ namespace bushd::test {
 namespace {
 
 constexpr int kMcus = 16;
-// Of the connector: between two questions to an MCU that has not answered.
+// How long the connector waits between two questions to an MCU that has not answered.
 constexpr double kRetry_s = 0.5;
 
 // At 1 Mbaud.
