@@ -49,7 +49,7 @@ void Trajectories::run(std::int64_t now_us, const api::Asker& asker, const api::
   }
   if (const auto may = may_run(loaded); !may) return asker.answer(api::Refused{may.error().text()});
   asker.answer(api::Accepted{});
-  loaded.followed = std::make_shared<Trajectory>(loaded.rows);
+  loaded.followed = std::make_shared<motion::Trajectory>(loaded.rows);
   loaded.logged = journal_.trajectory_begun();
   journal_.trajectory_rows(loaded.logged, *loaded.followed, loaded.motors());
   const std::vector<MotorId> motors = loaded.motors();

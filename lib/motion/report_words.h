@@ -21,8 +21,7 @@ bool forbids(const bushd_report& report, unsigned output, int direction);
 std::string stopper(const bushd_report& report, const std::string& mcu);
 // Why it is uncertain then where it stands.
 std::string stopped_immediately(const bushd_report& report, const std::string& mcu);
-inline constexpr const char* kUnpowered =
-    "its drivers were disabled by overcurrent while it moved";
+inline constexpr const char* kUnpowered = "its drivers were disabled by overcurrent while it moved";
 
 // Whether the bit of this output is set.
 constexpr bool has_bit(unsigned mask, unsigned output) {

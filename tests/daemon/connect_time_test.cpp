@@ -2,7 +2,7 @@
 // came.
 #include <gtest/gtest.h>
 
-#include "bus/line_times.h"
+#include "bus/bus_times.h"
 #include "daemon/lab.h"
 
 namespace bushd::test {
