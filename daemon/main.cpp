@@ -124,7 +124,9 @@ bushd::Result<std::optional<bushd::state::Store>> open_store(const bushd::config
     return std::optional(std::move(*store));
   }
   if (folder.configured && config.state.required) return bushd::fail(store.error());
-  spdlog::warn("positions are not kept over power cuts: {}", store.error().text());
+  spdlog::warn(
+      "positions and holds are not kept over power cuts, and those kept before do not count: {}",
+      store.error().text());
   return std::nullopt;
 }
 

@@ -95,7 +95,12 @@ void Holds::request(std::int64_t now_us, const api::Asker& asker, const api::Hol
   moves_.stop(now_us, armed);
   installation_.changed = true;
   if (open_.size() >= kMaxOpen) {
-    open_.front().asker.answer(api::done("held; what their MCUs say is not waited for"));
+    const Holding& oldest = open_.front();
+    const std::string not_known = oldest.unknown.empty() ? "" : "; " + oldest.unknown;
+    kept_.answer_when_kept(
+        oldest.asker, {.outcome = not_known.empty() ? api::Outcome::kDone : api::Outcome::kFault,
+                       .reason = "held; what their MCUs say is not waited for" + not_known,
+                       .detail = {}});
     open_.pop_front();
   }
   open_.push_back({.asker = asker, .motors = motors, .unknown = unknown});

@@ -227,7 +227,9 @@ void HomingQueue::begin(Mcu& mcu) {
 
 // Now that it is its turn.
 Result<void> HomingQueue::may_begin(MotorId id) const {
-  if (installation_[id].is_held()) return fail("it was held before it was its turn to be homed");
+  if (const motion::Motor& motor = installation_[id]; motor.is_held()) {
+    return fail("it was held before it was its turn to be homed, " + *motor.held());
+  }
   if (auto may = interlocks_.may_begin(id); !may)
     return fail("not homed, because " + may.error().text());
   return {};

@@ -34,13 +34,13 @@ motion::LineShare AlongPath::share(std::size_t motor, std::uint32_t from, std::u
 }
 
 bool Line::waits() const {
-  const Straight* line = straight();
-  return line != nullptr && line->trigger && line->trigger->waits;
+  const Straight* way = straight();
+  return way != nullptr && way->trigger && way->trigger->waits;
 }
 
 bool Line::has_begun() const {
-  const Straight* line = straight();
-  return line == nullptr || !line->trigger || line->trigger->begun;
+  const Straight* way = straight();
+  return way == nullptr || !way->trigger || way->trigger->begun;
 }
 
 std::size_t Line::legs() const {

@@ -1,5 +1,5 @@
-// What motors of one line go along: straight ways, one after the other, or a path. What each of
-// them is to do of it, as numbers; who lets them do it is Lines.
+// The course of a line: straight ways, one after the other, or a path. As numbers only; Lines
+// carries it out.
 #pragma once
 
 #include <cstddef>

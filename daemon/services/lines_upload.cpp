@@ -48,7 +48,8 @@ bool Lines::may_get_tables(const std::vector<MotorId>& motors, bool armed) const
 }
 
 std::optional<Lines::WantedTable> Lines::table_to_upload(const Line& line, bool armed) const {
-  // By a table of its own a motor moves where its MCU does not rest.
+  // A motor that goes by a table in place of its own is streamed: no upload, which MCUs take at
+  // rest only.
   const Straight* straight = line.straight();
   if (straight == nullptr || straight->by || line.longest() == 0 ||
       !may_get_tables(line.motors, armed)) {

@@ -131,7 +131,7 @@ static void leave(bushd_mcu* mcu, uint8_t m, int8_t heading) {
 }
 
 void bushd_mcu_stands_off_limit(bushd_mcu* mcu, uint8_t m, int8_t last_direction) {
-  leave(mcu, m, last_direction);
+  if ((mcu->limits.both_ends & motor_bit(m)) == 0) leave(mcu, m, last_direction);
 }
 
 bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active, bool homes) {

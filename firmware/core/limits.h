@@ -48,8 +48,9 @@ uint16_t bushd_mcu_debounce_limits(bushd_mcu* mcu, uint16_t pins);
 bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active, bool homes);
 // Motors with an active limit switch.
 uint16_t bushd_mcu_at_limits(const bushd_mcu* mcu);
-// A switch of a motor at rest has changed: one that it has gone away from with its last step, and
-// that is inactive, it has left.
+// A switch of a motor at rest has changed. If its last step led away from a switch, and that is
+// inactive, it no longer inhibits. One switch for both ends goes on to: if it closed again at rest,
+// nothing would tell at which end.
 void bushd_mcu_stands_off_limit(bushd_mcu* mcu, uint8_t m, int8_t last_direction);
 // A motor that homes has come to its switch: if that is a limit, it inhibits the way on. It has
 // left it.

@@ -83,8 +83,12 @@ struct MotorResult {
     places.resize(motors.size());  // of a payload that ended before
     for (std::size_t i = 0; i < motors.size(); ++i) {
       const auto place = static_cast<std::size_t>(places[i]);
-      visit.require(place < tables.size());
-      if (place < tables.size()) visit.set(motors[i].table, tables[place]);
+      // Each motor gets a copy: of a long text that would be many times the message.
+      const bool good = place < tables.size() &&
+                        tables[place].name.size() <= tables::kMaxNameLength &&
+                        tables[place].hash.size() <= tables::kShortHashLength;
+      visit.require(good);
+      if (good) visit.set(motors[i].table, tables[place]);
     }
   }
 };

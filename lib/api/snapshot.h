@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "api/reply.h"
@@ -159,9 +160,11 @@ struct MotorDescription {
     visit("table", self.table);
     visit("description", self.text);
     ToldScale::fields(scale, visit);
-    visit.require(scale.is_good());
-    visit.set(self.scale, scale.scale());
-    visit.set(self.soft_limits, scale.limits());
+    if constexpr (std::remove_cvref_t<decltype(visit)>::kReads) {
+      visit.require(scale.is_good());
+      visit.set(self.scale, scale.scale());
+      visit.set(self.soft_limits, scale.limits());
+    }
   }
   friend bool operator==(const MotorDescription&, const MotorDescription&) = default;
 };
@@ -223,7 +226,7 @@ struct McuHealth {
     visit("repeats", self.repeats);
     visit("missed_ticks", self.missed_ticks);
     visit("restarts", self.restarts);
-    visit("low_water_ticks", self.low_water_ticks, fields::NoneIs<std::int32_t>{-1});
+    visit("low_water_ticks", self.low_water_ticks, fields::NegativeIsNone<std::int32_t>{});
     visit("rate_ppm", self.rate_ppm);
     visit("clock_offset_us", self.clock_offset_us);
     visit("two_masters", self.two_masters);

@@ -1,28 +1,36 @@
-// A type of requests, replies and snapshots declares its fields once, in its header:
+// How a type of requests, replies and snapshots declares its fields: once, in its header.
 //
-//   static void fields(auto& jog, auto& visit) {
-//     visit("motor", jog.motor);
-//     visit("keepalive_ms", jog.keepalive_ms);
-//     visit("steps_after", jog.steps_after, fields::NoneIs<std::int64_t>{-1});
+//   static void fields(auto& self, auto& visit) {
+//     visit("motor", self.motor);
+//     visit("keepalive_ms", self.keepalive_ms);
+//     visit("steps_after", self.steps_after, fields::NoneIs<std::int64_t>{-1});
 //   }
 //
 // Names and order are those of its .lcm file. Whoever does something with all fields of a type
-// writes a visitor: lib/lcm/wire.h has those that write, read and fingerprint LCM's bytes. A
-// visitor has
+// writes a visitor: lib/lcm/wire.h has those that write, read and fingerprint LCM's bytes.
 //
-//   visit(name, member), visit(name, member, form)    a bool, a number, a text, or a type with
-//   fields visit.list(count, name, vector), ... form         a vector, one element after the other
-//   visit.columns(count, vector, Column{name, &Element::member}, ...)
-//                                                     a vector of structs, one member after the
-//                                                     other
-//   visit.set(member, value)      does nothing but in a visitor that reads: for a member that is
-//   made
-//                                 of several fields, which are visited as local variables before
-//   visit.require(condition)      false: what is read is no message of this type
+// What a visitor can be asked:
 //
-// A form says how a member is told where that is not its own type: `told` makes what is told of a
-// value, `taken` puts back what was told and returns false if it means nothing. An unsigned number
-// of 32 or 64 bits without a form is told by the signed one of the same bits.
+// visit(name, member) or visit(name, member, form): a bool, a number, a text, or a type with
+// fields.
+//
+// visit.list(count, name, vector) or with a form: a vector, one element after the other.
+//
+// visit.columns(count, vector, Column{name, &Element::member}, ...): a vector of structs, one
+// member of all elements after the other.
+//
+// visit.set(member, value): does something in a visitor that reads only. For a member that is made
+// of several fields, which are visited as local variables before.
+//
+// visit.require(condition): if it is false, what is read is no message of this type.
+//
+// `self` may be const, and a default object. Arguments of set() and require() are evaluated by
+// every visitor; what is dear is done where Visitor::kReads only. Local variables begin as `self`
+// says, since a visitor that writes takes their values.
+//
+// A form converts a member to another type and back. told(value) is what is told of it; taken(told,
+// value) puts it back, and returns false for what is not allowed. An unsigned number of 32 or 64
+// bits without a form is told by the signed one of the same bits.
 #pragma once
 
 #include <cstdint>
@@ -78,6 +86,20 @@ struct NoneIs {
   template <class T>
   bool taken(Told told, std::optional<T>& value) const {
     value = told == none ? std::optional<T>{} : std::optional<T>{static_cast<T>(told)};
+    return true;
+  }
+};
+
+// The same of numbers that are not negative: any negative one is none, and -1 is told.
+template <class Told>
+struct NegativeIsNone {
+  template <class T>
+  static Told told(const std::optional<T>& value) {
+    return value ? static_cast<Told>(*value) : Told{-1};
+  }
+  template <class T>
+  static bool taken(Told told, std::optional<T>& value) {
+    value = told < 0 ? std::optional<T>{} : std::optional<T>{static_cast<T>(told)};
     return true;
   }
 };

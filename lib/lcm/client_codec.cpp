@@ -2,7 +2,6 @@
 // underscores.
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <map>
 #include <utility>
 
@@ -16,7 +15,10 @@ using Decoder = std::optional<ClientMessage> (*)(Payload);
 
 std::string channel_of(std::string_view name) {
   std::string channel(name);
-  for (char& c : channel) c = c == ' ' ? '_' : static_cast<char>(std::toupper(c));
+  for (char& c : channel) {  // not by toupper(): that depends on the program's locale
+    if (c == ' ') c = '_';
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  }
   return channel;
 }
 

@@ -182,7 +182,8 @@ using DaemonMessage = std::variant<Welcome, ReplyMessage, StateMessage, Descript
 
 std::span<const std::string_view> daemon_channels();
 
-// Nothing for what is no message of the daemon's; an enumeration's unknown word counts as one.
+// Nothing for what is no message of the daemon's, nor for one with an unknown word in an
+// enumeration.
 std::optional<DaemonMessage> decode_daemon_message(std::string_view channel, Payload payload);
 
 }  // namespace bushd::lcm

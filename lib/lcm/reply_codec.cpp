@@ -47,6 +47,9 @@ auto& list_of(api::CamacResult& result) {
   return result.block.responses;
 }
 
+// A reply of 2048 motors has three; who says more is not to be believed.
+constexpr std::size_t kMaxParts = 64;
+
 using Packets = bushd::Result<std::vector<Packet>>;
 
 // In one message.
@@ -57,15 +60,16 @@ Packets whole(std::string_view channel, const Message& message) {
   return std::vector<Packet>{std::move(*made)};
 }
 
-// In as few messages as its list allows, each with a piece of it. `message_with` makes a message of
-// a detail.
+// In one message, or in as many as it takes, each with an equal piece of its list. `message_with`
+// makes a message of a detail.
 template <class Detail>
 Packets in_parts(std::string_view channel, const Detail& detail, auto message_with) {
+  bool good = true;
+  const std::vector<std::uint8_t> bytes = bytes_of(message_with(detail), good);
+  if (!good || bytes.size() <= kMaxMessageBytes) return whole(channel, message_with(detail));
   Detail piece = detail;
   const auto list = std::exchange(list_of(piece), {});
-  bool good = true;
-  const std::size_t bytes = bytes_of(message_with(detail), good).size();
-  for (std::size_t parts = bytes / kMaxMessageBytes + 1;; ++parts) {
+  for (std::size_t parts = bytes.size() / kMaxMessageBytes + 1;; ++parts) {
     std::vector<Packet> packets;
     for (std::size_t part = 0; part < parts; ++part) {
       const auto at = [&](std::size_t i) {
@@ -76,7 +80,7 @@ Packets in_parts(std::string_view channel, const Detail& detail, auto message_wi
       message.reply.part = static_cast<std::int32_t>(part);
       message.reply.parts = static_cast<std::int32_t>(parts);
       auto made = packet(channel, message);
-      if (!made && good && parts < list.size()) break;  // too long: in more parts
+      if (!made && parts < kMaxParts) break;  // too long: in more parts
       if (!made) return fail(made.error());
       packets.push_back(std::move(*made));
     }
@@ -170,9 +174,7 @@ std::optional<DaemonMessage> decode_reply(std::string_view channel, Payload payl
 }
 
 std::optional<api::Reply> ReplyParts::add(ReplyMessage message) {
-  // A reply of 2048 motors has three; who says more is not to be believed.
-  constexpr std::int32_t kMaxParts = 64;
-  if (message.parts > kMaxParts) return std::nullopt;
+  if (message.parts > static_cast<std::int32_t>(kMaxParts)) return std::nullopt;
   parts_.try_emplace(message.part, std::move(message.reply));
   if (static_cast<std::int32_t>(parts_.size()) < message.parts) return std::nullopt;
   auto part = parts_.begin();

@@ -81,6 +81,7 @@ using ToldInColumn =
 
 class Writer {
  public:
+  static constexpr bool kReads = false;
   explicit Writer(std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
 
   void operator()(const char* /*name*/, const auto& value) { put(value); }
@@ -133,6 +134,7 @@ class Writer {
 // Once something is wrong it stays so, and nothing is left to be read.
 class Reader {
  public:
+  static constexpr bool kReads = true;
   explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
 
   void operator()(const char* /*name*/, auto& value) { get(value); }
@@ -226,6 +228,7 @@ class Reader {
 // primitive, and their dimensions; and of the fingerprints of types within.
 class Fingerprint {
  public:
+  static constexpr bool kReads = false;
   template <class T>
   static std::uint64_t of() {
     const T message{};

@@ -14,7 +14,7 @@ constexpr const char* kRecordLost =
 
 std::string held_since(std::int64_t utime_us) {
   return "by bushd since " + time_text(utime_us) +
-         ", when state.db, with who was held, was damaged or gone";
+         ", because state.db, which lists holds, was damaged or missing";
 }
 
 // What the slots of the database's own file say; others say nothing.

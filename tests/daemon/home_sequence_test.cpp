@@ -133,7 +133,8 @@ TEST(HomeSequence, AMotorThatIsHeldBeforeItsTurnIsNotMoved) {
     EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m02"}})).result, "done");
     const Answer answer = lab.wait(all);
     EXPECT_THAT(answer.motor_results, ElementsAre("reached", "stopped"));
-    EXPECT_THAT(answer.reason, HasSubstr("m02: it was held before it was its turn"));
+    EXPECT_THAT(answer.reason,
+                HasSubstr("m02: it was held before it was its turn to be homed, by "));
     EXPECT_FALSE(lab.has_moved("m02"));
     EXPECT_EQ(lab.wait(lab.send(api::Release{{"m02"}})).result, "done");
     EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m02"})).result, "reached");

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <tuple>
+#include <type_traits>
+#include <variant>
 
 #include "bushd/answer_t.hpp"
 #include "bushd/arm_line_t.hpp"
@@ -83,5 +85,17 @@ using AllMessages = std::tuple<
     RequestPair<api::Hold, hold_t>, RequestPair<api::Release, release_t>,
     RequestPair<lcm::GetStatus, get_status_t>,
     Pair<lcm::AnswerWith<api::Configuration>, configuration_answer_t>>;
+
+// Every request is among them.
+template <class Request, class All>
+inline constexpr bool kIsAmong = false;
+template <class Request, class... Pairs>
+inline constexpr bool kIsAmong<Request, std::tuple<Pairs...>> =
+    (std::is_same_v<lcm::RequestMessage<Request>, typename Pairs::Message> || ...);
+template <class... Request>
+consteval bool has_all_of(const std::variant<Request...>* /*requests*/) {
+  return (kIsAmong<Request, AllMessages> && ...);
+}
+static_assert(has_all_of(static_cast<const api::Request::variant*>(nullptr)));
 
 }  // namespace bushd::test

@@ -48,6 +48,11 @@ ReplyMessage reply_over_the_wire(const api::Reply& reply) {
   return out;
 }
 
+template <class... Content>
+std::vector<api::Request> one_of_each(const std::variant<Content...>* /*requests*/) {
+  return {api::Request(Content{})...};
+}
+
 TEST(Codec, EveryRequestHasAChannelOfItsOwn) {
   EXPECT_EQ(client_channels().size(), std::variant_size_v<api::Request::variant> + 3);
   for (const std::string_view channel : client_channels()) {
@@ -55,13 +60,10 @@ TEST(Codec, EveryRequestHasAChannelOfItsOwn) {
   }
   EXPECT_EQ(encode(0, kId, api::Request(api::Move{}))->channel, "MOVE");
   EXPECT_EQ(encode(0, kId, api::Request(api::SetTable{}))->channel, "SET_TABLE");
-  for (const api::Request& request :
-       {api::Request(api::Stop{}), api::Request(api::EmergencyStop{}), api::Request(api::Pause{}),
-        api::Request(api::Hold{}), api::Request(api::Disarm{}), api::Request(api::Jog{})}) {
-    EXPECT_TRUE(api::ends_motion(request)) << api::name_of(request);
-    EXPECT_TRUE(is_urgent_channel(encode(0, kId, request)->channel)) << api::name_of(request);
+  for (const api::Request& request : one_of_each(static_cast<api::Request::variant*>(nullptr))) {
+    EXPECT_EQ(is_urgent_channel(encode(0, kId, request)->channel), api::ends_motion(request))
+        << api::name_of(request);
   }
-  EXPECT_FALSE(is_urgent_channel("MOVE"));
 }
 
 TEST(Codec, MovesArriveAsTheyWereMeant) {
@@ -505,15 +507,15 @@ TEST(Codec, TheStateOfSixteenMotorsFitsAnEthernetFrameTwice) {
 
 // Whatever decodes can be encoded.
 template <class... Pair>
-std::vector<std::vector<std::uint8_t>> one_of_each(test::Random& random,
-                                                   const std::tuple<Pair...>* /*all*/) {
+std::vector<std::vector<std::uint8_t>> random_payloads(test::Random& random,
+                                                       const std::tuple<Pair...>* /*all*/) {
   return {encode("TEST", test::random_message<typename Pair::Message>(random)).value()...};
 }
 
 TEST(Codec, RandomMessagesOfEveryChannelDoNoHarm) {
   test::Random random(20040518);
   for (int i = 0; i < 100; ++i) {
-    for (const auto& payload : one_of_each(random, static_cast<test::AllMessages*>(nullptr))) {
+    for (const auto& payload : random_payloads(random, static_cast<test::AllMessages*>(nullptr))) {
       for (const std::string_view channel : client_channels()) {
         const auto message = decode_client_message(channel, payload);
         if (!message) continue;

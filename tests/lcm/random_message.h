@@ -52,6 +52,7 @@ class RandomFields {
   void set(auto& member, auto value) { member = std::move(value); }
   void require(bool condition) { good = good && condition; }
 
+  static constexpr bool kReads = true;
   bool good = true;
 
  private:
@@ -70,12 +71,20 @@ class RandomFields {
       value = below(random_, 2) == 0;
     } else if constexpr (std::is_same_v<T, double>) {
       value = static_cast<double>(static_cast<std::int32_t>(random_())) / 4096;
+    } else if constexpr (std::is_same_v<T, std::int16_t>) {
+      value = static_cast<T>(below(random_, 3));  // outputs, and places in lists of at most 3
     } else if constexpr (std::is_integral_v<T>) {
       value = static_cast<T>(below(random_, 2) == 0 ? below(random_, 5) : random_());
     } else if constexpr (std::is_same_v<T, std::string>) {
       value = text(random_);
     } else {
-      T::fields(value, *this);
+      const bool good_before = good;
+      do {
+        good = true;
+        value = T{};
+        T::fields(value, *this);
+      } while (!good);
+      good = good_before;
     }
   }
 

@@ -109,6 +109,8 @@ class MotorCheck:
         Returns the steps and edges of the others."""
         moves = self._motor.moves
         own_steps = self._motor.steps_by_move()
+        if not any(move.result == "limit" for move in moves):
+            return [step for move in moves for step in own_steps[id(move)]], edges
         rest, of_moves = self._split(edges, moves)
         steps = []
         for move, own in zip(moves, of_moves):

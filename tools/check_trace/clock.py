@@ -61,9 +61,10 @@ def rough_clock(motors):
     edges_ns = [motor.edges[0].time_ns for motor in motors if motor.edges]
     starts_ns = [move.start_tick * move.tick_ns for motor in motors for move in motor.moves]
     starts_ns += [autonomous.begin_ns for motor in motors for autonomous in motor.autonomous]
-    if not edges_ns or min(starts_ns) == -math.inf:
+    if not edges_ns or not starts_ns or min(starts_ns) == -math.inf:
         return NO_CLOCK
-    return Clock(0, min(edges_ns) - min(starts_ns) - motors[0].moves[0].tick_ns, 0.0)
+    tick_ns = next((move.tick_ns for motor in motors for move in motor.moves), 0)
+    return Clock(0, min(edges_ns) - min(starts_ns) - tick_ns, 0.0)
 
 
 def pairs_of(steps, seen):

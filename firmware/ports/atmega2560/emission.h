@@ -17,8 +17,9 @@
 #define EMISSION_SLOTS 128u
 // STEP pulses last as long at least.
 #define EMISSION_PULSE_NS 2500
-// Half of what the report takes, the most that a frame asks for at once: the next tick is begun so
-// much late at worst. A whole report would leave no room for frames in the shortest ticks.
+// Half of what the report takes, the most that a frame asks for at once: so the
+// next tick begins at most this late. A whole report would leave no room for frames in the shortest
+// ticks.
 #define EMISSION_FRAME_CYCLES 3800u
 
 // All of these are for the main loop only.

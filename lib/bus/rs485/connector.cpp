@@ -47,7 +47,7 @@ void Connector::port_opened(std::int64_t now_us) {
     mcus_[i].view.detail = "no answer yet";
     links_[i].retry_due_us = now_us;
   }
-  vain_due_us_ = now_us;
+  unanswered_due_us_ = now_us;
 }
 
 bool Connector::reconfigure(McuIndex mcu, McuSetup setup) {
@@ -131,11 +131,12 @@ void Connector::tell_local(McuIndex mcu) {
   link.queue.local(local);
 }
 
-// The others have their turns first. Only one that was asked in vain costs the line a time-out.
+// The others have their turns first. Only one that has not answered before costs the bus a
+// time-out.
 std::int64_t Connector::retry_due_us(McuIndex mcu) const {
   const Link& link = links_[mcu];
   const bool may_cost = link.identify_attempts > 0;
-  return may_cost ? std::max(link.retry_due_us, vain_due_us_) : link.retry_due_us;
+  return may_cost ? std::max(link.retry_due_us, unanswered_due_us_) : link.retry_due_us;
 }
 
 bool Connector::send_due_identify(std::int64_t now_us) {
@@ -230,14 +231,14 @@ void Connector::identify_ended(std::int64_t now_us, McuIndex mcu) {
   links_[mcu].identify_attempts = 1;  // in windows again
 }
 
-// An IDENTIFY without an answer costs the line a time-out: once in kRetryUs, however many MCUs are
-// offline, as soon as somebody else needs the line. One that answers is followed by the next at
+// An IDENTIFY without an answer costs the bus a time-out: once in kRetryUs, however many MCUs are
+// offline, as soon as somebody else needs the bus. One that answers is followed by the next at
 // once, so that MCUs whose power has come, or whose first answer was lost, are found together.
 void Connector::not_found(std::int64_t now_us, McuIndex mcu) {
   const bool needed = std::ranges::any_of(
       mcus_, [](const McuRecord& record) { return record.view.phase != McuPhase::kOffline; });
   links_[mcu].retry_due_us = now_us + kRetryUs;
-  vain_due_us_ = needed ? now_us + kRetryUs : now_us;
+  unanswered_due_us_ = needed ? now_us + kRetryUs : now_us;
 }
 
 void Connector::take(std::int64_t now_us, McuIndex mcu, const bushd_identity& identity) {

@@ -129,7 +129,7 @@ class Connector {
   std::vector<bushd_identity> identities_;  // that the last IDENTIFY was answered with
   std::size_t turn_ = 0;                    // whose request is sent next
   std::size_t identify_turn_ = 0;           // who is looked for next
-  std::int64_t vain_due_us_ = 0;            // not before, if it was looked for in vain
+  std::int64_t unanswered_due_us_ = 0;      // not before, if it has not answered
   std::size_t part_turn_ = 0;               // whose part of a table, if nothing else is asked
 };
 
