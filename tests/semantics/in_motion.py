@@ -93,7 +93,7 @@ class InMotion:
         self.driver.do("ready")
         self.driver.do("run", s=1.0)
         for motor in self.motors:
-            motor.held = False
+            motor.held = motor.held and self.kept
         self.come_to_rest(motors, hulls)
 
     def reboot_in_motion(self, motors, moving, aims, number):

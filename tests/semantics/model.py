@@ -258,9 +258,9 @@ class Motor:
             self.trust = "restored"
 
     def daemon_restarted(self, kept: bool):
-        self.held = False
         if kept:
-            return  # the MCU has counted on
+            return  # the MCU has counted on, and a hold is kept
+        self.held = False
         self.trust = "unconfirmed"
         self.offset, self.negative, self.limits = self.in_file
         self.exact_offset = True

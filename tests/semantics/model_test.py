@@ -72,6 +72,10 @@ class Arithmetic(unittest.TestCase):
         motor.held = True
         with self.assertRaisesRegex(Refused, "held"):
             motor.jog(Fraction(-1), True)
+        motor.daemon_restarted(True)
+        self.assertTrue(motor.held)
+        motor.daemon_restarted(False)
+        self.assertFalse(motor.held)
 
     def test_settings(self):
         motor = Motor("m", unit=True, steps_per_unit=Fraction(400), steps=800)

@@ -260,7 +260,7 @@ class Sequence(InMotion):
             motor.daemon_restarted(self.kept)
 
     def hold(self):
-        """Until it is released, or the daemon is started again."""
+        """Until it is released, or a daemon without a state store is started again."""
         some = [m.name for m in self.some()]
         held = self.rng.random() < 0.4
         self.ask("hold" if held else "release", names=some)
