@@ -176,9 +176,9 @@ TEST_F(Chopper, RampsCruiseAndRestHaveTheirCurrents) {
     forget();
     pass(ns);
     const Figures found = figures();
-    // What it falls by in a period after a cut it rises by in a little more than one, so each second
-    // period has a cut. One that leaves the winding off for a whole period is not told from a change
-    // of phases, and does not count; the next one, which comes later in its period, does.
+    // What it falls by in a period after a cut it rises by in a little more than one, so each
+    // second period has a cut. One that leaves the winding off for a whole period is not told from
+    // a change of phases, and does not count; the next one, which comes later in its period, does.
     EXPECT_GE(found.cuts, static_cast<std::size_t>(ns / kPeriodNs / 4));
     EXPECT_GE(found.least_a, ma * 0.95e-3);
     EXPECT_LE(found.most_a, ma * 1.05e-3);
