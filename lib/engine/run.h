@@ -66,7 +66,7 @@ void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, i
                      bushd_delay shortest_delay);
 
 // Puts the beginning of a run that has just been started `ns` after the beginning of its first
-// tick. Precondition: ns < length of the ticks that it will be expanded in. O(1).
+// tick. Precondition: ns <= length of the ticks that it will be expanded in. O(1).
 void bushd_run_begin_late(bushd_run* run, uint32_t ns);
 // Its first tick has not been expanded: it begins later in it. O(1).
 static inline bool bushd_run_begins_later(const bushd_run* run) {

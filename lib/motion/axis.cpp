@@ -69,7 +69,12 @@ void Axis::start(std::int64_t from_steps, std::int64_t steps, Tick start, std::u
 void Axis::restart(bushd_run& run, std::uint32_t steps, int direction,
                    bushd_delay shortest_delay) const {
   bushd_run_start(&run, &run_table(), steps, direction, shortest_delay);
-  bushd_run_begin_late(&run, late_ns_);
+  bushd_run_begin_late(&run, late_ns_ + (stands_first() ? tick_ns_ : 0));
+}
+
+// As a path does (PathRun::stands).
+bool Axis::stands_first() const {
+  return share_ && share_->from > 0 && !share_->in_mcus && fine();
 }
 
 void Axis::start_line(std::int64_t from_steps, LineShare share, Tick start,

@@ -275,6 +275,9 @@ class Axis {
   Tick end_of(const Place& place) const;
   Tick own_end_of(const Place& place) const;
   void plan_end();
+  // A streamed line that goes on tells in its first tick, before it goes on, what motors stand from
+  // their whole steps.
+  bool stands_first() const;
   void restart(bushd_run& run, std::uint32_t steps, int direction,
                bushd_delay shortest_delay) const;
   const bushd_table& run_table() const { return share_ ? share_->table->view() : *table_; }

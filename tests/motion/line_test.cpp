@@ -10,6 +10,7 @@
 #include "engine/slots.h"
 #include "engine/tables.h"
 #include "motion/axis.h"
+#include "motion/ramp.h"
 
 namespace bushd::motion {
 namespace {
@@ -79,6 +80,14 @@ Line any_line() {
   return line;
 }
 
+// In which tick the run begins: a streamed line that goes on tells in its first tick what motors
+// stand from their whole steps.
+Tick run_begin(const Line& line, Tick start) {
+  const bool stands =
+      line.share.from > 0 && !line.share.in_mcus && line.format == BUSHD_FORMAT_FINE;
+  return start + (stands ? 1 : 0);
+}
+
 std::int64_t made_at(const LineShare& share, std::uint32_t step) {
   bushd_line line;
   bushd_line_start(&line, share.increment, share.longest);
@@ -124,13 +133,14 @@ TEST(LineOfAnAxis, EveryTickIsWhereTheLineIs) {
     Reference run = Reference::move(law, run_steps, line.shortest_delay);
     Axis axis(line.own(), line.tick_ns, line.format);
     const Tick start = 100;
+    const Tick begin = run_begin(line, start);
     axis.start_line(1000, line.share, start, line.shortest_delay);
     const Tick whole = axis.over_tick();
     RC_ASSERT(whole >= axis.end_tick());
     std::optional<Tick> at;
     if (between(0, 1) == 0 && whole > start + 1) {
       at = between<Tick>(start + 1, whole - 1);
-      const auto ns = static_cast<std::uint64_t>(*at - start) * line.tick_ns;
+      const auto ns = static_cast<std::uint64_t>(*at - begin) * line.tick_ns;
       axis.stop();
       const bool already = ramps_down(run, law, ns, line.shortest_delay);
       const std::size_t steps_before = run.steps();
@@ -160,7 +170,7 @@ TEST(LineOfAnAxis, EveryTickIsWhereTheLineIs) {
         place += signed_256(line, one) * line.share.direction;
         if (one != 0) last_moved = tick;
         ++tick;
-        const auto ns = static_cast<std::uint64_t>(std::max<Tick>(tick - start, 0)) * line.tick_ns;
+        const auto ns = static_cast<std::uint64_t>(std::max<Tick>(tick - begin, 0)) * line.tick_ns;
         const bool changed = !at || tick > *at;
         const Reference plain = Reference::move(law, run_steps, line.shortest_delay);
         const Reference& now = changed ? run : plain;
@@ -180,6 +190,38 @@ TEST(LineOfAnAxis, EveryTickIsWhereTheLineIs) {
     if (!at && axis.end_tick() > start) RC_ASSERT(last_moved == axis.end_tick() - 1);
     RC_ASSERT(axis.steps_at(axis.over_tick()) == axis.planned_end_steps());
   });
+}
+
+// A line that goes on stands between two steps of a motor. Of 390 steps of the run it has made 120;
+// of 380 that the motor makes step 117 falls at s = 120.07 and step 118 at s = 121.09.
+TEST(LineOfAnAxis, FirstStepAfterAPauseIsNotLate) {
+  const TestTable table(test::ramp(), true);
+  const std::vector<tables::LinePart> parts = {{table.view(), 390}, {table.view(), 380}};
+  Axis axis(*table.view(), 2'500'000, BUSHD_FORMAT_FINE);
+  axis.start_line(0,
+                  {.table = std::make_shared<const tables::Envelope>(parts, 390),
+                   .blocks = std::make_shared<RunBlocks>(),
+                   .increment = 380,
+                   .longest = 390,
+                   .from = 120,
+                   .to = 390},
+                  10, 0);
+  std::vector<double> steps_ns;  // as an MCU makes them, evenly within a tick
+  std::int64_t told_256 = 0;
+  for (Tick tick = 8; steps_ns.size() < 2; ++tick) {
+    std::int16_t moved = 0;
+    axis.render(tick, 1, &moved, 1);
+    const std::int64_t next_256 = (told_256 / 256 + 1) * 256;
+    if (told_256 + moved >= next_256) {
+      const double part = static_cast<double>(next_256 - told_256) / moved;
+      steps_ns.push_back((static_cast<double>(tick) + part) * axis.tick_ns());
+    }
+    told_256 += moved;
+    ASSERT_LT(tick, 100);
+  }
+  // A tick's displacement is told to 1/256 step, of which each end may take that of the first code.
+  const std::uint16_t* codes = table.view()->accel.code;
+  EXPECT_GE(steps_ns[1] - steps_ns[0], codes[1] * 40'000.0 - codes[0] * 40'000.0 / 128);
 }
 
 // The delay that an MCU is told, from which it would ramp down by the motor's own table.

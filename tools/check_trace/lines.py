@@ -9,7 +9,9 @@ r = N / L, all rounded up,
     A(k) = max r A_i(floor(r k)),  D(k) = max r D_i(k) for r = 1, else r D_i(max(0, floor(r k) - 1)),  c = max r c_i.
 
 In ticks a motor's position is told in 1/256 step, rounded down; it ends on a whole step, which it does not go beyond, and before
-its first step it rises twice as fast, from 0. A run that a trigger has started begins "late_ns" after the beginning of its start tick. So the tick of the first step of a run is judged as a first tick.
+its first step it rises twice as fast, from 0. So the tick of a motor's first step is judged as a first tick. A run that a trigger has started begins
+"late_ns" after the beginning of its start tick. That of a line that goes on begins a tick late, if ticks are fine: in the first one motors are told what they
+stand from their whole steps.
 """
 
 from fractions import Fraction
@@ -165,6 +167,8 @@ class LineMove(Move):
         self._rests = [(-1, self._rest())]  # from which tick of the move on, where it will rest, in steps of the line
 
     def _planned(self, event):
+        if self.fine and self._from > 0 and event.get("moves", "stream") == "stream":
+            self.late_ns += self.tick_ns
         return Run(self.late_ns, self._envelope, event["line"]["to"] - self._from, event.get("shortest_delay", 0))
 
     def _made(self, s):
@@ -241,7 +245,7 @@ class LineMove(Move):
         return made, place if self.fine else 256 * made
 
     def _place(self, tick, before, after):
-        return LAST_TICK if after == self._count() else FIRST_TICK if before == 0 else INTERIOR
+        return LAST_TICK if after == self._count() else FIRST_TICK if self._first + before == 0 else INTERIOR
 
     def _in_mcu(self, n):
         """And how long a 256th of the run's step is there."""
