@@ -97,8 +97,8 @@ class Camac::Bushd2Station final : public Station {
 };
 
 Camac::Camac(Installation& installation, const Interlocks& interlocks, const OpenMoves& open_moves,
-             TablesInService& tables, Travels& travels, KeptPositions& kept, Outputs& outputs,
-             const AskCore& ask)
+             TablesInService& tables, Lines& lines, Travels& travels, KeptPositions& kept,
+             Outputs& outputs, const AskCore& ask)
     : kept_(kept), outputs_(outputs) {
   for (const config::Crate& configured : installation.config().crates) {
     Crate crate{.number = configured.number};
@@ -114,7 +114,7 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
       } else {
         station = std::make_unique<Bushd2Station>(kept_as, module.f_start_hz, name, module,
                                                   installation, interlocks, open_moves.precedence(),
-                                                  turn_, tables, outputs, ask);
+                                                  turn_, tables, lines, outputs, ask);
       }
       crate.crate.insert(module.station, station->module());
       crate.stations.push_back(std::move(station));

@@ -12,6 +12,7 @@
 #include "daemon/model/service.h"
 #include "daemon/services/camac_asker.h"
 #include "daemon/services/kept_positions.h"
+#include "daemon/services/lines.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
@@ -23,8 +24,8 @@ class Camac final : public Service {
  public:
   // `ask` is called from step() only.
   Camac(Installation& installation, const Interlocks& interlocks, const OpenMoves& open_moves,
-        TablesInService& tables, Travels& travels, KeptPositions& kept, Outputs& outputs,
-        const AskCore& ask);
+        TablesInService& tables, Lines& lines, Travels& travels, KeptPositions& kept,
+        Outputs& outputs, const AskCore& ask);
   ~Camac() override;
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request);

@@ -167,8 +167,10 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   const std::int64_t steps = motion_->program.steps;
   const std::vector<api::MotorAmount> motors{
       {motor.name(), motion_->program.left ? -steps : steps}};
-  if (by) return ask_(now_us, asker(), api::MoveLine{.motors = motors, .by = by});
-  ask_(now_us, asker(), api::Move{.motors = motors});
+  const api::Asker who = asker();
+  if (!by) return ask_(now_us, who, api::Move{.motors = motors});
+  lines_.lend(who, by);
+  ask_(now_us, who, api::MoveLine{.motors = motors});
 }
 
 // All but the last one, which comes with the result.

@@ -14,6 +14,7 @@
 #include "daemon/model/outputs.h"
 #include "daemon/model/precedence.h"
 #include "daemon/services/camac_asker.h"
+#include "daemon/services/lines.h"
 #include "daemon/services/tables_in_service.h"
 #include "heritage/camac/bushd2.h"
 
@@ -32,7 +33,7 @@ class CamacMotors final : public camac::Motors {
   // `name` is that of the module: "camac-1-5".
   CamacMotors(std::string name, const config::CamacModule& module, Installation& installation,
               const Interlocks& interlocks, const Precedence& precedence, const CamacTurn& turn,
-              TablesInService& tables, Outputs& outputs, AskCore ask)
+              TablesInService& tables, Lines& lines, Outputs& outputs, AskCore ask)
       : name_(std::move(name)),
         config_(module),
         installation_(installation),
@@ -40,6 +41,7 @@ class CamacMotors final : public camac::Motors {
         precedence_(precedence),
         turn_(turn),
         tables_(tables),
+        lines_(lines),
         outputs_(outputs),
         ask_(std::move(ask)),
         session_(std::make_shared<CamacSession>(name_)) {}
@@ -91,6 +93,7 @@ class CamacMotors final : public camac::Motors {
   const Precedence& precedence_;
   const CamacTurn& turn_;
   TablesInService& tables_;
+  Lines& lines_;
   Outputs& outputs_;
   AskCore ask_;
   std::shared_ptr<CamacSession> session_;

@@ -14,7 +14,23 @@
 
 namespace bushd::daemon {
 
+void Lines::lend(const api::Asker& asker, tables::TablePtr table) {
+  std::erase_if(lent_, [&](const Lent& lent) { return lent.asker.is_same_client(asker); });
+  lent_.push_back({.asker = asker, .table = std::move(table)});
+}
+
+tables::TablePtr Lines::take_lent(const api::Asker& asker) {
+  const auto lent = std::ranges::find_if(lent_, [&](const Lent& one) {
+    return one.asker.number == asker.number && one.asker.is_same_client(asker);
+  });
+  if (lent == lent_.end()) return {};
+  tables::TablePtr table = std::move(lent->table);
+  lent_.erase(lent);
+  return table;
+}
+
 void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request) {
+  const tables::TablePtr by = take_lent(asker);
   const auto motors = installation_.find(request.motors);
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   const bool moves = std::ranges::any_of(
@@ -26,7 +42,7 @@ void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
                                      " first, or wait for it"});
   }
   if (moves) return redirect(now_us, asker, *motors, request);
-  auto line = line_of(request);
+  auto line = line_of(request, by);
   if (!line) return asker.answer(api::Refused{line.error().text()});
   if (request.dry_run) return plan_only(now_us, asker, *line, *line->straight());
   start(now_us, asker, std::move(*line));

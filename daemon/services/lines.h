@@ -41,6 +41,10 @@ class Lines final : public Service {
         paths_(installation, interlocks, moves, open_moves) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::MoveLine& request);
+  // The line of one motor that is asked for next, by this client and with this number, goes by this
+  // table in place of the motor's own. Its MCU need not have it, and ramps the motor down by its
+  // own one when the link is lost; so no delay of the line may be shorter than any of that.
+  void lend(const api::Asker& asker, tables::TablePtr table);
   void request(const api::Asker& asker, const api::MovePath& request) {
     paths_.request(asker, request);
   }
@@ -70,9 +74,16 @@ class Lines final : public Service {
   void step(std::int64_t now_us) override;
 
  private:
-  Result<Line> line_of(const api::MoveLine& request) const;
+  struct Lent {
+    api::Asker asker;
+    tables::TablePtr table;
+  };
+  tables::TablePtr take_lent(const api::Asker& asker);  // null: none
+
+  Result<Line> line_of(const api::MoveLine& request, const tables::TablePtr& by = {}) const;
   Result<std::vector<Straight::Point>> points_of(const std::vector<MotorId>& motors,
-                                                 const api::MoveLine& request) const;
+                                                 const api::MoveLine& request,
+                                                 const tables::TablePtr& by = {}) const;
   // What a motor goes by: `by`, or where there is none its own table.
   tables::TablePtr table_of(MotorId motor, const tables::TablePtr& by) const;
   bushd_delay shortest_delay_by(const tables::TablePtr& by, MotorId motor,
@@ -146,6 +157,7 @@ class Lines final : public Service {
   DryRuns& dry_runs_;
   std::map<std::uint64_t, Line> lines_;
   ComingPaths paths_;
+  std::vector<Lent> lent_;  // at most one to a client
   std::uint64_t last_number_ = 0;
 };
 

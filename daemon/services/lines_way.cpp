@@ -8,16 +8,16 @@
 #include "daemon/services/lines.h"
 
 namespace bushd::daemon {
-Result<Line> Lines::line_of(const api::MoveLine& request) const {
+Result<Line> Lines::line_of(const api::MoveLine& request, const tables::TablePtr& by) const {
   Line line{.motors = *installation_.find(request.motors), .course = {}, .target = 0};
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   if (const auto may = may_be_one_line(installation_, line.motors); !may) return fail(may.error());
-  auto points = points_of(line.motors, request);
+  auto points = points_of(line.motors, request, by);
   if (!points) return fail(points.error());
   std::vector<std::int64_t> from;
   for (const MotorId motor : line.motors) from.push_back(installation_[motor].position_steps());
-  Straight straight{.points = std::move(*points), .way = {}, .by = request.by};
-  straight.way = lay(line.motors, request.by, from, straight.points.front());
+  Straight straight{.points = std::move(*points), .way = {}, .by = by};
+  straight.way = lay(line.motors, by, from, straight.points.front());
   line.target = straight.way.longest();
   if (auto fits = fits_duration(line, straight.way, request.duration_s); !fits) {
     return fail(fits.error());
@@ -29,7 +29,8 @@ Result<Line> Lines::line_of(const api::MoveLine& request) const {
 // The line itself is straight. A motor that should make a last approach for its backlash makes it
 // when all have arrived, and the others wait; one that is alone turns where it makes it from.
 Result<std::vector<Straight::Point>> Lines::points_of(const std::vector<MotorId>& motors,
-                                                      const api::MoveLine& request) const {
+                                                      const api::MoveLine& request,
+                                                      const tables::TablePtr& by) const {
   using Point = Straight::Point;
   Point to;
   Point back;
@@ -46,8 +47,8 @@ Result<std::vector<Straight::Point>> Lines::points_of(const std::vector<MotorId>
     if (!legs) return fail(motor.name() + ": " + legs.error().message);
     const motion::Leg& last = legs->back();
     const bool straight = legs->size() == 1;
-    const bushd_delay fast = shortest_delay_by(request.by, motors[i], *shortest_delay);
-    const bushd_delay slow = shortest_delay_by(request.by, motors[i], last.shortest_delay);
+    const bushd_delay fast = shortest_delay_by(by, motors[i], *shortest_delay);
+    const bushd_delay slow = shortest_delay_by(by, motors[i], last.shortest_delay);
     approach = approach || !straight;
     to.steps.push_back(target->whole);
     to.shortest_delays.push_back(straight ? slow : fast);

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "daemon/model/table_ref.h"
+
 namespace bushd::daemon {
 
 std::string_view word(OpenMoves::Purpose purpose) {
@@ -29,7 +31,7 @@ void OpenMoves::open(api::Asker asker, const std::vector<MotorId>& motors, Purpo
   Open open{.asker = std::move(asker), .purpose = purpose, .tables = {}};
   for (const MotorId motor : motors) {
     open.from_steps[motor] = installation_[motor].position_steps();
-    open.tables.push_back(api::ref_to(by ? *by : *installation_.table_of(motor)));
+    open.tables.push_back(ref_to(by ? *by : *installation_.table_of(motor)));
   }
   open_.emplace(book_.open(motors), std::move(open));
 }
@@ -119,7 +121,7 @@ api::MotorResult OpenMoves::result_of(MotorId id, api::Outcome outcome, std::int
           .dial = coordinates.dial_of(position_steps),
           .unit = coordinates.unit(),
           .precision = coordinates.precision(),
-          .table = api::ref_to(*installation_.table_of(id)),
+          .table = ref_to(*installation_.table_of(id)),
           .who = text_of(asker)};
 }
 

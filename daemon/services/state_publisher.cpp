@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/model/table_ref.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -206,7 +207,7 @@ api::Description StatePublisher::description_of(const Mcu& mcu) const {
     description.motors.push_back({.name = config.name,
                                   .output = config.output.value,
                                   .group = installation_.config().group_of(config).name,
-                                  .table = api::ref_to(*installation_.table_of(motor)),
+                                  .table = ref_to(*installation_.table_of(motor)),
                                   .text = config.description,
                                   .scale = std::move(scale),
                                   .soft_limits = installation_[motor].soft_limits()});

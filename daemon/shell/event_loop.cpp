@@ -285,9 +285,10 @@ void EventLoop::serve_tables(const api::Asker& asker, const api::Request& reques
   if (set == nullptr) return post_table_job(asker, request);
   // A table's sums are made there too, and its codes are looked at; the core knows whose it is.
   worker_.post([this, asker, request, set = *set]() -> Worker::Completion {
-    const auto review = tables::make(set.content).map([this](const tables::TablePtr& table) {
-      return TableReview(config_, table);
-    });
+    const auto review =
+        tables::make(set.content.content).map([this](const tables::TablePtr& table) {
+          return TableReview(config_, table);
+        });
     return [this, asker, request, name = set.table, review] {
       const auto good = review ? core_.tables().check_content(name, *review) : fail(review.error());
       if (good) return post_table_job(asker, request);

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "daemon/model/table_ref.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -13,7 +15,7 @@ api::TableEntry entry_of(const std::string& name, const Result<tables::TablePtr>
   }
   const bushd_table& view = (*table)->view();
   const double unit_s = view.time_unit_ns * 1e-9;
-  entry.table = api::ref_to(**table);
+  entry.table = ref_to(**table);
   entry.codes =
       static_cast<std::int32_t>(view.accel.count + ((*table)->symmetric() ? 0 : view.decel.count));
   entry.start_steps_per_s = 1 / (view.accel.code[0] * unit_s);
@@ -32,12 +34,15 @@ api::Reply list(const TableLibrary& library) {
 api::Reply get(const TableLibrary& library, const api::GetTable& request) {
   auto content = library.content(request.table);
   if (!content) return api::Refused{content.error().text()};
-  return api::Completed{.reason = request.table, .detail = std::move(*content)};
+  std::string hash = tables::check(*content) ? "" : tables::content_hash(*content);
+  return api::Completed{
+      .reason = request.table,
+      .detail = api::TableFile{.content = std::move(*content), .hash = std::move(hash)}};
 }
 
 api::Reply set(const TableLibrary& library, const api::SetTable& request, const std::string& by) {
   const auto revision =
-      library.set(request.table, request.content, request.expected_hash, "set by " + by);
+      library.set(request.table, request.content.content, request.expected_hash, "set by " + by);
   if (!revision) return api::Refused{revision.error().text()};
   return api::Completed{
       .reason = request.table + ": revision " + std::to_string(*revision),

@@ -12,7 +12,6 @@
 
 #include "api/words.h"
 #include "base/fields.h"
-#include "tables/table.h"
 
 namespace bushd::api {
 
@@ -89,10 +88,6 @@ struct MoveLine {
   bool dry_run = false;                // from rest only: result kDone with a MovePlan
   std::optional<Speed> speed{};        // no motor exceeds it; none: as fast as tables allow
   std::optional<double> duration_s{};  // not shorter than this; refused if it cannot be so slow
-  // What a motor that is alone moves by, in place of its own table; CAMAC modules tell it, and no
-  // front end does. Its MCU need not have it, and ramps the motor down by the own one when the link
-  // is lost; so no delay of this move may be shorter than any of that.
-  tables::TablePtr by = {};
 
   static constexpr std::size_t kMostMotors = 127;
 

@@ -60,11 +60,12 @@ std::size_t memory_of(const CamacResult& result) {
   return sizeof result + result.block.responses.capacity() * sizeof(camac::Response);
 }
 
-std::size_t memory_of(const tables::TableContent& content) {
+std::size_t memory_of(const TableFile& file) {
+  const words::TableContent& content = file.content;
   std::size_t codes = content.accel.capacity();
   if (content.decel) codes += content.decel->capacity();
-  return sizeof content + memory_of(content.name) + memory_of(content.description) +
-         codes * sizeof(std::uint16_t);
+  return sizeof file + memory_of(content.name) + memory_of(content.description) +
+         memory_of(file.hash) + codes * sizeof(std::uint16_t);
 }
 
 }  // namespace
@@ -82,10 +83,6 @@ Reply::Reply(Reply&&) noexcept = default;
 Reply& Reply::operator=(const Reply&) = default;
 Reply& Reply::operator=(Reply&&) noexcept = default;
 Reply::~Reply() = default;
-
-TableRef ref_to(const tables::Table& table) {
-  return {.name = table.name(), .revision = table.revision(), .hash = table.short_hash()};
-}
 
 std::size_t memory_of(const Reply& reply) {
   std::size_t bytes = sizeof reply;

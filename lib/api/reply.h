@@ -10,11 +10,11 @@
 #include <variant>
 #include <vector>
 
+#include "api/table_file.h"
 #include "api/words.h"
 #include "base/fields.h"
 #include "base/units/coordinates.h"
-#include "heritage/camac/naf.h"
-#include "tables/table.h"
+#include "words/camac.h"
 
 namespace bushd::api {
 
@@ -22,7 +22,8 @@ namespace bushd::api {
 struct TableRef {
   std::string name{};
   std::uint32_t revision = 0;  // counted by bushtab from 1; 0: the table's file tells none
-  std::string hash{};          // first 8 digits of the SHA-256 of what moves a motor
+  std::string hash{};          // first kHashLength digits of the SHA-256 of what moves a motor
+  static constexpr std::size_t kHashLength = 8;
   static void fields(auto& self, auto& visit) {
     visit("name", self.name);
     visit("revision", self.revision, fields::OrZero<std::int32_t>{INT32_MAX});
@@ -30,7 +31,6 @@ struct TableRef {
   }
   friend bool operator==(const TableRef&, const TableRef&) = default;
 };
-TableRef ref_to(const tables::Table& table);
 
 // A number of decimals.
 struct Decimals {
@@ -85,8 +85,8 @@ struct MotorResult {
       const auto place = static_cast<std::size_t>(places[i]);
       // Each motor gets a copy: of a long text that would be many times the message.
       const bool good = place < tables.size() &&
-                        tables[place].name.size() <= tables::kMaxNameLength &&
-                        tables[place].hash.size() <= tables::kShortHashLength;
+                        tables[place].name.size() <= words::TableContent::kMaxNameLength &&
+                        tables[place].hash.size() <= TableRef::kHashLength;
       visit.require(good);
       if (good) visit.set(motors[i].table, tables[place]);
     }
@@ -229,7 +229,7 @@ struct Refused {
 // table requests; a history; settings; of a crate. (Its copies are compiled once, not in every file
 // that has one. So are those of Reply and Request.)
 struct Detail : std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList,
-                             tables::TableContent, MotionHistory, Configuration, CamacResult> {
+                             TableFile, MotionHistory, Configuration, CamacResult> {
   using variant::variant;
   Detail();
   Detail(const Detail&);

@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "api/move_requests.h"
+#include "api/table_file.h"
 #include "api/words.h"
 #include "base/fields.h"
-#include "heritage/camac/naf.h"
-#include "tables/table.h"
+#include "words/camac.h"
 
 namespace bushd::api {
 
@@ -198,7 +198,7 @@ struct ListTables {
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };
 
-// Result: tables::TableContent as its file says.
+// Result: TableFile.
 struct GetTable {
   std::string table{};  // NAME, NAME@REVISION or NAME@TAG
 
@@ -210,7 +210,7 @@ struct GetTable {
 // content already stays as it is. Result: TableList with the one as it is now.
 struct SetTable {
   std::string table{};  // NAME
-  tables::TableContent content{};
+  TableFile content{};  // its hash does not matter
   // The hash of the table that this one was made from, as GetTable told it (its revision is in the
   // content); if the table is another by now it is left alone. "": the table is new.
   std::string expected_hash{};
@@ -346,7 +346,19 @@ struct Camac {
   static constexpr std::string_view kName = "camac";
   static void fields(auto& self, auto& visit) {
     visit("crate", self.crate);
-    camac::Block::fields(self.block, visit);
+    block_fields(self.block, visit);
+  }
+  static void block_fields(auto& block, auto& visit) {
+    constexpr fields::As<std::int8_t> kByte{};
+    visit("mode", block.mode, fields::OneOf<4>{});
+    visit("count", block.count);
+    visit("last_station", block.last_station);
+    visit("last_subaddress", block.last_subaddress);
+    visit.columns("cycle_count", block.cycles,
+                  fields::Column{"stations", &camac::Naf::station, kByte},
+                  fields::Column{"subaddresses", &camac::Naf::subaddress, kByte},
+                  fields::Column{"functions", &camac::Naf::function, kByte},
+                  fields::Column{"data", &camac::Naf::data});
   }
 };
 

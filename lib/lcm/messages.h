@@ -78,7 +78,7 @@ struct Answer {
 struct TableAnswer {
   ReplyHeader reply;
   std::vector<api::TableEntry> entries{};
-  std::vector<tables::TableContent> tables{};  // one or none
+  std::vector<api::TableFile> tables{};  // one or none
   static void fields(auto& self, auto& visit) {
     visit("reply", self.reply);
     visit.list("entry_count", "entries", self.entries);

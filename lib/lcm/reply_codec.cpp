@@ -149,8 +149,8 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
             return in_parts("TABLE_REPLY", list,
                             [&](const auto& piece) { return TableAnswer{begin, piece.entries}; });
           },
-          [&](const tables::TableContent& content) {
-            return whole("TABLE_REPLY", TableAnswer{begin, {}, {content}});
+          [&](const api::TableFile& table) {
+            return whole("TABLE_REPLY", TableAnswer{begin, {}, {table}});
           },
           [&](const api::MotionHistory& history) {
             return in_parts("HISTORY_REPLY", history, with);

@@ -107,10 +107,6 @@ std::optional<ContentFault> check(const TableContent& content) {
   return std::nullopt;
 }
 
-std::string TableContent::hash_told(const TableContent& content) {
-  return check(content) ? std::string{} : tables::content_hash(content);
-}
-
 std::string content_hash(const TableContent& content) {
   struct Free {
     void operator()(GChecksum* checksum) const { g_checksum_free(checksum); }

@@ -8,52 +8,19 @@
 #include <string>
 #include <vector>
 
-#include "base/fields.h"
 #include "base/result.h"
 #include "engine/table.h"
+#include "words/table_content.h"
 
 namespace bushd::tables {
 
 // An MCU addresses the codes of a table, both sides together, by 16 bits.
 inline constexpr std::size_t kMaxCodes = 65535;
-// One second: above it nothing can be told apart any more, and the engine's sums of two rests fit
-// 32 bits.
-inline constexpr std::uint32_t kMaxTimeUnitNs = 1'000'000'000;
-inline constexpr std::size_t kMaxNameLength = 63;
 inline constexpr std::int64_t kMaxRevision = 2147483647;
 
-// What a table file holds, in the file's order.
-struct TableContent {
-  std::string name{};
-  std::uint32_t time_unit_ns = 0;
-  std::vector<std::uint16_t> accel{};                 // slow to fast
-  std::optional<std::vector<std::uint16_t>> decel{};  // fast to slow; none: accel reversed
-  std::optional<std::uint16_t> cruise{};              // none: the last of accel
-  std::string description{};
-  std::uint32_t revision = 0;  // counted by bushtab from 1; 0: none
-  // What no file can say becomes 0, which check() names. (How fields are declared: base/fields.h.)
-  static void fields(auto& self, auto& visit) {
-    constexpr fields::OrZero<std::int32_t> kCode{65535};
-    std::uint16_t cruise_code = self.cruise.value_or(0);
-    std::int32_t cruise_told = cruise_code;
-    std::vector<std::uint16_t> decel_codes = self.decel.value_or(std::vector<std::uint16_t>{});
-    std::string hash = hash_told(self);
-    visit("name", self.name);
-    visit("description", self.description);
-    visit("revision", self.revision, fields::OrZero<std::int32_t>{INT32_MAX});
-    visit("hash", hash);
-    visit("time_unit_ns", self.time_unit_ns, fields::OrZero<std::int64_t>{kMaxTimeUnitNs});
-    visit("cruise", cruise_told);
-    visit.list("accel_count", "accel", self.accel, kCode);
-    visit.list("decel_count", "decel", decel_codes, kCode);
-    kCode.taken(cruise_told, cruise_code);
-    visit.set(self.cruise, cruise_told == 0 ? std::optional<std::uint16_t>{} : cruise_code);
-    visit.set(self.decel, decel_codes.empty() ? std::optional<std::vector<std::uint16_t>>{}
-                                              : std::optional(std::move(decel_codes)));
-  }
-  static std::string hash_told(const TableContent& content);  // "" where it is no table
-  friend bool operator==(const TableContent&, const TableContent&) = default;
-};
+using words::TableContent;
+inline constexpr std::uint32_t kMaxTimeUnitNs = TableContent::kMaxTimeUnitNs;
+inline constexpr std::size_t kMaxNameLength = TableContent::kMaxNameLength;
 
 // SHA-256, as 64 hexadecimal digits, of what moves a motor: time unit, both sides and cruise delay,
 // whether written or implied. Name, description and revision do not count.

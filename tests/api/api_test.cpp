@@ -140,7 +140,7 @@ TEST(Reply, MemoryGrowsWithWhatItHolds) {
   motors.detail = std::vector<MotorResult>(100);
   EXPECT_GE(memory_of(motors), small + 100 * sizeof(MotorResult));
   Completed table{};
-  table.detail = tables::TableContent{.accel = std::vector<std::uint16_t>(30000)};
+  table.detail = TableFile{.content = {.accel = std::vector<std::uint16_t>(30000)}};
   EXPECT_GE(memory_of(table), 60000u);
 }
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "api/snapshot.h"
-#include "heritage/camac/naf.h"
 #include "sim/edge.h"
+#include "words/camac.h"
 
 namespace bushfaults {
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "config/config.h"
-#include "heritage/camac/naf.h"
 #include "request.h"
 #include "sim/random.h"
+#include "words/camac.h"
 
 namespace bushfaults {
 

@@ -13,9 +13,9 @@
 
 #include "api/snapshot.h"
 #include "config/config.h"
-#include "heritage/camac/naf.h"
 #include "module_registers.h"
 #include "sim/edge.h"
+#include "words/camac.h"
 
 namespace bushfaults {
 

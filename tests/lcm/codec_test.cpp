@@ -194,17 +194,17 @@ TEST(Codec, OtherRequestsDoToo) {
   EXPECT_EQ(request_over_the_wire(api::GetTable{"own"}).table, "own");
   const auto set = request_over_the_wire(
       api::SetTable{.table = "own",
-                    .content = {.name = "own",
-                                .time_unit_ns = 4000,
-                                .accel = {2500, 1200},
-                                .decel = std::vector<std::uint16_t>{1200, 2500},
-                                .cruise = std::uint16_t{900},
-                                .revision = 2},
+                    .content = {{.name = "own",
+                                 .time_unit_ns = 4000,
+                                 .accel = {2500, 1200},
+                                 .decel = std::vector<std::uint16_t>{1200, 2500},
+                                 .cruise = std::uint16_t{900},
+                                 .revision = 2}},
                     .expected_hash = "abc"});
   EXPECT_EQ(set.expected_hash, "abc");
-  EXPECT_EQ(set.content.accel, (std::vector<std::uint16_t>{2500, 1200}));
-  EXPECT_EQ(set.content.cruise, 900);
-  EXPECT_EQ(set.content.revision, 2u);
+  EXPECT_EQ(set.content.content.accel, (std::vector<std::uint16_t>{2500, 1200}));
+  EXPECT_EQ(set.content.content.cruise, 900);
+  EXPECT_EQ(set.content.content.revision, 2u);
 }
 
 TEST(Codec, HelloSubscriptionAndStatusArrive) {
@@ -323,10 +323,11 @@ TEST(Codec, PlansAndTablesDoToo) {
   EXPECT_EQ(configured.path, configuration.path);
   EXPECT_EQ(configured.sha256, configuration.sha256);
   EXPECT_EQ(configured.settings, configuration.settings);
-  const tables::TableContent own{.name = "own", .time_unit_ns = 4000, .accel = {2500, 1200}};
+  const api::TableFile own{.content = {.name = "own", .time_unit_ns = 4000, .accel = {2500, 1200}},
+                           .hash = "abc"};
   const auto content = std::get<api::Completed>(
       reply_over_the_wire(api::Completed{.reason = "r", .detail = own}).reply);
-  EXPECT_EQ(std::get<tables::TableContent>(content.detail), own);
+  EXPECT_EQ(std::get<api::TableFile>(content.detail), own);
 }
 
 // Decodes the parts of a reply in this order of their indices, and puts them together.

@@ -202,19 +202,20 @@ TEST(FieldNames, OtherRequests) {
   EXPECT_EQ(cycles.last_subaddress, 11);
 }
 
-const tables::TableContent kTable{.name = "own",
-                                  .time_unit_ns = 4000,
-                                  .accel = {2500, 1200},
-                                  .decel = std::vector<std::uint16_t>{1300, 2600},
-                                  .cruise = std::uint16_t{900},
-                                  .description = "d",
-                                  .revision = 2};
+const api::TableFile kTable{.content = {.name = "own",
+                                        .time_unit_ns = 4000,
+                                        .accel = {2500, 1200},
+                                        .decel = std::vector<std::uint16_t>{1300, 2600},
+                                        .cruise = std::uint16_t{900},
+                                        .description = "d",
+                                        .revision = 2},
+                            .hash = "abc"};
 
 void expect_table(const table_t& table) {
   EXPECT_EQ(table.name, "own");
   EXPECT_EQ(table.description, "d");
   EXPECT_EQ(table.revision, 2);
-  EXPECT_EQ(table.hash, tables::content_hash(kTable));
+  EXPECT_EQ(table.hash, "abc");
   EXPECT_EQ(table.time_unit_ns, 4000);
   EXPECT_EQ(table.cruise, 900);
   EXPECT_EQ(table.accel, (std::vector<std::int32_t>{2500, 1200}));

@@ -14,6 +14,14 @@
 namespace bushd::test {
 namespace {
 
+using tables::check;
+using tables::content_hash;
+using tables::greatest_shortfall;
+using tables::resample_codes;
+using tables::resample_unit;
+using tables::reverse;
+using tables::scale_acceleration;
+using tables::scale_speed;
 using tables::SideKey;
 using tables::TableContent;
 using testing::ElementsAre;

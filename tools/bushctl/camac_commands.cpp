@@ -205,9 +205,9 @@ Result<std::vector<std::uint32_t>> codes_of(Client& client, const std::string& n
   if (const auto* none = std::get_if<api::Refused>(&*reply)) return fail(none->reason);
   const auto* completed = std::get_if<api::Completed>(&*reply);
   const auto* table =
-      completed == nullptr ? nullptr : std::get_if<bushd::tables::TableContent>(&completed->detail);
+      completed == nullptr ? nullptr : std::get_if<api::TableFile>(&completed->detail);
   if (table == nullptr) return fail("the daemon's answer brings no table");
-  auto codes = codes_of(*table);
+  auto codes = codes_of(table->content);
   if (!codes) return fail("table " + name + " " + codes.error().message);
   return codes;
 }

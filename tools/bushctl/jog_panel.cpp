@@ -16,6 +16,7 @@
 #include "named_motors.h"
 #include "progress.h"
 #include "render.h"
+#include "tables/table.h"
 
 namespace bushctl {
 namespace {
@@ -102,8 +103,9 @@ bool JogPanel::find_amounts(const api::MotorDescription& motor) {
     return false;
   }
   const auto* completed = std::get_if<api::Completed>(&*reply);
-  const auto* table =
-      completed == nullptr ? nullptr : std::get_if<bushd::tables::TableContent>(&completed->detail);
+  const auto* file =
+      completed == nullptr ? nullptr : std::get_if<api::TableFile>(&completed->detail);
+  const auto* table = file == nullptr ? nullptr : &file->content;
   if (table != nullptr && bushd::tables::check(*table)) table = nullptr;
   amounts_ = jog_amounts(table, motor.scale, options_.in_steps);
   if (options_.speed > 0) amounts_.speed = options_.speed;

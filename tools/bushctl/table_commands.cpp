@@ -11,6 +11,7 @@
 #include "commands.h"
 #include "grid.h"
 #include "render.h"
+#include "tables/table.h"
 
 namespace bushctl {
 namespace {
@@ -137,18 +138,19 @@ void print(const bushd::tables::TableContent& table) {
 
 int show_table(Client& client, const std::string& wanted, bool as_json) {
   int code = kDone;
-  const auto table = ask<bushd::tables::TableContent>(client, api::GetTable{wanted}, &code);
-  if (!table) return code;
+  const auto file = ask<api::TableFile>(client, api::GetTable{wanted}, &code);
+  if (!file) return code;
+  const bushd::tables::TableContent& table = file->content;
   // Computed here, so that it is what is shown that is hashed.
-  if (const auto fault = bushd::tables::check(*table)) {
+  if (const auto fault = bushd::tables::check(table)) {
     fmt::print(stderr, "bushctl: the daemon's answer brings no table: {}: {}\n",
                bushd::printable(fault->key), bushd::printable(fault->message));
     return kFailed;
   }
   if (as_json) {
-    print_json(*table);
+    print_json(table);
   } else {
-    print(*table);
+    print(table);
   }
   return kDone;
 }

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "heritage/camac/crate.h"
-#include "heritage/camac/naf.h"
+#include "words/camac.h"
 
 namespace bushd::camac {
 

@@ -1,22 +1,15 @@
 // What stands at a station of a CAMAC crate: it answers cycles and requests attention.
 //
 // One cycle is command N A F with up to 24 bits of data. Its answer is X, the command was accepted,
-// and Q, whose meaning depends on the function. Functions 0..7 read, 16..23 write, the others carry
-// no data. What a cycle changes is not seen in its own answer: Q and data are those before it.
+// and Q, whose meaning depends on the function. What a cycle changes is not seen in its own answer:
+// Q and data are those before it.
 #pragma once
 
 #include <cstdint>
 
-#include "heritage/camac/naf.h"
+#include "words/camac.h"
 
 namespace bushd::camac {
-
-constexpr bool reads(int function) {
-  return function >= 0 && function < 8;
-}
-constexpr bool writes(int function) {
-  return function >= 16 && function < 24;
-}
 
 // What a station sees of a cycle.
 struct Command {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "heritage/camac/module.h"
+#include "words/camac.h"
 
 namespace bushd::esone {
 namespace {

@@ -6,7 +6,7 @@
 #include <tl/expected.hpp>
 
 #include "api/reply.h"
-#include "heritage/camac/naf.h"
+#include "words/camac.h"
 
 namespace bushd::esone {
 

@@ -288,7 +288,7 @@ Result<TableContent> make_content(const Spec& spec) {
     std::reverse(decel_codes->begin(), decel_codes->end());
     content.decel = std::move(*decel_codes);
   }
-  if (const auto fault = check(content)) {
+  if (const auto fault = tables::check(content)) {
     return fail(Error{.message = fault->message, .key = fault->key});
   }
   return content;

@@ -108,14 +108,5 @@ TEST(Block, ScanGoesFromSubaddressToStation) {
   EXPECT_EQ(transfer(0, crate, block).tally, 3U);
 }
 
-TEST(Block, WordsOfModes) {
-  EXPECT_EQ(word(BlockMode::kSingle), "single");
-  EXPECT_EQ(word(BlockMode::kRepeat), "repeat");
-  EXPECT_EQ(word(BlockMode::kQStop), "q-stop");
-  EXPECT_EQ(word(BlockMode::kScan), "scan");
-  EXPECT_EQ(block_mode_of("q-stop"), BlockMode::kQStop);
-  EXPECT_FALSE(block_mode_of("q"));
-}
-
 }  // namespace
 }  // namespace bushd::camac::block_test

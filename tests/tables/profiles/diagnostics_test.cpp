@@ -15,6 +15,7 @@
 namespace bushd::test {
 namespace {
 
+using tables::scale_acceleration;
 using tables::TableContent;
 using tables::profiles::Diagnostic;
 using tables::profiles::Limits;

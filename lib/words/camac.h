@@ -2,11 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string_view>
 #include <vector>
-
-#include "base/fields.h"
 
 namespace bushd::camac {
 
@@ -14,6 +10,14 @@ inline constexpr int kStations = 23;  // for modules, 1 .. 23
 inline constexpr int kLastSubaddress = 15;
 inline constexpr int kLastFunction = 31;
 inline constexpr std::uint32_t kDataMask = 0xFFFFFF;
+
+// The others carry no data.
+constexpr bool reads(int function) {
+  return function >= 0 && function < 8;
+}
+constexpr bool writes(int function) {
+  return function >= 16 && function < 24;
+}
 
 struct Naf {
   int station = 0;
@@ -37,10 +41,6 @@ enum class BlockMode {
   kScan     // one subaddress after the other, after one without Q the next station
 };
 
-// single, repeat, q-stop, scan
-std::string_view word(BlockMode mode);
-std::optional<BlockMode> block_mode_of(std::string_view word);
-
 struct Block {
   static constexpr int kMostTries = 100;
 
@@ -53,18 +53,6 @@ struct Block {
   // The last address of a kScan, inclusive.
   int last_station = kStations;
   int last_subaddress = kLastSubaddress;
-  static void fields(auto& self, auto& visit) {
-    constexpr bushd::fields::As<std::int8_t> kByte{};
-    visit("mode", self.mode, bushd::fields::OneOf<4>{});
-    visit("count", self.count);
-    visit("last_station", self.last_station);
-    visit("last_subaddress", self.last_subaddress);
-    visit.columns("cycle_count", self.cycles,
-                  bushd::fields::Column{"stations", &Naf::station, kByte},
-                  bushd::fields::Column{"subaddresses", &Naf::subaddress, kByte},
-                  bushd::fields::Column{"functions", &Naf::function, kByte},
-                  bushd::fields::Column{"data", &Naf::data});
-  }
   friend bool operator==(const Block&, const Block&) = default;
 };
 
