@@ -55,41 +55,18 @@ struct MotorResult {
   int legs = 1;                 // how many its motion had, as planned
   double most_steps_per_s = 0;  // not exceeded by any of them; 0 of what the MCU makes by itself
 
-  // All motors of a result. Each table is told once, and each motor has its place among them.
-  static void fields_of_all(auto& motors, auto& visit) {
-    std::vector<TableRef> tables;
-    std::vector<std::int16_t> places(motors.size());
-    for (std::size_t i = 0; i < motors.size(); ++i) {
-      const auto known = std::find(tables.begin(), tables.end(), motors[i].table);
-      places[i] = static_cast<std::int16_t>(known - tables.begin());
-      if (known == tables.end()) tables.push_back(motors[i].table);
-    }
-    const auto place_of = [&](auto& motor) -> std::int16_t& {
-      places.resize(motors.size());  // known by now, in a visitor that reads
-      return places[static_cast<std::size_t>(&motor - motors.data())];
-    };
-    visit.columns("motor_count", motors, fields::Column{"motors", &MotorResult::motor},
-                  fields::Column{"outcomes", &MotorResult::outcome, fields::Word{outcome_of}},
-                  fields::Column{"position_steps", &MotorResult::position_steps},
-                  fields::Column{"user_positions", &MotorResult::user},
-                  fields::Column{"dial_positions", &MotorResult::dial},
-                  fields::Column{"units", &MotorResult::unit},
-                  fields::Column{"precisions", &MotorResult::precision, Decimals{}},
-                  fields::Column{"table_of_motor", place_of},
-                  fields::Column{"asked_by", &MotorResult::who},
-                  fields::Column{"legs", &MotorResult::legs, fields::As<std::int8_t>{}},
-                  fields::Column{"most_steps_per_s", &MotorResult::most_steps_per_s});
-    visit.list("table_count", "tables", tables);
-    places.resize(motors.size());  // of a payload that ended before
-    for (std::size_t i = 0; i < motors.size(); ++i) {
-      const auto place = static_cast<std::size_t>(places[i]);
-      // Each motor gets a copy: of a long text that would be many times the message.
-      const bool good = place < tables.size() &&
-                        tables[place].name.size() <= words::TableContent::kMaxNameLength &&
-                        tables[place].hash.size() <= TableRef::kHashLength;
-      visit.require(good);
-      if (good) visit.set(motors[i].table, tables[place]);
-    }
+  static void fields(auto& self, auto& visit) {
+    visit("motor", self.motor);
+    visit("outcome", self.outcome, fields::Word{outcome_of});
+    visit("position_steps", self.position_steps);
+    visit("user_position", self.user);
+    visit("dial_position", self.dial);
+    visit("unit", self.unit);
+    visit("precision", self.precision, Decimals{});
+    visit("table", self.table);
+    visit("asked_by", self.who);
+    visit("legs", self.legs, fields::As<std::int8_t>{});
+    visit("most_steps_per_s", self.most_steps_per_s);
   }
 };
 
@@ -100,6 +77,12 @@ struct MovePlan {
     std::int64_t steps = 0;
     std::int64_t duration_us = 0;  // to its last step
     double peak_steps_per_s = 0;
+    static void fields(auto& self, auto& visit) {
+      visit("motor", self.motor);
+      visit("steps", self.steps);
+      visit("duration_us", self.duration_us);
+      visit("peak_steps_per_s", self.peak_steps_per_s);
+    }
   };
   // Frames of the motion alone: no polls, synchronisation and repeats.
   struct Traffic {
@@ -118,13 +101,11 @@ struct MovePlan {
     Traffic traffic = self.traffic.value_or(Traffic{.frames = -1, .bytes = -1});
     visit("duration_us", self.duration_us);
     visit("ticks", self.ticks);
-    visit("frames", traffic.frames);
-    visit("bytes", traffic.bytes);
+    const fields::If counted{self.traffic.has_value()};
+    visit("frames", traffic.frames, counted);
+    visit("bytes", traffic.bytes, counted);
     visit("limited_by", self.limited_by);
-    visit.columns("motor_count", self.motors, fields::Column{"motors", &Motor::motor},
-                  fields::Column{"steps", &Motor::steps},
-                  fields::Column{"motor_duration_us", &Motor::duration_us},
-                  fields::Column{"peak_steps_per_s", &Motor::peak_steps_per_s});
+    visit.list("motor_count", "motors", self.motors);
     visit.list("point_count", "points_us", self.points_us);
     visit.set(self.traffic, traffic.frames < 0 ? std::optional<Traffic>{} : traffic);
   }
@@ -189,6 +170,12 @@ struct MotorSetting {
   std::string key{};
   std::string value{};
   std::string in_file{};
+  static void fields(auto& self, auto& visit) {
+    visit("motor", self.motor);
+    visit("key", self.key);
+    visit("value", self.value);
+    visit("value_in_file", self.in_file);
+  }
   friend bool operator==(const MotorSetting&, const MotorSetting&) = default;
 };
 struct Configuration {
@@ -198,10 +185,7 @@ struct Configuration {
   static void fields(auto& self, auto& visit) {
     visit("path", self.path);
     visit("sha256", self.sha256);
-    visit.columns(
-        "setting_count", self.settings, fields::Column{"setting_motors", &MotorSetting::motor},
-        fields::Column{"keys", &MotorSetting::key}, fields::Column{"values", &MotorSetting::value},
-        fields::Column{"values_in_file", &MotorSetting::in_file});
+    visit.list("setting_count", "settings", self.settings);
   }
 };
 
@@ -212,9 +196,7 @@ struct CamacResult {
   static void fields(auto& self, auto& visit) {
     visit("tally", self.block.tally);
     visit("requests", self.requests);
-    visit.columns("response_count", self.block.responses, fields::Column{"x", &camac::Response::x},
-                  fields::Column{"q", &camac::Response::q},
-                  fields::Column{"data", &camac::Response::data});
+    visit.list("response_count", "responses", self.block.responses);
   }
   friend bool operator==(const CamacResult&, const CamacResult&) = default;
 };

@@ -256,6 +256,11 @@ struct Configure {
     std::string motor{};
     std::string key{};
     std::string value{};
+    static void fields(auto& self, auto& visit) {
+      visit("motor", self.motor);
+      visit("key", self.key);
+      visit("value", self.value);
+    }
     friend bool operator==(const Change&, const Change&) = default;
   };
   Kind kind = Kind::kShow;
@@ -267,9 +272,7 @@ struct Configure {
   static void fields(auto& self, auto& visit) {
     visit("kind", self.kind, fields::OneOf<3>{});
     names_fields(self, visit);
-    visit.columns("change_count", self.changes, fields::Column{"change_motors", &Change::motor},
-                  fields::Column{"change_keys", &Change::key},
-                  fields::Column{"change_values", &Change::value});
+    visit.list("change_count", "changes", self.changes);
     visit("file_sha256", self.file_sha256);
   }
 };
@@ -346,10 +349,9 @@ struct Camac {
   static constexpr std::string_view kName = "camac";
   static void fields(auto& self, auto& visit) {
     visit("crate", self.crate);
-    block_fields(self.block, visit);
+    camac::Block::fields(self.block, visit);
   }
-  static void block_fields(auto& block, auto& visit) {
-    constexpr fields::As<std::int8_t> kByte{};
+};
     visit("mode", block.mode, fields::OneOf<4>{});
     visit("count", block.count);
     visit("last_station", block.last_station);

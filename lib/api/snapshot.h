@@ -18,8 +18,10 @@
 
 namespace bushd::api {
 
-// Microseconds as seconds.
+// Microseconds as seconds, where they mean something.
 struct InSeconds {
+  bool meant;
+  bool nothing(std::int64_t /*us*/) const { return !meant; }
   static double told(std::int64_t us) { return static_cast<double>(us) * 1e-6; }
   // What hostile numbers make of it need only be some number.
   static bool taken(double told, std::int64_t& us) {
@@ -55,22 +57,19 @@ struct MotorState {
   struct Line {
     double fraction = 0;
     std::int64_t left_us = 0;
-    static void fields(auto& self, auto& visit) {
-      visit("line_fraction", self.fraction);
-      visit("line_left_s", self.left_us, InSeconds{});
-    }
     friend bool operator==(const Line&, const Line&) = default;
   };
   std::optional<Line> line{};
   static void fields(auto& self, auto& visit) {
+    const fields::If known{self.trust != Trust::kUnknown};
     bool on_line = self.line.has_value();
     Line line_now = self.line.value_or(Line{});
     visit("name", self.name);
-    visit("position_steps", self.position_steps);
-    visit("user_position", self.user);
-    visit("dial_position", self.dial);
-    visit("target_steps", self.target_steps);
-    visit("user_target", self.user_target);
+    visit("position_steps", self.position_steps, known);
+    visit("user_position", self.user, known);
+    visit("dial_position", self.dial, known);
+    visit("target_steps", self.target_steps, known);
+    visit("user_target", self.user_target, known);
     visit("velocity_steps_per_s", self.velocity_steps_per_s);
     visit("moving", self.moving);
     visit("activity", self.activity, fields::Word{activity_of});
@@ -85,7 +84,8 @@ struct MotorState {
     visit("held", self.held);
     visit("armed_by", self.armed_by);
     visit("on_line", on_line);
-    Line::fields(line_now, visit);
+    visit("line_fraction", line_now.fraction, fields::If{on_line});
+    visit("line_left_s", line_now.left_us, InSeconds{on_line});
     visit.set(self.line, on_line ? std::optional(line_now) : std::nullopt);
   }
   friend bool operator==(const MotorState&, const MotorState&) = default;
@@ -133,10 +133,11 @@ struct ToldScale {
     visit("offset", self.offset);
     visit("precision", self.precision);
     visit("soft_limits", self.soft_limits);
-    visit("dial_low", self.dial.low);
-    visit("dial_high", self.dial.high);
-    visit("user_low", self.user.low);
-    visit("user_high", self.user.high);
+    const fields::If limited{self.soft_limits};
+    visit("dial_low", self.dial.low, limited);
+    visit("dial_high", self.dial.high, limited);
+    visit("user_low", self.user.low, limited);
+    visit("user_high", self.user.high, limited);
   }
   bool is_good() const;
   units::Scale scale() const;  // of one that is not good: any
@@ -238,6 +239,10 @@ struct HealthSnapshot {
   struct Latency {
     std::int64_t below_us = 0;  // the last one is INT64_MAX
     std::uint64_t answers = 0;  // below this and not below the one before
+    static void fields(auto& self, auto& visit) {
+      visit("below_us", self.below_us, fields::If{self.below_us != INT64_MAX});
+      visit("answers", self.answers);
+    }
   };
   std::string bus{};
   std::string port_state{};  // "open", or why it is not
@@ -254,9 +259,7 @@ struct HealthSnapshot {
     visit("crc_errors", self.crc_errors);
     visit("stray_frames", self.stray_frames);
     visit("recent_latency_us", self.recent_latency_us);
-    visit.columns("latency_count", self.latency,
-                  fields::Column{"latency_below_us", &Latency::below_us},
-                  fields::Column{"latency_answers", &Latency::answers});
+    visit.list("latency_count", "latency", self.latency);
     visit.list("mcu_count", "mcus", self.mcus);
   }
 };

@@ -29,7 +29,7 @@ struct TableFile {
     visit("hash", self.hash);
     visit("time_unit_ns", content.time_unit_ns,
           fields::OrZero<std::int64_t>{words::TableContent::kMaxTimeUnitNs});
-    visit("cruise", cruise_told);
+    visit("cruise", cruise_told, fields::If{cruise_told != 0});
     visit.list("accel_count", "accel", content.accel, kCode);
     visit.list("decel_count", "decel", decel_codes, kCode);
     kCode.taken(cruise_told, cruise_code);

@@ -16,9 +16,6 @@
 //
 // visit.list(count, name, vector) or with a form: a vector, one element after the other.
 //
-// visit.columns(count, vector, Column{name, &Element::member}, ...): a vector of structs, one
-// member of all elements after the other.
-//
 // visit.set(member, value): does something in a visitor that reads only. For a member that is made
 // of several fields, which are visited as local variables before.
 //
@@ -28,8 +25,11 @@
 // every visitor; what is dear is done where Visitor::kReads only. Local variables begin as `self`
 // says, since a visitor that writes takes their values.
 //
+// lib/base/fields_json.h has the one that makes JSON.
+//
 // A form converts a member to another type and back. told(value) is what is told of it; taken(told,
-// value) puts it back, and returns false for what is not allowed. An unsigned number of 32 or 64
+// value) puts it back, and returns false for what is not allowed. nothing(value), if a form has it:
+// there is none, whatever is told in its place. An unsigned number of 32 or 64
 // bits without a form is told by the signed one of the same bits.
 #pragma once
 
@@ -50,6 +50,13 @@ struct Same {
     value = std::forward<T>(told);
     return true;
   }
+};
+
+// As it is, where it means something.
+struct If : Same {
+  bool meant;
+  constexpr explicit If(bool condition) : meant(condition) {}
+  bool nothing(const auto& /*value*/) const { return !meant; }
 };
 
 // An integer as one of another type; what does not fit means nothing.
@@ -79,6 +86,7 @@ struct OrZero {
 template <class Told>
 struct NoneIs {
   Told none;
+  static bool nothing(const auto& value) { return !value; }
   template <class T>
   Told told(const std::optional<T>& value) const {
     return value ? static_cast<Told>(*value) : none;
@@ -93,6 +101,7 @@ struct NoneIs {
 // The same of numbers that are not negative: any negative one is none, and -1 is told.
 template <class Told>
 struct NegativeIsNone {
+  static bool nothing(const auto& value) { return !value; }
   template <class T>
   static Told told(const std::optional<T>& value) {
     return value ? static_cast<Told>(*value) : Told{-1};
@@ -131,17 +140,5 @@ struct Word {
 };
 template <class Parse>
 Word(Parse) -> Word<Parse>;
-
-// A member of the elements of a vector, or what `get` makes of an element.
-template <class Get, class Form = Same>
-struct Column {
-  const char* name;
-  Get get;
-  Form form{};
-};
-template <class Get>
-Column(const char*, Get) -> Column<Get>;
-template <class Get, class Form>
-Column(const char*, Get, Form) -> Column<Get, Form>;
 
 }  // namespace bushd::fields

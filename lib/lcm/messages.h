@@ -64,7 +64,7 @@ struct Answer {
   std::vector<api::MovePlan> plan{};  // one or none
   static void fields(auto& self, auto& visit) {
     visit("reply", self.reply);
-    api::MotorResult::fields_of_all(self.motors, visit);
+    visit.list("motor_count", "motors", self.motors);
     visit.list("plan_count", "plan", self.plan);
   }
   api::Detail detail() && {

@@ -74,11 +74,6 @@ constexpr std::size_t least_bytes() {
 template <class Form, class T>
 using Told = std::decay_t<decltype(std::declval<const Form&>().told(std::declval<const T&>()))>;
 
-template <class Column, class Element>
-using ToldInColumn =
-    Told<decltype(Column::form),
-         std::decay_t<std::invoke_result_t<const decltype(Column::get)&, const Element&>>>;
-
 class Writer {
  public:
   static constexpr bool kReads = false;
@@ -93,10 +88,6 @@ class Writer {
     put(static_cast<std::int32_t>(list.size()));
     for (const auto& element : list) put(form.told(element));
   }
-  void columns(const char* /*count*/, const auto& list, const auto&... columns) {
-    put(static_cast<std::int32_t>(list.size()));
-    (put_column(list, columns), ...);
-  }
   static void set(const auto& /*member*/, const auto& /*value*/) {}
   static void require(bool /*condition*/) {}
 
@@ -104,9 +95,6 @@ class Writer {
   bool good() const { return good_; }
 
  private:
-  void put_column(const auto& list, const auto& column) {
-    for (const auto& element : list) put(column.form.told(std::invoke(column.get, element)));
-  }
   template <class T>
   void put(const T& value) {
     if constexpr (std::same_as<T, bool>) {
@@ -149,13 +137,6 @@ class Reader {
     list.clear();
     for (std::size_t i = 0; good_ && i < count; ++i) take(list.emplace_back(), form);
   }
-  template <class T, class... Column>
-  void columns(const char* /*count*/, std::vector<T>& list, const Column&... columns) {
-    const std::size_t count = get_count((least_bytes<ToldInColumn<Column, T>>() + ...));
-    list.clear();
-    list.resize(count);
-    (take_column(list, columns), ...);
-  }
   void set(auto& member, auto value) { member = std::move(value); }
   void require(bool condition) {
     if (!condition) fail_here();
@@ -174,12 +155,6 @@ class Reader {
     Told<Form, T> told{};
     get(told);
     if (good_ && !form.taken(std::move(told), value)) fail_here();
-  }
-  void take_column(auto& list, const auto& column) {
-    for (auto& element : list) {
-      if (!good_) return;
-      take(std::invoke(column.get, element), column.form);
-    }
   }
   // So many elements of so many bytes at least may be left. A negative count is far too large.
   std::size_t get_count(std::size_t least_bytes) {
@@ -252,11 +227,6 @@ class Fingerprint {
             const Form& /*form*/ = {}) {
     counted_by(count);
     array<Told<Form, T>>(count, name);
-  }
-  template <class T, class... Column>
-  void columns(const char* count, const std::vector<T>& /*list*/, const Column&... columns) {
-    counted_by(count);
-    (array<ToldInColumn<Column, T>>(count, columns.name), ...);
   }
   static void set(const auto& /*member*/, const auto& /*value*/) {}
   static void require(bool /*condition*/) {}

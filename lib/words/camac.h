@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/fields.h"
+
 namespace bushd::camac {
 
 inline constexpr int kStations = 23;  // for modules, 1 .. 23
@@ -24,6 +26,13 @@ struct Naf {
   int subaddress = 0;
   int function = 0;
   std::uint32_t data = 0;  // W; of functions that write
+  static void fields(auto& self, auto& visit) {
+    constexpr bushd::fields::As<std::int8_t> kByte{};
+    visit("station", self.station, kByte);
+    visit("subaddress", self.subaddress, kByte);
+    visit("function", self.function, kByte);
+    visit("data", self.data);
+  }
   friend bool operator==(const Naf&, const Naf&) = default;
 };
 
@@ -31,6 +40,11 @@ struct Response {
   bool x = false;
   bool q = false;
   std::uint32_t data = 0;  // R; 0 of functions that do not read
+  static void fields(auto& self, auto& visit) {
+    visit("x", self.x);
+    visit("q", self.q);
+    visit("data", self.data);
+  }
   friend bool operator==(const Response&, const Response&) = default;
 };
 
@@ -53,6 +67,13 @@ struct Block {
   // The last address of a kScan, inclusive.
   int last_station = kStations;
   int last_subaddress = kLastSubaddress;
+  static void fields(auto& self, auto& visit) {
+    visit("mode", self.mode, bushd::fields::OneOf<4>{});
+    visit("count", self.count);
+    visit("last_station", self.last_station);
+    visit("last_subaddress", self.last_subaddress);
+    visit.list("cycle_count", "cycles", self.cycles);
+  }
   friend bool operator==(const Block&, const Block&) = default;
 };
 

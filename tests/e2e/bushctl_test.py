@@ -183,8 +183,6 @@ class Bushctl(EndToEndTest):
             "mcu": "hall:2",
             "output": 3,
             "group": "group3",
-            "table": "bushd2-resonance",
-            "table_revision": 0,
             "position_steps": -12,
             "target_steps": -12,
             "velocity_steps_per_s": 0,
@@ -193,10 +191,11 @@ class Bushctl(EndToEndTest):
             "trust": "known",
         }
         self.assertEqual({key: motor[key] for key in expected}, expected)
+        self.assertEqual((motor["table"]["name"], motor["table"]["revision"]), ("bushd2-resonance", 0))
         self.assertEqual([mcu["mcu"] for mcu in status["mcus"]], ["hall:1", "hall:2"])
         for mcu in status["mcus"]:
             self.assertEqual(mcu["state"], "READY")
-            self.assertGreater(mcu["boot"], 0)
+            self.assertGreater(mcu["boot_number"], 0)
 
     def test_status_of_a_motor_under_way(self):
         self.bring_up()
@@ -270,7 +269,7 @@ class Bushctl(EndToEndTest):
         path = pathlib.Path(self.file("path.csv"))
         path.write_text("\ufeffa0,a1\n" + rows)
         self.assertGreater(path.stat().st_size, 2 << 20)
-        self.assertEqual(json.loads(self.command("path", "run", "--dry-run", "--json", path).stdout)["motors"][0]["name"], "a0")
+        self.assertEqual(json.loads(self.command("path", "run", "--dry-run", "--json", path).stdout)["motors"][0]["motor"], "a0")
         path.write_text("a0,a1\n" + "1" * 400 + "x,2\n")
         self.assertLess(len(self.bushctl("path", "run", path).stderr), 200)
 

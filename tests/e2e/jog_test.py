@@ -170,8 +170,8 @@ class Keys(EndToEndTest):
     def test_begins_slowly_by_the_table(self):
         panel = self.open()
         tables = json.loads(self.command("table", "list", "--json").stdout)["tables"]
-        name = self.motors()["a0"]["table"]
-        start = next(table["start_steps_per_s"] for table in tables if table["table"] == name)
+        name = self.motors()["a0"]["table"]["name"]
+        start = next(table["start_steps_per_s"] for table in tables if table["name"] == name)
         panel.wait_for(f"speed {start:.4g} steps/s, step 10")
         panel.send("+")
         panel.wait_for(f"speed {2 * start:.4g} steps/s, step 10")

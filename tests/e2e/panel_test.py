@@ -96,7 +96,7 @@ class Panel(EndToEndTest):
         self.assertEqual([level for _, level in levels], [0, 1, 0])
         edges = self.traced()["a0"]
         self.assertEqual(stands["position_steps"], len(edges))
-        self.assert_ran_down_by_table(edges, stands["table"])
+        self.assert_ran_down_by_table(edges, stands["table"]["name"])
         # The ramp from then on, once the running step is over, which takes less than a tick at cruise.
         ramp_ns = sum(delays_before_end_us("bushd2-constant")) * 1000
         self.assertLessEqual(edges[-1].time_ns, levels[1][0] + ACTS_WITHIN_NS + TICK_NS + ramp_ns)
@@ -151,9 +151,9 @@ class Panel(EndToEndTest):
         """From the falling edge of EN to the next rising one, in ns."""
         self.bring_up_with(f'enable_after_reset = "{enable_after_reset}"')
         self.assertTrue(self.motors()["a0"]["enabled"])
-        before = self.status()["mcus"][0]["boot"]
+        before = self.status()["mcus"][0]["boot_number"]
         self.press(key)
-        self.wait_until("the MCU to boot again", lambda: self.status()["mcus"][0]["boot"] not in (0, before))
+        self.wait_until("the MCU to boot again", lambda: self.status()["mcus"][0]["boot_number"] not in (0, before))
         self.wait_until("the cause to be told", lambda: self.reset_cause() == ("watchdog" if key == "W" else "external"))
         if enable_after_reset == "no":
             self.wait_until_said("drivers disabled")

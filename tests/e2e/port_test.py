@@ -37,7 +37,7 @@ class Port(EndToEndTest):
 
     def test_lost_in_motion_and_back_with_mcus_that_booted_again(self):
         self.bring_up()
-        before = {mcu["mcu"]: mcu["boot"] for mcu in self.status()["mcus"]}
+        before = {mcu["mcu"]: mcu["boot_number"] for mcu in self.status()["mcus"]}
         move = self.start_move("a0", FAR, "b1", -FAR)
         self.wait_until_travelled(300, "a0", "b1")
         self.bushsim.end(signal.SIGKILL)  # takes the port with it
@@ -53,7 +53,7 @@ class Port(EndToEndTest):
         self.wait_until_ready()
         status = self.status()
         for mcu in status["mcus"]:
-            self.assertNotEqual(mcu["boot"], before[mcu["mcu"]])
+            self.assertNotEqual(mcu["boot_number"], before[mcu["mcu"]])
         self.assertEqual({motor["trust"] for motor in status["motors"]}, {"uncertain"})
         refused = self.bushctl("move", "a0", "5")
         self.assertEqual(refused.returncode, 1)
@@ -70,7 +70,7 @@ class Port(EndToEndTest):
     def check_unplugged(self, bus_lines=(), port="port", links=("port",)):
         self.bring_up(bus_lines=bus_lines, port=port, links=links)
         self.survey()
-        before = [mcu["boot"] for mcu in self.status()["mcus"]]
+        before = [mcu["boot_number"] for mcu in self.status()["mcus"]]
         move = self.start_outward()
         self.bushsim.send(signal.SIGUSR1)
         self.assertEqual(move.process.wait(), 1)
@@ -95,7 +95,7 @@ class Port(EndToEndTest):
             self.assertEqual(corrected[name]["position_steps"], found[name])
             self.assertIn(f"{name}: stands at {found[name]}, not at", self.bushd.said())
         self.assertIn(f"port {self.file(links[-1])} opened", self.bushd.said())
-        self.assertEqual([mcu["boot"] for mcu in self.status()["mcus"]], before)
+        self.assertEqual([mcu["boot_number"] for mcu in self.status()["mcus"]], before)
         self.assert_way_back_shows_no_step_lost()
 
     def test_unplugged_in_motion_the_motors_stand_where_the_mcus_counted(self):

@@ -283,8 +283,8 @@ class EndToEndTest(unittest.TestCase):
             self.assertEqual(len(back), len(out), name)
             if name in OUTWARD:
                 self.assertGreater(len(out), 600)
-                self.assert_ran_down_by_table(out, motor["table"])
-                self.assert_ran_down_by_table(back, motor["table"])
+                self.assert_ran_down_by_table(out, motor["table"]["name"])
+                self.assert_ran_down_by_table(back, motor["table"]["name"])
         self.assert_one_result_each(moves)
 
     def assert_ran_down_by_table(self, edges, table):

@@ -22,12 +22,12 @@ class Tables(EndToEndTest):
         self.bring_up(bus_lines=bus_lines)
 
     def table_of(self, motor):
-        state = self.motors()[motor]
-        return state["table"], state["table_revision"]
+        table = self.motors()[motor]["table"]
+        return table["name"], table["revision"]
 
     def check_use_while_a_move_runs(self, bus_lines=()):
         self.bring_up_with_tables(bus_lines)
-        before = self.motors()["a0"]
+        before = self.motors()["a0"]["table"]
         move = self.start_move("a0", 4000)
         self.wait_until_travelled(600, "a0")
         use = self.start_bushctl("table", "use", "group0", "own@1")
@@ -37,13 +37,13 @@ class Tables(EndToEndTest):
         self.assertEqual(refused.returncode, 1)
         self.assertIn("about to get another table, for group group0", refused.stderr)
         self.assertEqual(move.process.wait(), 0, move.said())
-        self.assertIn(f"stands at 4000 by bushd2-constant ({before['table_hash']})", move.said())
+        self.assertIn(f"stands at 4000 by bushd2-constant ({before['hash']})", move.said())
         self.assertEqual(use.process.wait(), 0, use.said())
-        after = self.motors()["a0"]
-        self.assertEqual((after["table"], after["table_revision"]), ("own", 1))
-        self.assertNotEqual(after["table_hash"], before["table_hash"])
+        after = self.motors()["a0"]["table"]
+        self.assertEqual((after["name"], after["revision"]), ("own", 1))
+        self.assertNotEqual(after["hash"], before["hash"])
         ran = self.command("move", "--wait", "a0", "1000", "b0", "-900", "a1", "300")
-        self.assertIn(f"a0: reached, stands at 5000 by own@1 ({after['table_hash']})", ran.stdout)
+        self.assertIn(f"a0: reached, stands at 5000 by own@1 ({after['hash']})", ran.stdout)
         self.assertRegex(ran.stdout, r"a1: reached, stands at 300 by bushd2-scurve \(")
 
         # A tag is a revision, too; without any it is the newest.
@@ -118,15 +118,16 @@ class Tables(EndToEndTest):
         self.command("table", "use", "group0", "own@1")
         listed = json.loads(self.command("table", "list", "--json").stdout)
         self.assertEqual([entry["group"] for entry in listed["groups"]], [f"group{i}" for i in range(4)])
-        self.assertEqual((listed["groups"][0]["table"], listed["groups"][0]["revision"]), ("own", 1))
-        own = next(entry for entry in listed["tables"] if entry["table"] == "own")
-        self.assertEqual((own["revision"], round(own["max_steps_per_s"], -2)), (2, 2400))
+        used = listed["groups"][0]["table"]
+        self.assertEqual((used["name"], used["revision"]), ("own", 1))
+        own = next(entry for entry in listed["tables"] if entry["name"] == "own")
+        self.assertEqual((own["table"]["revision"], round(own["max_steps_per_s"], -2)), (2, 2400))
         self.assertRegex(self.command("table", "list").stdout, r"group0 +own +1 +[0-9a-f]{8}\n")
         # What bushtab says of the same revision.
         for wanted in ("own", "own@1", "own@gentle"):
             shown = json.loads(self.command("table", "show", wanted, "--json").stdout)
             said = json.loads(self.bushtab("show", wanted, "--json").stdout)
-            self.assertEqual((shown["sha256"], shown["time_unit_ns"]), (said["sha256"], said["time_unit_ns"]))
+            self.assertEqual((shown["hash"], shown["time_unit_ns"]), (said["sha256"], said["time_unit_ns"]))
         self.assertIn("revision 2, SHA-256 ", self.command("table", "show", "own").stdout)
         refused = self.bushctl("table", "show", "own@9")
         self.assertEqual(refused.returncode, 1)

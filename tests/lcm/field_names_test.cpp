@@ -180,9 +180,9 @@ TEST(FieldNames, OtherRequests) {
                                                         .file_sha256 = "f"});
   EXPECT_EQ(change.kind, configure_t::SAVED);
   EXPECT_EQ(change.motors, Strings{"m"});
-  EXPECT_EQ(change.change_motors, Strings{"a"});
-  EXPECT_EQ(change.change_keys, Strings{"offset"});
-  EXPECT_EQ(change.change_values, Strings{"2"});
+  EXPECT_EQ(change.changes.at(0).motor, "a");
+  EXPECT_EQ(change.changes.at(0).key, "offset");
+  EXPECT_EQ(change.changes.at(0).value, "2");
   EXPECT_EQ(change.file_sha256, "f");
   const auto cycles = heard<camac_request_t>(
       api::Camac{.crate = 4,
@@ -193,10 +193,10 @@ TEST(FieldNames, OtherRequests) {
                            .last_subaddress = 11}});
   EXPECT_EQ(cycles.crate, 4);
   EXPECT_EQ(cycles.mode, camac_request_t::SCAN);
-  EXPECT_EQ(cycles.stations.at(0), 5);
-  EXPECT_EQ(cycles.subaddresses.at(0), 6);
-  EXPECT_EQ(cycles.functions.at(0), 7);
-  EXPECT_EQ(cycles.data.at(0), 8);
+  EXPECT_EQ(cycles.cycles.at(0).station, 5);
+  EXPECT_EQ(cycles.cycles.at(0).subaddress, 6);
+  EXPECT_EQ(cycles.cycles.at(0).function, 7);
+  EXPECT_EQ(cycles.cycles.at(0).data, 8);
   EXPECT_EQ(cycles.count, 9);
   EXPECT_EQ(cycles.last_station, 10);
   EXPECT_EQ(cycles.last_subaddress, 11);
@@ -262,17 +262,19 @@ TEST(FieldNames, ResultsAndPlans) {
                                                      .who = "w",
                                                      .legs = 2,
                                                      .most_steps_per_s = 7}});
-  EXPECT_EQ(answer.motors, (Strings{"a", "b"}));
-  EXPECT_EQ(answer.outcomes.at(1), "reached");
-  EXPECT_EQ(answer.position_steps.at(1), 3);
-  EXPECT_EQ(answer.user_positions.at(1), 4);
-  EXPECT_EQ(answer.dial_positions.at(1), 5);
-  EXPECT_EQ(answer.units.at(1), "mm");
-  EXPECT_EQ(answer.precisions.at(1), 6);
-  EXPECT_EQ(answer.tables.at(static_cast<std::size_t>(answer.table_of_motor.at(1))).name, "other");
-  EXPECT_EQ(answer.asked_by.at(1), "w");
-  EXPECT_EQ(answer.legs.at(1), 2);
-  EXPECT_EQ(answer.most_steps_per_s.at(1), 7);
+  EXPECT_EQ(answer.motors.at(0).motor, "a");
+  const motor_result_t& result = answer.motors.at(1);
+  EXPECT_EQ(result.motor, "b");
+  EXPECT_EQ(result.outcome, "reached");
+  EXPECT_EQ(result.position_steps, 3);
+  EXPECT_EQ(result.user_position, 4);
+  EXPECT_EQ(result.dial_position, 5);
+  EXPECT_EQ(result.unit, "mm");
+  EXPECT_EQ(result.precision, 6);
+  EXPECT_EQ(result.table.name, "other");
+  EXPECT_EQ(result.asked_by, "w");
+  EXPECT_EQ(result.legs, 2);
+  EXPECT_EQ(result.most_steps_per_s, 7);
   const auto planned = heard<answer_t>(
       api::MovePlan{.duration_us = 1,
                     .ticks = 2,
@@ -286,10 +288,10 @@ TEST(FieldNames, ResultsAndPlans) {
   EXPECT_EQ(plan.frames, 3);
   EXPECT_EQ(plan.bytes, 4);
   EXPECT_EQ(plan.limited_by, "l");
-  EXPECT_EQ(plan.motors, Strings{"a"});
-  EXPECT_EQ(plan.steps.at(0), 5);
-  EXPECT_EQ(plan.motor_duration_us.at(0), 6);
-  EXPECT_EQ(plan.peak_steps_per_s.at(0), 7);
+  EXPECT_EQ(plan.motors.at(0).motor, "a");
+  EXPECT_EQ(plan.motors.at(0).steps, 5);
+  EXPECT_EQ(plan.motors.at(0).duration_us, 6);
+  EXPECT_EQ(plan.motors.at(0).peak_steps_per_s, 7);
   EXPECT_EQ(plan.points_us, std::vector<std::int64_t>{8});
 }
 
@@ -319,17 +321,18 @@ TEST(FieldNames, OtherAnswers) {
       .settings = {{.motor = "a", .key = "offset", .value = "1", .in_file = "2"}}});
   EXPECT_EQ(configuration.path, "p");
   EXPECT_EQ(configuration.sha256, "s");
-  EXPECT_EQ(configuration.setting_motors, Strings{"a"});
-  EXPECT_EQ(configuration.keys, Strings{"offset"});
-  EXPECT_EQ(configuration.values, Strings{"1"});
-  EXPECT_EQ(configuration.values_in_file, Strings{"2"});
+  const motor_setting_t& setting = configuration.settings.at(0);
+  EXPECT_EQ(setting.motor, "a");
+  EXPECT_EQ(setting.key, "offset");
+  EXPECT_EQ(setting.value, "1");
+  EXPECT_EQ(setting.value_in_file, "2");
   const auto crate = heard<camac_reply_t>(api::CamacResult{
       .block = {.responses = {{.x = true, .q = false, .data = 6}}, .tally = 4}, .requests = 5});
   EXPECT_EQ(crate.tally, 4);
   EXPECT_EQ(crate.requests, 5);
-  EXPECT_EQ(crate.x.at(0), 1);
-  EXPECT_EQ(crate.q.at(0), 0);
-  EXPECT_EQ(crate.data.at(0), 6);
+  EXPECT_EQ(crate.responses.at(0).x, 1);
+  EXPECT_EQ(crate.responses.at(0).q, 0);
+  EXPECT_EQ(crate.responses.at(0).data, 6);
   const auto lam = test::as<camac_lam_t>(
       encode(1, api::CamacLam{.crate = 2, .raised = 3, .requests = 4, .demand = true})->payload);
   EXPECT_EQ(lam.utime_us, 1);
@@ -497,8 +500,8 @@ TEST(FieldNames, Health) {
   EXPECT_EQ(health.crc_errors, 6);
   EXPECT_EQ(health.stray_frames, 7);
   EXPECT_EQ(health.recent_latency_us, 8);
-  EXPECT_EQ(health.latency_below_us.at(0), 9);
-  EXPECT_EQ(health.latency_answers.at(0), 10);
+  EXPECT_EQ(health.latency.at(0).below_us, 9);
+  EXPECT_EQ(health.latency.at(0).answers, 10);
   const mcu_health_t& mcu = health.mcus.at(0);
   EXPECT_EQ(mcu.mcu, "m");
   EXPECT_EQ(mcu.address, 1);

@@ -44,11 +44,6 @@ class RandomFields {
     list.resize(below(random_, 4));
     for (T& element : list) take(element, form);
   }
-  template <class T>
-  void columns(const char* /*count*/, std::vector<T>& list, const auto&... columns) {
-    list.resize(below(random_, 4));
-    (take_column(list, columns), ...);
-  }
   void set(auto& member, auto value) { member = std::move(value); }
   void require(bool condition) { good = good && condition; }
 
@@ -56,9 +51,6 @@ class RandomFields {
   bool good = true;
 
  private:
-  void take_column(auto& list, const auto& column) {
-    for (auto& element : list) take(std::invoke(column.get, element), column.form);
-  }
   template <class T, class Form>
   void take(T& value, const Form& form) {
     lcm::wire::Told<Form, T> told{};
@@ -72,7 +64,7 @@ class RandomFields {
     } else if constexpr (std::is_same_v<T, double>) {
       value = static_cast<double>(static_cast<std::int32_t>(random_())) / 4096;
     } else if constexpr (std::is_same_v<T, std::int16_t>) {
-      value = static_cast<T>(below(random_, 3));  // outputs, and places in lists of at most 3
+      value = static_cast<T>(below(random_, 3));  // outputs
     } else if constexpr (std::is_integral_v<T>) {
       value = static_cast<T>(below(random_, 2) == 0 ? below(random_, 5) : random_());
     } else if constexpr (std::is_same_v<T, std::string>) {

@@ -199,25 +199,25 @@ class Arguments(unittest.TestCase):
         self.assertRegex(arguments.client_id("a@b"), rf"^a_b@.+-{os.getpid()}-[0-9a-f]{{8}}$")
 
     def test_settings_are_as_in_the_file(self):
-        changes = {"offset": 12.5, "direction": "negative", "soft_limits": (-5, 30.0)}
-        message = requests.change_configuration("m", changes).message
-        self.assertEqual(message.change_values, ["12.5", "negative", "[-5.0, 30.0]"])
-        self.assertEqual(requests.change_configuration("m", {"soft_limits": None}).message.change_values, ["none"])
-        message = requests.change_configuration("m", {"max_speed": 2.5}).message
-        self.assertEqual((message.change_keys, message.change_values), (["max_speed"], ["2.5"]))
-        message = requests.change_configuration("m", {"acceleration": 0.5}).message
-        self.assertEqual((message.change_keys, message.change_values), (["acceleration"], ["0.5"]))
-        message = requests.change_configuration("m", {"local": True, "keypad": False}).message
-        self.assertEqual(message.change_values, ["true", "false"])
-        changes = {"velocity": (100, 1500, 500), "currents": (1500, 1000, 300, "fast")}
-        message = requests.change_configuration("m", changes).message
-        self.assertEqual(message.change_values, ["100,1500,500", "1500,1000,300,fast"])
+        for changes, said in (
+            ({"offset": 12.5, "direction": "negative", "soft_limits": (-5, 30.0)},
+             [("offset", "12.5"), ("direction", "negative"), ("soft_limits", "[-5.0, 30.0]")]),
+            ({"soft_limits": None}, [("soft_limits", "none")]),
+            ({"max_speed": 2.5}, [("max_speed", "2.5")]),
+            ({"acceleration": 0.5}, [("acceleration", "0.5")]),
+            ({"local": True, "keypad": False}, [("local", "true"), ("keypad", "false")]),
+            ({"velocity": (100, 1500, 500), "currents": (1500, 1000, 300, "fast")},
+             [("velocity", "100,1500,500"), ("currents", "1500,1000,300,fast")]),
+        ):
+            message = requests.change_configuration("m", changes).message
+            self.assertEqual([(change.motor, change.key, change.value) for change in message.changes], [("m", *one) for one in said])
 
     def test_cycles_have_addresses_and_data(self):
         message = requests.camac([(5, 1, 16, 7), (5, 0, 0)], crate=2).message
         self.assertEqual((message.crate, message.count), (2, 2))
         self.assertEqual(messages.camac_request_t.decode(message.encode()).cycle_count, 2)
-        self.assertEqual((message.stations, message.subaddresses, message.functions, message.data), ([5, 5], [1, 0], [16, 0], [7, 0]))
+        cycles = [(cycle.station, cycle.subaddress, cycle.function, cycle.data) for cycle in message.cycles]
+        self.assertEqual(cycles, [(5, 1, 16, 7), (5, 0, 0, 0)])
         self.assertEqual((message.last_station, message.last_subaddress), (23, 15))
         self.assertEqual(requests.camac([(5, 0, 0)], mode="q-stop", count=4096).message.count, 4096)
         for wrong in ({"mode": "stop"}, {"cycles": [(5, 0)]}):

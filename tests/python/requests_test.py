@@ -85,7 +85,7 @@ def way(**values):
 MOVE = messages.move_t
 TABLE = Table(name="own", time_unit_ns=40_000, accel=(3, 2), hash="0a", revision=4)
 CAMAC = {"crate": 2, "mode": messages.camac_request_t.SINGLE, "count": 1, "last_station": 23, "last_subaddress": 15,
-         "stations": [5], "subaddresses": [1], "functions": [16], "data": [7]}
+         "cycles": [{"station": 5, "subaddress": 1, "function": 16, "data": 7}]}
 
 # (call, channel, what its message says)
 ASKED = [
@@ -118,7 +118,7 @@ ASKED = [
     (lambda c: c.config("m"), "CONFIGURE", {"kind": messages.configure_t.SHOW, "motors": ["m"]}),
     (lambda c: c.config(), "CONFIGURE", {"kind": messages.configure_t.SHOW}),
     (lambda c: c.config("m", local=True, max_speed=None), "CONFIGURE",
-     {"kind": messages.configure_t.CHANGE, "change_motors": ["m", "m"], "change_keys": ["local", "max_speed"], "change_values": ["true", "none"]}),
+     {"kind": messages.configure_t.CHANGE, "changes": [{"motor": "m", "key": "local", "value": "true"}, {"motor": "m", "key": "max_speed", "value": "none"}]}),
     (lambda c: c.history("m", 7), "GET_HISTORY", {"motor": "m", "most": 7}),
     (lambda c: c.camac([(5, 1, 16, 7)], crate=2), "CAMAC", CAMAC),
     (lambda c: c.tables.list(), "LIST_TABLES", {}),

@@ -32,21 +32,13 @@ def reply(request, phase, outcome="", reason="", part=0, parts=1, session=None):
 def answer(*arguments, motors=(), **named):
     message = messages.answer_t()
     message.reply = reply(*arguments, **named)
-    message.tables = [messages.table_ref_t()]
-    message.table_count = 1
-    message.motors = list(motors)
-    message.motor_count = len(motors)
-    for name in motors:
-        message.outcomes.append("reached")
-        message.position_steps.append(int(name[1:]))
-        message.user_positions.append(float(name[1:]))
-        message.dial_positions.append(0.0)
-        message.units.append("mm")
-        message.precisions.append(3)
-        message.table_of_motor.append(0)
-        message.asked_by.append("me")
-        message.legs.append(1)
-        message.most_steps_per_s.append(100.0)
+    message.motors = [
+        messages.motor_result_t(
+            motor=name, outcome="reached", position_steps=int(name[1:]), user_position=float(name[1:]), unit="mm", precision=3,
+            asked_by="me", legs=1, most_steps_per_s=100.0,
+        )
+        for name in motors
+    ]
     return message.encode()
 
 
@@ -380,7 +372,7 @@ class HostileBytes(unittest.TestCase):
         history.motions, history.motion_count = [messages.past_motion_t()], 1
         camac = messages.camac_reply_t()
         camac.reply = reply(request, RESULT, "done")
-        camac.x, camac.q, camac.data, camac.response_count = [True], [False], [7], 1
+        camac.responses, camac.response_count = [messages.camac_response_t(x=True, data=7)], 1
         health = messages.health_t()
         health.mcus, health.mcu_count, health.parts = [messages.mcu_health_t()], 1, 1
         described = messages.mcu_description_t()

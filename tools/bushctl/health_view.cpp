@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
+#include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "grid.h"
@@ -90,47 +91,6 @@ std::vector<std::string> mcu_lines(const Healths& health) {
   return grid.lines();
 }
 
-nlohmann::json mcu_json(const api::McuHealth& mcu) {
-  nlohmann::json out = {{"mcu", mcu.mcu},
-                        {"address", mcu.address},
-                        {"unique_id", mcu.unique_id},
-                        {"firmware_version", mcu.firmware_version},
-                        {"boot", mcu.boot},
-                        {"reset_cause", mcu.reset_cause},
-                        {"current", mcu.current},
-                        {"crc_errors", mcu.crc_errors},
-                        {"rejected_frames", mcu.rejected_frames},
-                        {"ramp_downs", mcu.ramp_downs},
-                        {"timeouts", mcu.timeouts},
-                        {"repeats", mcu.repeats},
-                        {"missed_ticks", mcu.missed_ticks},
-                        {"restarts", mcu.restarts},
-                        {"low_water_ticks", nullptr},
-                        {"rate_ppm", mcu.rate_ppm},
-                        {"clock_offset_us", mcu.clock_offset_us},
-                        {"two_masters", mcu.two_masters}};
-  if (mcu.low_water_ticks) out["low_water_ticks"] = *mcu.low_water_ticks;
-  return out;
-}
-
-nlohmann::json bus_json(const api::HealthSnapshot& bus) {
-  nlohmann::json out = {{"bus", bus.bus},
-                        {"port_state", bus.port_state},
-                        {"two_masters", bus.two_masters},
-                        {"crc_errors", bus.crc_errors},
-                        {"stray_frames", bus.stray_frames},
-                        {"recent_latency_us", bus.recent_latency_us},
-                        {"latency", nlohmann::json::array()},
-                        {"mcus", nlohmann::json::array()}};
-  for (const auto& column : bus.latency) {
-    nlohmann::json json = {{"below_us", nullptr}, {"answers", column.answers}};
-    if (column.below_us != INT64_MAX) json["below_us"] = column.below_us;
-    out["latency"].push_back(json);
-  }
-  for (const api::McuHealth& mcu : bus.mcus) out["mcus"].push_back(mcu_json(mcu));
-  return out;
-}
-
 }  // namespace
 
 std::vector<std::string> health_table(const bushd::client::Status& status) {
@@ -144,10 +104,10 @@ std::vector<std::string> health_table(const bushd::client::Status& status) {
 }
 
 std::string health_json(const bushd::client::Status& status) {
-  nlohmann::json out = {{"buses", nlohmann::json::array()},
-                        {"sequence", status.healths.front().part.sequence},
-                        {"utime_us", status.healths.front().part.utime_us}};
-  for (const api::HealthSnapshot& bus : healths_of(status)) out["buses"].push_back(bus_json(bus));
+  nlohmann::ordered_json out = {{"buses", nlohmann::json::array()},
+                                {"sequence", status.healths.front().part.sequence},
+                                {"utime_us", status.healths.front().part.utime_us}};
+  for (const auto& bus : healths_of(status)) out["buses"].push_back(bushd::json_of(bus));
   return bushd::json_text(out);
 }
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <variant>
 
+#include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "commands.h"
@@ -34,18 +35,8 @@ void add_confirm(CommandLine& commands) {
 }
 
 void print_json(const std::string& motor, const api::MotionHistory& history) {
-  ordered_json json = {{"motor", motor}, {"motions", ordered_json::array()}};
-  for (const api::PastMotion& motion : history.motions) {
-    json["motions"].push_back({{"utime_us", motion.utime_us},
-                               {"what", motion.what},
-                               {"who", motion.who},
-                               {"from_steps", motion.from_steps},
-                               {"to_steps", motion.to_steps},
-                               {"from", motion.from_text},
-                               {"to", motion.to_text},
-                               {"outcome", motion.outcome},
-                               {"reason", motion.reason}});
-  }
+  ordered_json json = bushd::json_of(history);
+  json["motor"] = motor;
   fmt::print("{}\n", bushd::json_text(json));
 }
 

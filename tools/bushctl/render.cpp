@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "grid.h"
@@ -23,48 +24,6 @@ using bushd::client::Status;
 constexpr const char* kRoom =
     "give datagrams more room ('sysctl net.core.rmem_max=4194304'), or use the control socket";
 
-// In steps or units; null where nothing is known.
-nlohmann::json position_json(const api::MotorState& motor, auto position) {
-  return has_position(motor) ? nlohmann::json(position) : nlohmann::json(nullptr);
-}
-
-nlohmann::json motor_json(const api::MotorState& motor, const std::string& mcu,
-                          const api::MotorDescription& description) {
-  const auto heard_utime_us =
-      motor.heard_utime_us ? nlohmann::json(*motor.heard_utime_us) : nullptr;
-  nlohmann::json on_line = nullptr;
-  if (motor.line) {
-    on_line = {{"fraction", motor.line->fraction}, {"left_us", motor.line->left_us}};
-  }
-  return {{"name", motor.name},
-          {"mcu", mcu},
-          {"output", description.output},
-          {"group", description.group},
-          {"table", description.table.name},
-          {"table_revision", description.table.revision},
-          {"table_hash", description.table.hash},
-          {"position_steps", position_json(motor, motor.position_steps)},
-          {"unit", description.scale.unit},
-          {"user", position_json(motor, motor.user)},
-          {"dial", position_json(motor, motor.dial)},
-          {"user_target", position_json(motor, motor.user_target)},
-          {"target_steps", position_json(motor, motor.target_steps)},
-          {"velocity_steps_per_s", motor.velocity_steps_per_s},
-          {"moving", motor.moving},
-          {"activity", word(motor.activity)},
-          {"enabled", motor.enabled},
-          {"input", motor.input},
-          {"inputs", motor.inputs},
-          {"inhibited", word(motor.inhibited)},
-          {"trust", word(motor.trust)},
-          {"paused", motor.paused},
-          {"held", motor.held},
-          {"armed_by", motor.armed_by},
-          {"line", on_line},
-          {"uncertain_reason", motor.uncertain_reason},
-          {"heard_utime_us", heard_utime_us}};
-}
-
 std::string user_position_text(const api::MotorResult& motor) {
   return position_text(motor.position_steps, motor.user,
                        {.unit = motor.unit, .steps_per_unit = {}, .decimals = motor.precision});
@@ -76,18 +35,14 @@ std::string position_text(const api::MotorResult& motor) {
   return fmt::format("{} ({} steps)", user, motor.position_steps);
 }
 
-nlohmann::json mcu_json(const api::StateSnapshot& mcu, const api::Description& description) {
-  return {{"mcu", mcu.mcu},
-          {"bus", mcu.bus},
-          {"address", description.address},
-          {"state", word(mcu.state)},
-          {"detail", mcu.detail},
-          {"inputs", mcu.inputs},
-          {"boot", mcu.boot},
-          {"tick", mcu.tick},
-          {"tick_ns", description.tick_ns},
-          {"emergency_stop", word(description.emergency_stop)},
-          {"port", description.port}};
+// What is known of one thing, from two snapshots.
+nlohmann::ordered_json together(nlohmann::ordered_json state,
+                                const nlohmann::ordered_json& description) {
+  for (const auto& [name, value] : description.items()) {
+    if (!state.contains(name)) state[name] = value;
+  }
+  state.erase("motors");
+  return state;
 }
 
 }  // namespace
@@ -197,45 +152,35 @@ std::string bounds_text(const Status& status, std::size_t mcu, std::size_t index
   return text + fmt::format("{:g} .. {:g}", limits.low, limits.high);
 }
 
+nlohmann::ordered_json motor_json(const std::string& mcu, const api::MotorState& state,
+                                  const api::MotorDescription& description) {
+  nlohmann::ordered_json motor = together(bushd::json_of(state), bushd::json_of(description));
+  motor["mcu"] = mcu;
+  return motor;
+}
+
 std::string json(const Status& status) {
-  nlohmann::json out = {{"motors", nlohmann::json::array()},
-                        {"mcus", nlohmann::json::array()},
-                        {"run", status.states.front().part.run},
-                        {"sequence", status.sequence()},
-                        {"utime_us", status.states.front().part.utime_us},
-                        {"dropped_messages", status.states.front().dropped_messages}};
+  nlohmann::ordered_json out = {{"motors", nlohmann::json::array()},
+                                {"mcus", nlohmann::json::array()},
+                                {"run", status.states.front().part.run},
+                                {"sequence", status.sequence()},
+                                {"utime_us", status.states.front().part.utime_us},
+                                {"dropped_messages", status.states.front().dropped_messages}};
   for (std::size_t i = 0; i < status.states.size(); ++i) {
     const api::StateSnapshot& mcu = status.states[i].snapshot;
     const api::Description& description = status.descriptions.at(i).snapshot;
     for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
       out["motors"].push_back(
-          motor_json(mcu.motors[m], mcu.mcu, description_of(description, m, mcu.motors[m].name)));
+          motor_json(mcu.mcu, mcu.motors[m], description_of(description, m, mcu.motors[m].name)));
     }
-    if (description.is_mcu()) out["mcus"].push_back(mcu_json(mcu, description));
+    if (!description.is_mcu()) continue;
+    out["mcus"].push_back(together(bushd::json_of(mcu), bushd::json_of(description)));
   }
   return bushd::json_text(out);
 }
 
 std::string json(const api::MovePlan& plan) {
-  nlohmann::json out = {{"duration_us", plan.duration_us},
-                        {"ticks", plan.ticks},
-                        {"frames", nullptr},
-                        {"bytes", nullptr},
-                        {"limited_by", nullptr},
-                        {"motors", nlohmann::json::array()}};
-  if (plan.traffic) {
-    out["frames"] = plan.traffic->frames;
-    out["bytes"] = plan.traffic->bytes;
-  }
-  if (!plan.limited_by.empty()) out["limited_by"] = plan.limited_by;
-  if (!plan.points_us.empty()) out["points_us"] = plan.points_us;
-  for (const api::MovePlan::Motor& motor : plan.motors) {
-    out["motors"].push_back({{"name", motor.motor},
-                             {"steps", motor.steps},
-                             {"duration_us", motor.duration_us},
-                             {"peak_steps_per_s", motor.peak_steps_per_s}});
-  }
-  return bushd::json_text(out);
+  return bushd::json_text(bushd::json_of(plan));
 }
 
 std::vector<std::string> lines(const api::MovePlan& plan) {

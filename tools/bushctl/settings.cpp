@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "config/edit.h"
@@ -21,13 +22,13 @@ using bushd::fail;
 using bushd::Result;
 
 // A value of a key that a newer daemon has is a text.
-nlohmann::json json_of(const std::string& key, const std::string& value) {
+nlohmann::json parsed(const std::string& key, const std::string& value) {
   for (const auto word : {config::SettingKey::kDirection, config::SettingKey::kInputActive}) {
     if (key == name_of(word)) return value;
   }
   if (value == "none") return nullptr;
-  nlohmann::json parsed = nlohmann::json::parse(value, nullptr, false);
-  return parsed.is_discarded() ? nlohmann::json(value) : parsed;
+  nlohmann::json json = nlohmann::json::parse(value, nullptr, false);
+  return json.is_discarded() ? nlohmann::json(value) : json;
 }
 
 }  // namespace
@@ -72,13 +73,11 @@ std::vector<std::string> table(const api::Configuration& configuration) {
 }
 
 std::string json(const api::Configuration& configuration) {
-  nlohmann::ordered_json out = {{"path", configuration.path},
-                                {"settings", nlohmann::ordered_json::array()}};
-  for (const auto& [motor, key, value, in_file] : configuration.settings) {
-    out["settings"].push_back({{"motor", motor},
-                               {"key", key},
-                               {"value", json_of(key, value)},
-                               {"in_file", json_of(key, in_file)}});
+  nlohmann::ordered_json out = bushd::json_of(configuration);
+  for (auto& setting : out["settings"]) {
+    for (const char* value : {"value", "value_in_file"}) {
+      setting[value] = parsed(setting["key"], setting[value]);
+    }
   }
   return bushd::json_text(out);
 }

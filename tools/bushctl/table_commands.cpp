@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "commands.h"
@@ -39,23 +40,9 @@ void print_json(const std::map<std::string, api::TableRef>& groups,
                 const std::vector<api::TableEntry>& entries) {
   ordered_json json = {{"groups", ordered_json::array()}, {"tables", ordered_json::array()}};
   for (const auto& [group, table] : groups) {
-    json["groups"].push_back({{"group", group},
-                              {"table", table.name},
-                              {"revision", table.revision},
-                              {"hash", table.hash}});
+    json["groups"].push_back({{"group", group}, {"table", bushd::json_of(table)}});
   }
-  for (const api::TableEntry& entry : entries) {
-    if (!entry.fault.empty()) {
-      json["tables"].push_back({{"table", entry.name}, {"fault", entry.fault}});
-      continue;
-    }
-    json["tables"].push_back({{"table", entry.name},
-                              {"revision", entry.table.revision},
-                              {"hash", entry.table.hash},
-                              {"codes", entry.codes},
-                              {"start_steps_per_s", entry.start_steps_per_s},
-                              {"max_steps_per_s", entry.max_steps_per_s}});
-  }
+  for (const api::TableEntry& entry : entries) json["tables"].push_back(bushd::json_of(entry));
   fmt::print("{}\n", bushd::json_text(json));
 }
 
@@ -113,18 +100,6 @@ int list_tables(Client& client, bool as_json) {
   return kDone;
 }
 
-void print_json(const bushd::tables::TableContent& table) {
-  ordered_json json = {{"name", table.name},
-                       {"description", table.description},
-                       {"revision", table.revision},
-                       {"sha256", bushd::tables::content_hash(table)},
-                       {"time_unit_ns", table.time_unit_ns}};
-  if (table.cruise) json["cruise"] = *table.cruise;
-  json["accel"] = table.accel;
-  if (table.decel) json["decel"] = *table.decel;
-  fmt::print("{}\n", bushd::json_text(json));
-}
-
 void print(const bushd::tables::TableContent& table) {
   fmt::print("{}\n", bushd::printable(table.name));
   if (!table.description.empty()) fmt::print("  {}\n", bushd::printable(table.description));
@@ -148,7 +123,7 @@ int show_table(Client& client, const std::string& wanted, bool as_json) {
     return kFailed;
   }
   if (as_json) {
-    print_json(table);
+    fmt::print("{}\n", bushd::json_text(bushd::json_of(*file)));
   } else {
     print(table);
   }

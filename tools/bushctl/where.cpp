@@ -10,6 +10,7 @@
 #include "base/printable.h"
 #include "grid.h"
 #include "named_motors.h"
+#include "render.h"
 
 namespace bushctl {
 namespace {
@@ -43,8 +44,10 @@ Result<std::vector<Whereabouts>> where(const bushd::client::Status& status,
   for (std::size_t i = 0; i < status.states.size(); ++i) {
     const auto age_us = std::max<std::int64_t>(now_us - status.states[i].part.utime_us, 0);
     for (const api::MotorState& state : status.states[i].snapshot.motors) {
-      Whereabouts motor{
-          .state = state, .description = {}, .age_s = 1e-6 * static_cast<double>(age_us)};
+      Whereabouts motor{.mcu = status.states[i].snapshot.mcu,
+                        .state = state,
+                        .description = {},
+                        .age_s = 1e-6 * static_cast<double>(age_us)};
       for (const auto& description : status.descriptions.at(i).snapshot.motors) {
         if (description.name == state.name) motor.description = description;
       }
@@ -69,7 +72,7 @@ std::vector<std::string> table(const std::vector<Whereabouts>& motors) {
   using enum Align;
   Grid grid({kLeft, kRight, kLeft, kRight, kRight, kLeft, kLeft, kRight, kLeft});
   grid.row({"MOTOR", "USER", "UNIT", "DIAL", "STEPS", "LIMITS", "TRUST", "AGE", ""});
-  for (const auto& [state, description, age_s] : motors) {
+  for (const auto& [mcu, state, description, age_s] : motors) {
     grid.row({bushd::printable(state.name), number(state.user, description.scale),
               bushd::printable(description.scale.unit), number(state.dial, description.scale),
               fmt::to_string(state.position_steps), limits_text(description),
@@ -80,19 +83,9 @@ std::vector<std::string> table(const std::vector<Whereabouts>& motors) {
 }
 
 std::string json(const std::vector<Whereabouts>& motors) {
-  nlohmann::json out = {{"motors", nlohmann::json::array()}};
-  for (const auto& [state, description, age_s] : motors) {
-    nlohmann::json motor = {
-        {"name", state.name},   {"unit", description.scale.unit}, {"user", state.user},
-        {"dial", state.dial},   {"steps", state.position_steps},  {"user_low", nullptr},
-        {"user_high", nullptr}, {"moving", state.moving},         {"trust", word(state.trust)},
-        {"reason", nullptr}};
-    if (const auto limits = user_limits(description)) {
-      motor["user_low"] = limits->low;
-      motor["user_high"] = limits->high;
-    }
-    if (!state.uncertain_reason.empty()) motor["reason"] = state.uncertain_reason;
-    out["motors"].push_back(std::move(motor));
+  nlohmann::ordered_json out = {{"motors", nlohmann::json::array()}};
+  for (const auto& [mcu, state, description, age_s] : motors) {
+    out["motors"].push_back(motor_json(mcu, state, description));
   }
   return bushd::json_text(out);
 }

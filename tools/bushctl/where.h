@@ -11,6 +11,7 @@ namespace bushctl {
 
 // One motor, from what the daemon tells of it.
 struct Whereabouts {
+  std::string mcu;
   bushd::api::MotorState state;
   bushd::api::MotorDescription description;
   double age_s = 0;  // of the state
@@ -23,8 +24,7 @@ bushd::Result<std::vector<Whereabouts>> where(const bushd::client::Status& statu
 
 std::vector<std::string> table(const std::vector<Whereabouts>& motors);
 
-// {"motors":[{"name","unit","user","dial","steps","user_low","user_high","moving","trust",
-// "reason"}]}, null where nothing is known.
+// {"motors": [...]}, each as `status` has it.
 std::string json(const std::vector<Whereabouts>& motors);
 
 }  // namespace bushctl

@@ -164,12 +164,6 @@ def made(kind: Callable[..., T], message: Any, **others: Any) -> T:
     return kind(**others)
 
 
-def made_of_columns(kind: Callable[..., T], message: Any, **others: Any) -> tuple[T, ...]:
-    """One for each place of arrays of one length, of which `others` names those that have another name, or holds the values."""
-    columns = [others.get(name, name) for name in _names(kind)]
-    return tuple(kind(*row) for row in zip(*(getattr(message, one) if isinstance(one, str) else one for one in columns)))
-
-
 def table_ref(message: Any) -> model.TableRef:
     return made(model.TableRef, message, revision=max(message.revision, 0))
 
@@ -185,26 +179,23 @@ def _reply(message: Any, detail: Detail) -> Reply:
 
 
 def _answer(message: Any) -> Reply:
-    tables = [table_ref(table) for table in message.tables]
-    for index in message.table_of_motor:
-        if index < 0:
-            raise ValueError("no such table")
-    motors = made_of_columns(
-        model.MotorResult,
-        message,
-        motor="motors",
-        outcome=[model.Outcome(word) for word in message.outcomes],
-        position="user_positions",
-        dial="dial_positions",
-        unit="units",
-        precision=[precision(decimals) for decimals in message.precisions],
-        table=[tables[index] for index in message.table_of_motor],
-    )
+    motors = tuple(_motor_result(motor) for motor in message.motors)
     return _reply(message, Detail(motors=motors, plan=_plan(message.plan[0]) if message.plan else None))
 
 
+def _motor_result(message: Any) -> model.MotorResult:
+    return made(
+        model.MotorResult,
+        message,
+        outcome=model.Outcome(message.outcome),
+        position=message.user_position,
+        dial=message.dial_position,
+        precision=precision(message.precision),
+        table=table_ref(message.table),
+    )
+
+
 def _plan(message: Any) -> model.MovePlan:
-    durations_s = [us / 1e6 for us in message.motor_duration_us]
     return made(
         model.MovePlan,
         message,
@@ -213,7 +204,7 @@ def _plan(message: Any) -> model.MovePlan:
         bytes=message.bytes if message.frames >= 0 else None,
         limited_by=message.limited_by or None,
         points_s=tuple(us * 1e-6 for us in message.points_us),
-        legs=made_of_columns(model.PlannedLeg, message, motor="motors", duration_s=durations_s),
+        legs=tuple(made(model.PlannedLeg, motor, duration_s=motor.duration_us / 1e6) for motor in message.motors),
     )
 
 
@@ -228,12 +219,13 @@ def _history_answer(message: Any) -> Reply:
 
 
 def _configuration_answer(message: Any) -> Reply:
-    settings = made_of_columns(model.Setting, message, motor="setting_motors", key="keys", value="values", in_file="values_in_file")
+    settings = tuple(made(model.Setting, setting, in_file=setting.value_in_file) for setting in message.settings)
     return _reply(message, Detail(configuration=made(model.Configuration, message, settings=settings)))
 
 
 def _camac_answer(message: Any) -> Reply:
-    return _reply(message, Detail(camac=made(model.CamacResult, message, responses=made_of_columns(model.CamacResponse, message))))
+    responses = tuple(made(model.CamacResponse, response) for response in message.responses)
+    return _reply(message, Detail(camac=made(model.CamacResult, message, responses=responses)))
 
 
 def _welcome(message: Any) -> Welcome:
@@ -268,10 +260,7 @@ _UNBOUNDED = 2**63 - 1
 
 
 def _health(message: Any) -> Health:
-    latency = tuple(
-        (None if below == _UNBOUNDED else below, answers)
-        for below, answers in zip(message.latency_below_us, message.latency_answers)
-    )
+    latency = tuple((None if each.below_us == _UNBOUNDED else each.below_us, each.answers) for each in message.latency)
     bus = made(model.BusHealth, message, latency=latency, mcus=tuple(_mcu_health(mcu) for mcu in message.mcus))
     return made(Health, message, content=bus)
 

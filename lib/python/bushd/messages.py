@@ -97,12 +97,7 @@ class Message:
         return message
 
     def _encoded(self) -> Iterator[bytes]:
-        lengths: dict[str, int] = {}
-        for field in self.FIELDS:
-            if field.count:
-                length = len(getattr(self, field.name))
-                if lengths.setdefault(field.count, length) != length:
-                    raise ValueError(f"{field.name} has {length} elements, not {lengths[field.count]}")
+        lengths = {field.count: len(getattr(self, field.name)) for field in self.FIELDS if field.count}
         for field in self.FIELDS:
             value = lengths.get(field.name, getattr(self, field.name))
             values: Any = value if field.count else [value]

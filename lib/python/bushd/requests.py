@@ -108,13 +108,8 @@ def stop(names: Names) -> Request:
 
 def change_configuration(motor: str, changes: Mapping[str, object]) -> Request:
     """Values: a number, a word, True or False, (low, high), a longer tuple of whole numbers and words, or None for none."""
-    return ask(
-        "CONFIGURE",
-        kind="CHANGE",
-        change_motors=[motor] * len(changes),
-        change_keys=changes,
-        change_values=map(_setting, changes.values()),
-    )
+    listed = [messages.motor_change_t(motor=motor, key=key, value=_setting(value)) for key, value in changes.items()]
+    return ask("CONFIGURE", kind="CHANGE", changes=listed)
 
 
 _CAMAC_MODES = {"single": "SINGLE", "repeat": "REPEAT", "q-stop": "Q_STOP", "scan": "SCAN"}
@@ -126,9 +121,7 @@ def camac(
 ) -> Request:
     if mode not in _CAMAC_MODES:
         raise ValueError(f"mode={mode!r}; allowed: {', '.join(_CAMAC_MODES)}")
-    listed = [tuple(cycle) for cycle in cycles]
-    if any(len(cycle) not in (3, 4) for cycle in listed):
-        raise ValueError("a cycle is (N, A, F) or (N, A, F, data)")
+    listed = [_camac_cycle(*cycle) for cycle in cycles]
     last_station, last_subaddress = last or (_LAST_STATION, _LAST_SUBADDRESS)
     return ask(
         "CAMAC",
@@ -137,11 +130,14 @@ def camac(
         count=len(listed) if count is None else count,
         last_station=last_station,
         last_subaddress=last_subaddress,
-        stations=[cycle[0] for cycle in listed],
-        subaddresses=[cycle[1] for cycle in listed],
-        functions=[cycle[2] for cycle in listed],
-        data=[cycle[3] if len(cycle) == 4 else 0 for cycle in listed],
+        cycles=listed,
     )
+
+
+def _camac_cycle(*cycle: int) -> Any:
+    if len(cycle) not in (3, 4):
+        raise ValueError("a cycle is (N, A, F) or (N, A, F, data)")
+    return messages.camac_cycle_t(**dict(zip(("station", "subaddress", "function", "data"), cycle)))
 
 
 # -- fields of several messages

@@ -38,9 +38,9 @@ TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
   EXPECT_EQ(theta["mcu"], "hall:1");
   EXPECT_EQ(theta["output"], 0);
   EXPECT_EQ(theta["group"], "goniometer");
-  EXPECT_EQ(theta["table"], "bushd2-constant");
-  EXPECT_EQ(theta["table_revision"], 3);
-  EXPECT_EQ(theta["table_hash"], "0a1b2c3d");
+  EXPECT_EQ(theta["table"]["name"], "bushd2-constant");
+  EXPECT_EQ(theta["table"]["revision"], 3);
+  EXPECT_EQ(theta["table"]["hash"], "0a1b2c3d");
   EXPECT_EQ(theta["position_steps"], -12);
   EXPECT_EQ(theta["target_steps"], 400);
   EXPECT_EQ(theta["velocity_steps_per_s"], 2500.5);
@@ -52,7 +52,7 @@ TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
   ASSERT_EQ(status["mcus"].size(), 2u);
   EXPECT_EQ(status["mcus"][1]["mcu"], "hall:2");
   EXPECT_EQ(status["mcus"][1]["state"], "READY");
-  EXPECT_EQ(status["mcus"][1]["boot"], 42);
+  EXPECT_EQ(status["mcus"][1]["boot_number"], 42);
 }
 
 TEST(Bushctl, StatusIsATableOfMotorsAndMcus) {

@@ -32,8 +32,8 @@ TEST(Render, AnUnknownPositionIsNoNumber) {
   const auto shown = nlohmann::json::parse(json(status_of(motor)))["motors"][0];
   EXPECT_TRUE(shown["position_steps"].is_null());
   EXPECT_TRUE(shown["target_steps"].is_null());
-  EXPECT_TRUE(shown["user"].is_null());
-  EXPECT_TRUE(shown["dial"].is_null());
+  EXPECT_TRUE(shown["user_position"].is_null());
+  EXPECT_TRUE(shown["dial_position"].is_null());
   EXPECT_TRUE(shown["heard_utime_us"].is_null());
   EXPECT_EQ(shown["trust"], "unknown");
 }

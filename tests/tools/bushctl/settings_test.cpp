@@ -47,11 +47,10 @@ TEST(Settings, AreShown) {
                           "a      offset       2.5      0",              //
                           "a      soft_limits  [-1, 2]  none"));
   EXPECT_EQ(json(some()),
-            "{\"path\":\"/b.toml\",\"settings\":["
-            "{\"motor\":\"a\",\"key\":\"offset\",\"value\":2.5,\"in_file\":0},"
-            "{\"motor\":\"a\",\"key\":\"direction\",\"value\":\"negative\",\"in_file\":"
-            "\"negative\"},"
-            "{\"motor\":\"a\",\"key\":\"soft_limits\",\"value\":[-1,2],\"in_file\":null}]}");
+            R"({"path":"/b.toml","sha256":"","settings":[)"
+            R"({"motor":"a","key":"offset","value":2.5,"value_in_file":0},)"
+            R"({"motor":"a","key":"direction","value":"negative","value_in_file":"negative"},)"
+            R"({"motor":"a","key":"soft_limits","value":[-1,2],"value_in_file":null}]})");
 }
 
 struct Saving : testing::Test {
