@@ -352,17 +352,6 @@ struct Camac {
     camac::Block::fields(self.block, visit);
   }
 };
-    visit("mode", block.mode, fields::OneOf<4>{});
-    visit("count", block.count);
-    visit("last_station", block.last_station);
-    visit("last_subaddress", block.last_subaddress);
-    visit.columns("cycle_count", block.cycles,
-                  fields::Column{"stations", &camac::Naf::station, kByte},
-                  fields::Column{"subaddresses", &camac::Naf::subaddress, kByte},
-                  fields::Column{"functions", &camac::Naf::function, kByte},
-                  fields::Column{"data", &camac::Naf::data});
-  }
-};
 
 struct Request
     : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
