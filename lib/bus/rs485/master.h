@@ -139,6 +139,7 @@ class Rs485Master final : public BusMaster,
   void notice_standing_still(std::int64_t now_us);
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,
                      const bushd_report& report);
+  void ask_at_end(std::int64_t now_us, McuIndex mcu);
   bool send_next(std::int64_t now_us);
   std::int64_t silence_us() const;
   std::int64_t wake_us(McuIndex mcu) const;

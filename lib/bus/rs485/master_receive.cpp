@@ -1,6 +1,7 @@
 // What answers, their absence and changes of an MCU's phase mean, and for which machine.
 #include <algorithm>
 
+#include "bus/bus_times.h"
 #include "bus/rs485/master.h"
 
 namespace bushd::link {
@@ -112,7 +113,17 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
     return;
   }
   streams_.follow_report(index);
+  ask_at_end(now_us, index);
   events_.push_back(McuReported{index});
+}
+
+// As soon as its report can tell that a motor has come to rest. This clock lags behind the MCU's:
+// in that tick the MCU is there.
+void Rs485Master::ask_at_end(std::int64_t now_us, McuIndex mcu) {
+  const std::optional<Tick> end = streams_.next_end(mcu);
+  const Tick now = clock().tick_at(now_us);
+  if (!end || *end > now + clock().ticks_in(2 * fieldbus::kPollPeriodUs)) return;
+  poller_.ask_at(mcu, now_us + std::max<Tick>(*end - now, 0) * setup_.tick_ns / 1000);
 }
 
 void Rs485Master::found(std::int64_t now_us, McuIndex) {

@@ -17,6 +17,7 @@ using fieldbus::kWindowGuardUs;
 constexpr std::int64_t kMaxCycleUs = 60'000;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
+constexpr std::int64_t kLeastApartUs = 10'000;
 constexpr int kMaxMissedReplies = 10;  // about half a second
 
 }  // namespace
@@ -88,8 +89,15 @@ bool Poller::send_wanted(std::int64_t now_us) {
   for (const Transactions::ReplyWindow& window : windows) {
     mcus_[window.mcu].poll_wanted = false;
     polled_[window.mcu].due_us = now_us + kPollPeriodUs;
+    polled_[window.mcu].asked_us = now_us;
   }
   return true;
+}
+
+void Poller::ask_at(McuIndex mcu, std::int64_t at_us) {
+  Polled& polled = polled_[mcu];
+  at_us = std::max(at_us, polled.asked_us + std::max(kLeastApartUs, 4 * cycle_us()));
+  if (at_us < polled.due_us + kLeastApartUs) polled.due_us = at_us;
 }
 
 bool Poller::send_due(std::int64_t now_us) {

@@ -92,6 +92,16 @@ bool StreamScheduler::has_ticks_to_send(McuIndex mcu) const {
                      [](const Stream& s) { return s.active && !s.finished; });
 }
 
+std::optional<Tick> StreamScheduler::next_end(McuIndex mcu) const {
+  std::optional<Tick> next;
+  for (std::uint8_t motor = 0; motor < BUSHD_MOTORS_PER_MCU; ++motor) {
+    if (!mcus_[mcu].stream[motor].active) continue;
+    const Tick end = source_.end_tick(mcu, motor);
+    if (end > records_[mcu].view.tick) next = std::min(next.value_or(INT64_MAX), end);
+  }
+  return next;
+}
+
 // A start waits for the replacement before it to be confirmed: if that was not taken, neither would
 // the start be, and a replacement of the start would not be taken either.
 std::optional<Tick> StreamScheduler::Mcu::next_tick() const {

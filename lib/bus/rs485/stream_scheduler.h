@@ -94,6 +94,9 @@ class StreamScheduler {
   // The first tick of this motor that has not been sent.
   Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
   bool has_ticks_to_send(McuIndex mcu) const;
+  // The next tick, after that of its report, at which a motor of this MCU comes to rest by its
+  // plan.
+  std::optional<Tick> next_end(McuIndex mcu) const;
   // An MCU makes the run of a line, or is to.
   bool runs_line() const;
   bool has_replacement_to_send(McuIndex mcu) const { return mcus_[mcu].replacing != 0; }

@@ -160,6 +160,19 @@ TEST_P(Tables, LostWholeMoveIsSentAgainInTime) {
   EXPECT_TRUE(bus.slaves[0].run[1].has_value());
 }
 
+// Polls are 50 ms apart otherwise. Asked is within a tick of the end, and an exchange takes less
+// than 5 ms: some 15 bytes of 20 us, 1 ms to the first window, some 80 bytes.
+TEST_P(Tables, TheEndOfAMoveIsHeardOfAtOnce) {
+  for (std::uint32_t steps = 20; steps < 60; ++steps) {
+    start(1, steps, steps % 2 == 0);
+    ASSERT_TRUE(bus.run_until([&] { return bus.master->tick_at(bus.now_us) >= end(1); }));
+    const std::int64_t ended_us = bus.now_us;
+    ASSERT_TRUE(bus.run_until([&] { return bus.master->view(McuIndex{0}).tick >= end(1); }));
+    EXPECT_LE(bus.now_us - ended_us, std::int64_t{FakeBus::kTickNs} / 1000 + 5'000) << steps;
+    bus.master->drop(McuIndex{0}, 1);
+  }
+}
+
 TEST_P(Tables, WholeMoveThatIsTooLateIsTold) {
   bus.slaves[0].loses = [](const Heard& h) { return h.type == BUSHD_MSG_TABLE_RUN; };
   start(1, 2000, true);
