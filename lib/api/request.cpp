@@ -14,19 +14,21 @@ std::string_view name_of(const Request& request) {
 }
 
 bool ends_motion(const Request& request) {
-  if (const auto* jog = std::get_if<Jog>(&request)) return jog->per_s == 0 && !jog->renew;
-  return std::holds_alternative<Stop>(request) || std::holds_alternative<EmergencyStop>(request) ||
-         std::holds_alternative<Pause>(request) || std::holds_alternative<Hold>(request) ||
-         std::holds_alternative<Disarm>(request);
+  return std::visit(
+      [](const auto& content) {
+        if constexpr (requires { content.ends_motion(); }) return content.ends_motion();
+        return false;
+      },
+      request);
 }
 
 bool is_repeatable(const Request& request) {
-  if (const auto* configure = std::get_if<Configure>(&request)) {
-    return configure->kind == Configure::Kind::kShow;
-  }
-  return std::holds_alternative<Stop>(request) || std::holds_alternative<EmergencyStop>(request) ||
-         std::holds_alternative<ListTables>(request) || std::holds_alternative<GetTable>(request) ||
-         std::holds_alternative<GetHistory>(request);
+  return std::visit(
+      [](const auto& content) {
+        if constexpr (requires { content.is_repeatable(); }) return content.is_repeatable();
+        return false;
+      },
+      request);
 }
 
 }  // namespace bushd::api

@@ -1,5 +1,6 @@
 // Everything that can be asked of the daemon: one type per request. A new request is a new type
-// here, a service in the core and a message in the front ends; no other request changes.
+// here, a service in the core and a message in the front ends; no other request changes. What ends
+// motion, or is harmless when it is carried out twice, says so (below: ends_motion, is_repeatable).
 //
 // Motors and groups are named as in the configuration. Front ends pass names and numbers as they
 // come, however wrong: the core resolves them, checks every range and refuses with a reason. So the
@@ -28,6 +29,8 @@ struct Stop {
   MotorNames motors{};
 
   static constexpr std::string_view kName = "stop";
+  static constexpr bool ends_motion() { return true; }
+  static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 
@@ -35,6 +38,8 @@ struct Stop {
 // MCU until ClearFaults. Never refused. Result kDone once all MCUs that are online stand.
 struct EmergencyStop {
   static constexpr std::string_view kName = "emergency stop";
+  static constexpr bool ends_motion() { return true; }
+  static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };
 
@@ -158,6 +163,7 @@ struct Disarm {
   MotorNames motors{};
 
   static constexpr std::string_view kName = "disarm";
+  static constexpr bool ends_motion() { return true; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 
@@ -195,6 +201,7 @@ struct PositionCompare {
 // Result: TableList.
 struct ListTables {
   static constexpr std::string_view kName = "list tables";
+  static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };
 
@@ -203,6 +210,7 @@ struct GetTable {
   std::string table{};  // NAME, NAME@REVISION or NAME@TAG
 
   static constexpr std::string_view kName = "get table";
+  static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) { visit("table", self.table); }
 };
 
@@ -237,6 +245,7 @@ struct GetHistory {
   std::int32_t most = 20;  // 1..1000
 
   static constexpr std::string_view kName = "get history";
+  static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) {
     visit("motor", self.motor);
     visit("most", self.most);
@@ -269,6 +278,7 @@ struct Configure {
   std::string file_sha256{};
 
   static constexpr std::string_view kName = "configure";
+  bool is_repeatable() const { return kind == Kind::kShow; }
   static void fields(auto& self, auto& visit) {
     visit("kind", self.kind, fields::OneOf<3>{});
     names_fields(self, visit);
@@ -298,6 +308,7 @@ struct Jog {
   std::optional<std::int64_t> steps_after{};
 
   static constexpr std::string_view kName = "jog";
+  bool ends_motion() const { return per_s == 0 && !renew; }
   static void fields(auto& self, auto& visit) {
     visit("motor", self.motor);
     visit("speed", self.per_s);
@@ -315,6 +326,7 @@ struct Pause {
   MotorNames motors{};  // and groups, as of the three below
 
   static constexpr std::string_view kName = "pause";
+  static constexpr bool ends_motion() { return true; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 // Those that are paused go on to their targets. Refused as a whole if one of them may not move.
@@ -330,6 +342,7 @@ struct Hold {
   MotorNames motors{};
 
   static constexpr std::string_view kName = "hold";
+  static constexpr bool ends_motion() { return true; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit); }
 };
 struct Release {

@@ -45,11 +45,15 @@ std::optional<ClientMessage> decode_subscription(Payload payload) {
   return ClientMessage{.id = {}, .content = *message};
 }
 
+template <class Content>
+constexpr bool kMayEndMotion = requires(const Content& content) { content.ends_motion(); };
+
 // Requests first, in the order of api::Request.
 struct Channels {
   std::vector<std::string> names{};
   std::vector<std::string_view> views{};
   std::map<std::string_view, Decoder> decoders{};
+  std::vector<std::string_view> urgent{};
 
   template <class... Content>
   explicit Channels(const std::variant<Content...>* /*requests*/)
@@ -58,6 +62,10 @@ struct Channels {
     const std::vector<Decoder> all{decode_request<Content>..., decode_hello, decode_subscription,
                                    decode_request<GetStatus>};
     for (std::size_t i = 0; i < all.size(); ++i) decoders.emplace(views[i], all[i]);
+    const std::array ends{kMayEndMotion<Content>...};
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      if (ends[i]) urgent.push_back(views[i]);
+    }
   }
 };
 
@@ -73,9 +81,7 @@ std::span<const std::string_view> client_channels() {
 }
 
 std::span<const std::string_view> urgent_channels() {
-  static constexpr std::array<std::string_view, 6> kChannels = {"STOP", "EMERGENCY_STOP", "PAUSE",
-                                                                "HOLD", "DISARM",         "JOG"};
-  return kChannels;
+  return channels().urgent;
 }
 
 bool is_urgent_channel(std::string_view channel) {
