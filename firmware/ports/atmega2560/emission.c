@@ -16,6 +16,9 @@
 #define CHANGE_CYCLES 92u
 // Until the first slot.
 #define START_CYCLES 400u
+// From a tick's start until emission_begun says so: compare C, 59 cycles with interrupts off, those
+// of the slot and the line, and the interrupt itself, less than 100.
+#define BEGINNING_CYCLES 256u
 // A tick without steps: its last slot, and how many of them there are at most. The longest tick
 // is one of BUSHD_MAX_TICK_NS that is nearly doubled to come into step with the bus.
 #define SHORT_SLOT_CYCLES 256u
@@ -216,8 +219,9 @@ bool emission_begun(void) {
 }
 
 bool emission_begins_soon(void) {
-  // One that was not taken when it should have been begins a tick later.
-  return given_start - clock_now() < EMISSION_FRAME_CYCLES;
+  // Later it has begun, or was not taken when it should have been and begins a tick later.
+  const uint32_t end = given_start + BEGINNING_CYCLES;
+  return end - clock_now() < EMISSION_FRAME_CYCLES + BEGINNING_CYCLES;
 }
 
 // If no slot_buffer is ready after this one, its last levels stay.

@@ -186,6 +186,11 @@ static void prepare(void) {
   if (slot_buffer->compare_fall) compare_fall(emission_slot_time(slot_buffer->compare_fall - 1u));
 }
 
+// In this order: between the two it may begin.
+static bool tick_is_near(void) {
+  return emission_begins_soon() || emission_begun();
+}
+
 static void hear_keypad(void) {
 #if BOARD_KEYPAD
   keypad_line_hear(&mcu);
@@ -194,7 +199,7 @@ static void hear_keypad(void) {
 
 static void show_at_keypad(void) {
 #if BOARD_KEYPAD
-  if (mcu.local.settings.keypad != 0 && !emission_begins_soon()) keypad_line_show(&mcu);
+  if (mcu.local.settings.keypad != 0 && !tick_is_near()) keypad_line_show(&mcu);
 #endif
 }
 
@@ -202,7 +207,7 @@ static void hear_line(void) {
   uint32_t ended = 0;
   if (line_collect(&mcu.receiver, &ended)) {
     // A frame takes a while, and can wait; a tick that has begun meanwhile, or soon will, cannot.
-    if (emission_begun() || emission_begins_soon() || !line_may_take(&mcu.receiver)) return;
+    if (tick_is_near() || !line_may_take(&mcu.receiver)) return;
     line_take(&mcu.receiver);
     bushd_mcu_receive(&mcu, 0, emission_time_in_tick_ns(ended));
   } else if (bushd_mcu_wants_samples(&mcu)) {
