@@ -24,6 +24,11 @@ static inline bool bushd_mcu_has_output(const bushd_mcu* mcu, uint8_t motor) {
   return motor < bushd_mcu_motors_with_outputs(mcu);
 }
 
+// +1, -1: of its last step, or the one that DIR shows already.
+static inline int8_t bushd_mcu_last_direction(const bushd_mcu* mcu, uint8_t m) {
+  return mcu->direction & motor_bit(m) ? 1 : -1;
+}
+
 static inline int16_t* bushd_mcu_queue_at(bushd_mcu* mcu, uint32_t tick, uint8_t motor) {
   const uint16_t row = (uint16_t)tick & (uint16_t)(mcu->config.queue_ticks - 1u);
   return &mcu->config.queue[(size_t)row * mcu->config.motors + motor];

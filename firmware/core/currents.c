@@ -3,8 +3,8 @@
 #include <string.h>
 
 #include "firmware/core/access.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
-#include "firmware/core/velocity.h"
 
 // Two displacements of one speed differ by so much at most: rounding, to 1/256 step or to a step.
 static uint16_t tolerance_of(const bushd_mcu* mcu, const bushd_mcu_motor* motor) {
@@ -17,13 +17,7 @@ static uint16_t speed_of(const bushd_mcu* mcu, uint8_t m) {
   const bushd_mcu_motor* motor = &mcu->motor[m];
   const bushd_slot_buffer* next = &mcu->slot_buffer[mcu->front ^ 1u];
   if (((bushd_mcu_moving(mcu) | next->active) & motor_bit(m)) == 0) return 0;
-  if (motor->exact && motor->mode != BUSHD_MCU_STREAM) {
-    if (motor->mode == BUSHD_MCU_VELOCITY) return bushd_mcu_velocity_period(mcu, m);
-    const bool on_line = (mcu->line.motors & motor_bit(m)) != 0;
-    if (on_line) return bushd_mcu_line_delay(mcu, m);
-    const bushd_delay delay = bushd_run_delay(&motor->made.run);
-    return bushd_delay_is_code(delay) ? (uint16_t)delay : UINT16_MAX;
-  }
+  if (motor->exact && motor->mode != BUSHD_MCU_STREAM) return bushd_mcu_step_delay(mcu, m);
   if (mcu->format == BUSHD_FORMAT_FINE) {
     return (motor->displacement & BUSHD_MCU_SELDOM) != 0 ? (uint16_t)1 : motor->displacement;
   }

@@ -20,6 +20,7 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
 
@@ -27,12 +28,6 @@ enum { READINGS = 3 };
 
 static bool under_way(const bushd_mcu_homing* homing) {
   return homing->stage >= BUSHD_HOMING_FAST && homing->stage <= BUSHD_HOMING_APPROACH;
-}
-
-uint16_t bushd_mcu_homing_motor(const bushd_mcu* mcu) {
-  const uint8_t m = mcu->homing.motor;
-  const bool homes = under_way(&mcu->homing) && mcu->motor[m].mode == BUSHD_MCU_AUTONOMOUS;
-  return homes ? motor_bit(m) : (uint16_t)0;
 }
 
 static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
@@ -49,11 +44,11 @@ static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
 }
 
 static void end(bushd_mcu* mcu, bushd_homing stage) {
-  bushd_mcu_motor* motor = &mcu->motor[mcu->homing.motor];
+  const uint8_t m = mcu->homing.motor;
   mcu->homing.stage = (uint8_t)stage;
-  if (motor->mode != BUSHD_MCU_AUTONOMOUS) return;
-  motor->mode = BUSHD_MCU_STREAM;
-  motor->remainder = 0;
+  if (bushd_mcu_owner_of_motor(mcu, m) != BUSHD_MCU_OWNER_HOMING) return;
+  bushd_mcu_give_to_queue(mcu, m);
+  mcu->motor[m].remainder = 0;
 }
 
 static void arrive(bushd_mcu* mcu) {
@@ -172,7 +167,7 @@ void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs) {
   if (!under_way(&mcu->homing)) return;
   watch_silence(mcu);
   const uint8_t m = mcu->homing.motor;
-  if (mcu->motor[m].mode == BUSHD_MCU_AUTONOMOUS) {
+  if (bushd_mcu_owner_of_motor(mcu, m) == BUSHD_MCU_OWNER_HOMING) {
     go_on(mcu, (active_inputs & motor_bit(mcu->switches[m].home)) != 0);
   } else {
     end(mcu, BUSHD_HOMING_STOPPED);
@@ -219,10 +214,10 @@ static int8_t first_direction(const bushd_mcu* mcu, uint8_t m, int8_t direction)
 }
 
 bool bushd_mcu_homing_in_use(const bushd_mcu* mcu) {
-  const bushd_mcu_motor* motor = &mcu->motor[mcu->homing.motor];
+  const uint8_t m = mcu->homing.motor;
   return under_way(&mcu->homing) ||
-         ((mcu->line.motors & motor_bit(mcu->homing.motor)) == 0 &&
-          motor->mode == BUSHD_MCU_RAMP_DOWN && motor->made.run.table == &mcu->homing.slow);
+         (bushd_mcu_owner_of_motor(mcu, m) == BUSHD_MCU_OWNER_RAMP_DOWN &&
+          mcu->motor[m].made.run.table == &mcu->homing.slow);
 }
 
 static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
@@ -277,6 +272,6 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   mcu->homed &= (uint16_t)~bit;
   mcu->local.held &= (uint16_t)~bit;
   bushd_mcu_begin_by_itself(mcu, message->motor, message->most_steps, begins,
-                            message->shortest_delay);
+                            message->shortest_delay, BUSHD_MCU_HOMING);
   return BUSHD_OK;
 }

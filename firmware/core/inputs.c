@@ -4,19 +4,17 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/drivers.h"
-#include "firmware/core/homing.h"
 #include "firmware/core/limits.h"
 #include "firmware/core/local.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
-#include "firmware/core/travel.h"
-#include "firmware/core/velocity.h"
 
 // `changed`: a switch of the motor has just become active or inactive.
 static void follow_limit(bushd_mcu* mcu, uint8_t m, bool changed) {
   const uint32_t next = mcu->tick + 1u;
   const int8_t heading = bushd_mcu_heading(mcu, m, next);
-  const bool homes = (bushd_mcu_homing_motor(mcu) & motor_bit(m)) != 0;
+  const bool homes = bushd_mcu_owner_of_motor(mcu, m) == BUSHD_MCU_OWNER_HOMING;
   if (heading == 0) {
     if (changed && !homes) {
       bushd_mcu_stands_off_limit(mcu, m, bushd_mcu_last_direction(mcu, m));
@@ -26,23 +24,11 @@ static void follow_limit(bushd_mcu* mcu, uint8_t m, bool changed) {
   const bool now_active = changed && (bushd_mcu_at_limits(mcu) & motor_bit(m)) != 0;
   if (!bushd_mcu_limit_stops(mcu, m, heading, now_active, homes)) return;
   const bool cuts = (mcu->inputs.limit_immediate & motor_bit(m)) != 0;
-  if (homes) {
-    bushd_mcu_homing_meets_limit(mcu, cuts);
-    return;
-  }
-  const bool travels = (bushd_mcu_travel_motor(mcu) & motor_bit(m)) != 0;
-  if (travels && !bushd_mcu_travel_meets_limit(mcu)) return;
-  // One that only turns towards the switch is at rest as far as this direction goes.
-  const bool immediate = cuts || heading != bushd_mcu_last_direction(mcu, m);
-  const uint8_t mode = mcu->motor[m].mode;
-  const bool ramps_down =
-      mode == BUSHD_MCU_VELOCITY ? bushd_mcu_is_braking(mcu, m) : mode == BUSHD_MCU_RAMP_DOWN;
-  if (immediate || !ramps_down) {
-    bushd_mcu_stop_motor(mcu, m, immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
-  }
+  bushd_mcu_motor_meets_limit(mcu, m, heading, cuts, next);
 }
 
-static void follow_limits(bushd_mcu* mcu, uint16_t pins) {
+// Not inlined, since few ticks need it: what all do would cost those their registers.
+__attribute__((noinline)) static void follow_limits(bushd_mcu* mcu, uint16_t pins) {
   const uint16_t changed = bushd_mcu_debounce_limits(mcu, pins);
   uint16_t concerned =
       bushd_mcu_at_limits(mcu) | mcu->limits.hit_positive | mcu->limits.hit_negative;

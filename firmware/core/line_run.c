@@ -10,6 +10,7 @@
 #include "engine/run_plan.h"
 #include "firmware/core/access.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/table_run.h"
@@ -40,7 +41,7 @@ static bushd_status check_entries(const bushd_mcu* mcu, const bushd_line_run* me
     const bushd_line_entry entry = bushd_next_line_entry(&at);
     const bushd_mcu_motor* motor = &mcu->motor[entry.motor];
     if (ticks_after(message->first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
-    if (motor->mode != BUSHD_MCU_STREAM) return BUSHD_E_STATE;
+    if (!bushd_mcu_has_no_run(motor)) return BUSHD_E_STATE;
     if ((bushd_mcu_forbidden(mcu, entry.direction) & motor_bit(entry.motor)) == 0) *barred = false;
   }
   return BUSHD_OK;
@@ -207,9 +208,7 @@ static uint16_t begin_tick(bushd_mcu_motor* motor, int16_t* steps, uint16_t moto
 static void end_ramp_down(bushd_mcu* mcu, uint16_t motors) {
   for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
     if ((motors & 1u) == 0 || mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) continue;
-    mcu->motor[m].mode = BUSHD_MCU_STREAM;
-    mcu->line.motors &= (uint16_t)~motor_bit(m);
-    mcu->stream.queue_summary.stale = true;
+    bushd_mcu_give_to_queue(mcu, m);
   }
 }
 
@@ -238,13 +237,11 @@ uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu) {
   uint16_t concerned = 0;
   if (mcu->line.motors == 0 || bushd_run_done(&mcu->line.run)) return 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
-    bushd_mcu_motor* motor = &mcu->motor[m];
-    if (!is_on_line(mcu, m) || motor->mode != BUSHD_MCU_TABLE_RUN) continue;
-    motor->mode = BUSHD_MCU_RAMP_DOWN;
+    if (!is_on_line(mcu, m) || mcu->motor[m].mode != BUSHD_MCU_TABLE_RUN) continue;
+    bushd_mcu_give_motor(mcu, m, BUSHD_MCU_RAMP_DOWN);
     concerned |= motor_bit(m);
   }
   if (concerned == 0) return 0;
-  mcu->stream.queue_summary.stale = true;
   bushd_run_ramp_down_once(&mcu->line.run);
   mcu->line.last = mcu->line.step - 1u + bushd_run_steps_left(&mcu->line.run);
   return concerned;

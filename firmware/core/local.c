@@ -12,12 +12,11 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/drivers.h"
-#include "firmware/core/homing.h"
 #include "firmware/core/keypad.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
-#include "firmware/core/travel.h"
 #include "firmware/core/velocity.h"
 
 enum { READINGS = BUSHD_MCU_LOCAL_READINGS };
@@ -39,7 +38,7 @@ static void release(bushd_mcu* mcu) {
   uint16_t moving = (uint16_t)(mcu->local.held & mcu->autonomous);
   mcu->local.held = 0;
   for (uint8_t m = 0; moving != 0; ++m, moving = (uint16_t)(moving >> 1)) {
-    if (moving & 1u) bushd_mcu_ramp_down_run(mcu, m);
+    if (moving & 1u) bushd_mcu_ramp_down_own_motion(mcu, m);
   }
 }
 
@@ -84,7 +83,7 @@ static void begin_held(bushd_mcu* mcu) {
           mcu->local.by_keypad ? bushd_mcu_keypad_shortest_delay(mcu, table) : 0;
       const uint32_t counted = bushd_mcu_steps_counted(mcu, m, mcu->local.wish);
       const uint32_t steps = counted < INT32_MAX ? counted : INT32_MAX;
-      bushd_mcu_begin_by_itself(mcu, m, steps, mcu->local.wish, shortest_delay);
+      bushd_mcu_begin_by_itself(mcu, m, steps, mcu->local.wish, shortest_delay, BUSHD_MCU_LOCAL);
     }
   }
 }
@@ -103,7 +102,7 @@ static void slow_down(bushd_mcu* mcu) {
   uint16_t moving =
       (uint16_t)(mcu->local.held & mcu->autonomous & ~bushd_mcu_moved_by_velocity(mcu));
   for (uint8_t m = 0; moving != 0; ++m, moving = (uint16_t)(moving >> 1)) {
-    if (moving & 1u) bushd_mcu_ramp_down_run(mcu, m);
+    if (moving & 1u) bushd_mcu_ramp_down_own_motion(mcu, m);
   }
 }
 
@@ -134,7 +133,7 @@ void bushd_mcu_move_locally(bushd_mcu* mcu, uint8_t system_inputs) {
   if (wish == 0 || !allowed) return;
   if (local->readings < READINGS && ++local->readings == READINGS) {
     const uint16_t motors = local->by_keypad ? local->settings.keypad : local->settings.motors;
-    local->held = (uint16_t)(motors & ~(bushd_mcu_homing_motor(mcu) | bushd_mcu_travel_motor(mcu)));
+    local->held = motors & (uint16_t)~bushd_mcu_moved_by_request(mcu);
     if ((mcu->flags & BUSHD_FLAG_ENABLED) == 0) bushd_mcu_set_enable(mcu, true);
   }
   begin_held(mcu);
@@ -160,7 +159,7 @@ static void take_away(bushd_mcu* mcu, uint16_t motors) {
   mcu->local.held &= (uint16_t)~motors;
   motors &= mcu->autonomous;
   for (uint8_t m = 0; motors != 0; ++m, motors = (uint16_t)(motors >> 1)) {
-    if (motors & 1u) bushd_mcu_ramp_down_run(mcu, m);
+    if (motors & 1u) bushd_mcu_ramp_down_own_motion(mcu, m);
   }
 }
 

@@ -5,11 +5,11 @@
 #include "firmware/core/access.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/line_run.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/position_compare.h"
-#include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
+#include "firmware/core/stream_stop.h"
 #include "firmware/core/table_run.h"
-#include "firmware/core/velocity.h"
 
 static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
@@ -24,12 +24,8 @@ static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_ramp_down_stream(mcu, m, delay);
 }
 
-static void end_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
-  motor->mode = BUSHD_MCU_STREAM;
-  mcu->stream.queue_summary.stale = true;
-}
-
-static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
+static int16_t ramp_down_displacement(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
   int16_t displacement = 0;
   if (mcu->format == BUSHD_FORMAT_FINE) {
     bushd_run_expand_fine(&motor->made.run, mcu->tick_ns, 1, &displacement, 1);
@@ -38,7 +34,7 @@ static int16_t ramp_down_displacement(bushd_mcu* mcu, bushd_mcu_motor* motor) {
     bushd_run_expand_coarse(&motor->made.run, mcu->tick_ns, 1, &counts, 1);
     displacement = bushd_coarse_to_fine(counts);
   }
-  if (bushd_run_done(&motor->made.run)) end_run(mcu, motor);
+  if (bushd_run_done(&motor->made.run)) bushd_mcu_give_to_queue(mcu, m);
   return displacement;
 }
 
@@ -55,81 +51,21 @@ static inline void note_speed(bushd_mcu_motor* motor, int16_t displacement) {
   if (motor->displacement == 1) motor->displacement = (uint16_t)(BUSHD_MCU_SELDOM + before + 1u);
 }
 
-static inline const bushd_run_tick* run_tick_of(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
-  return bushd_mcu_run_tick_of(mcu, (uint8_t)motor->table, motor->made.run.table);
-}
-
-// Sets the motors' bits in the masks of their steps, or none if the emission decides where they
-// lie.
-__attribute__((noinline)) static void emit_runs(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer,
-                                                uint16_t exact) {
-  const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
-  bushd_mcu_motor* motor = mcu->motor;
-  int16_t* steps = slot_buffer->steps;
-  const bushd_table* table = NULL;
-  const bushd_run_tick* tick = NULL;
-  uint16_t forward = 0;
-  uint16_t active = 0;
-  uint16_t bit = 1;
-  for (uint16_t left = exact; left != 0; left = (uint16_t)(left >> 1), ++motor, ++steps) {
-    if ((left & 1u) != 0) {
-      bushd_run* run = &motor->made.run;
-      // Mostly motors share a table.
-      if (run->table != table) tick = run_tick_of(mcu, motor);
-      table = run->table;
-      *steps = bushd_run_slots(run, tick, keep_slots ? bit : 0, slot_buffer->step);
-      if (run->direction > 0) forward |= bit;
-      if (*steps != 0) active |= bit;
-      motor->remainder = 0;  // until ticks follow (leave_run)
-      if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) end_run(mcu, motor);
-    }
-    bit = (uint16_t)(bit << 1);
-  }
-  mcu->direction = (mcu->direction & (uint16_t)~exact) | forward;
-  mcu->stream.begun |= exact;
-  slot_buffer->active |= active;
-}
-
-// Ticks take the place of the rest of a run: they go on from the share of the running step that has
-// passed. Nobody asks for that before. Its speed is rounded down, so that a stop goes by a longer
-// delay rather than a shorter one; 31 bits hold it, since no table makes more than 127 steps a
-// tick.
-static void leave_run(bushd_mcu* mcu, bushd_mcu_motor* motor) {
-  bushd_run* run = &motor->made.run;
-  const bushd_delay delay = bushd_run_delay(run);
-  if (delay == 0 || mcu->format != BUSHD_FORMAT_FINE) return;
-  bushd_run_note_fraction(run);
-  motor->remainder = (int16_t)(run->direction < 0 ? -run->fraction : run->fraction);
-  const uint32_t units = run_tick_of(mcu, motor)->units;
-  motor->still_ticks = 0;
-#if BUSHD_SLOW_RUNS
-  // Less than 1/256 step a tick: then by the time for one (note_speed).
-  if (!bushd_delay_is_code(delay) && delay > (uint64_t)units * 256u) {
-    const uint64_t apart = delay / (units * UINT64_C(256) + 1u) + 1u;
-    const uint16_t most = (uint16_t)(BUSHD_MCU_SELDOM - 1u);
-    motor->displacement = (uint16_t)(BUSHD_MCU_SELDOM + (apart < most ? (uint16_t)apart : most));
-    return;
-  }
-#endif
-  motor->displacement = (uint16_t)(units * 256u / delay);
-}
-
-static inline bool in_run_at(bushd_mcu* mcu, bushd_mcu_motor* motor, uint32_t tick) {
+static inline bool in_run_at(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
   const bool begins = motor->mode == BUSHD_MCU_RUN_WAITS && motor->start.tick == (uint16_t)tick;
-  const uint8_t m = (uint8_t)(motor - mcu->motor);
   if (begins) {
-    motor->mode = BUSHD_MCU_TABLE_RUN;
-    mcu->stream.queue_summary.stale = true;
-    if ((mcu->line.motors & motor_bit(m)) != 0) bushd_mcu_line_begins(mcu, tick);
+    bushd_mcu_give_motor(mcu, m, BUSHD_MCU_TABLE_RUN);
+    if (bushd_mcu_owner_of_motor(mcu, m) == BUSHD_MCU_OWNER_LINE) bushd_mcu_line_begins(mcu, tick);
   }
   if (motor->mode != BUSHD_MCU_TABLE_RUN) return false;
   if (ticks_after(tick, motor->made.until) < 0) return true;
-  if ((mcu->line.motors & motor_bit(m)) != 0) {
+  if (bushd_mcu_owner_of_motor(mcu, m) == BUSHD_MCU_OWNER_LINE) {
     bushd_mcu_leave_line(mcu, m);
   } else if (!begins) {
-    leave_run(mcu, motor);
+    bushd_mcu_leave_run(mcu, m);
   }
-  end_run(mcu, motor);
+  bushd_mcu_give_to_queue(mcu, m);
   return false;
 }
 
@@ -231,7 +167,7 @@ __attribute__((noinline)) static void forget_starts(bushd_mcu* mcu, uint32_t tic
 // of a run, exact to a slot.
 static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* displacement) {
   bushd_mcu_motor* motor = &mcu->motor[m];
-  if (in_run_at(mcu, motor, tick)) return false;
+  if (in_run_at(mcu, m, tick)) return false;
   if (ticks_after(motor->known_until, tick) > 0) {
     follow_begun(mcu, motor_bit(m), *displacement != 0 ? motor_bit(m) : (uint16_t)0, tick);
     return true;
@@ -244,7 +180,7 @@ static bool displacement_of(bushd_mcu* mcu, uint8_t m, uint32_t tick, int16_t* d
     return true;
   }
   if (motor->exact) return false;
-  *displacement = ramp_down_displacement(mcu, motor);
+  *displacement = ramp_down_displacement(mcu, m);
   return true;
 }
 
@@ -359,11 +295,8 @@ static uint16_t plan(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
 }
 
 void bushd_mcu_emit(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
-  uint16_t exact = plan(mcu, slot_buffer);
-  exact &= (uint16_t)~bushd_mcu_emit_velocity(mcu, slot_buffer, exact);
-  const uint16_t on_line = exact & mcu->line.motors;
-  if (exact != on_line) emit_runs(mcu, slot_buffer, exact & (uint16_t)~on_line);
-  if (on_line != 0) bushd_mcu_emit_line(mcu, slot_buffer, on_line);
+  const uint16_t exact = plan(mcu, slot_buffer);
+  if (exact != 0) bushd_mcu_make_steps(mcu, slot_buffer, exact);
   slot_buffer->direction = mcu->direction ^ mcu->config.outputs.direction_low;
   slot_buffer->outputs = BUSHD_OUTPUTS_PULSES;
   slot_buffer->compare_rise = slot_buffer->compare_fall = 0;

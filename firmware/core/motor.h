@@ -11,14 +11,17 @@
 
 typedef struct bushd_mcu bushd_mcu;
 
+// What it does; whose it is meanwhile, owner.h tells.
 typedef enum bushd_mcu_mode {
   BUSHD_MCU_STREAM = 0,     // the queue decides
   BUSHD_MCU_RUN_WAITS = 1,  // so it does until its start, then a table run follows
-  BUSHD_MCU_TABLE_RUN = 2,
+  BUSHD_MCU_TABLE_RUN = 2,  // of its own table, or that of a line
   BUSHD_MCU_RAMP_DOWN = 3,
-  BUSHD_MCU_AUTONOMOUS =
-      4,                  // `run` is made, whatever its stage, until homing or local inputs end it
-  BUSHD_MCU_VELOCITY = 5  // by the velocity loop (velocity.h), until it is at rest
+  // `run` is made, whatever its stage, until these end it:
+  BUSHD_MCU_HOMING = 4,
+  BUSHD_MCU_TRAVEL = 5,
+  BUSHD_MCU_LOCAL = 6,    // local inputs
+  BUSHD_MCU_VELOCITY = 7  // local inputs by the velocity loop (velocity.h), until it is at rest
 } bushd_mcu_mode;
 
 #define BUSHD_MCU_SELDOM 0x8000u  // of bushd_mcu_motor.displacement

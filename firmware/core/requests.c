@@ -12,6 +12,7 @@
 #include "firmware/core/inputs.h"
 #include "firmware/core/line_run.h"
 #include "firmware/core/local.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/position_compare.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
@@ -47,8 +48,7 @@ static inline void report_motors(const bushd_mcu* mcu, bushd_report* report) {
   }
   report->motor_count = mcu->config.motors;
   // What people move by local inputs is not for a master to end.
-  const uint16_t its = bushd_mcu_homing_motor(mcu) | bushd_mcu_travel_motor(mcu);
-  report->running = (uint16_t)(running & ~(mcu->autonomous & ~its));
+  report->running = (uint16_t)(running & ~(mcu->autonomous & ~bushd_mcu_moved_by_request(mcu)));
   report->out_of_order_from = told != NULL ? (uint16_t)told->from : (uint16_t)0;
   report->out_of_order_until = told != NULL ? (uint16_t)told->until : (uint16_t)0;
 }

@@ -15,7 +15,13 @@
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
+
+void bushd_mcu_give_to_queue(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_give_motor(mcu, m, BUSHD_MCU_STREAM);
+  mcu->line.motors &= (uint16_t)~motor_bit(m);
+}
 
 void bushd_mcu_clear_streams(bushd_mcu* mcu) {
   mcu->stream.rows.next = mcu->stream.rows.ticks.count;
@@ -28,7 +34,7 @@ void bushd_mcu_clear_streams(bushd_mcu* mcu) {
     bushd_mcu_motor* motor = &mcu->motor[m];
     motor->known_until = bushd_mcu_first_open(mcu);
     motor->delay = 0;
-    motor->mode = BUSHD_MCU_STREAM;
+    bushd_mcu_give_motor(mcu, m, BUSHD_MCU_STREAM);
     motor->has_out_of_order = false;
   }
 }
@@ -64,10 +70,7 @@ static void cut_start(bushd_mcu* mcu, uint8_t m, uint32_t tick) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   if ((mcu->stream.starting & motor_bit(m)) == 0) return;
   if (ticks_after(near_tick(motor->start.tick, tick), tick) < 0) return;
-  if (motor->mode == BUSHD_MCU_RUN_WAITS) {
-    motor->mode = BUSHD_MCU_STREAM;
-    mcu->line.motors &= (uint16_t)~motor_bit(m);
-  }
+  if (motor->mode == BUSHD_MCU_RUN_WAITS) bushd_mcu_give_to_queue(mcu, m);
   motor->start.tick = (uint16_t)tick;
   if (ticks_after(near_tick(motor->start.rest_from, tick), tick) >= 0) {
     mcu->stream.starting &= (uint16_t)~motor_bit(m);
@@ -115,16 +118,12 @@ static bushd_status check_motor(const bushd_mcu* mcu, uint8_t m, const bushd_mcu
   if (end <= 0) return BUSHD_OK;
   if (range->flags & BUSHD_TICKS_START) {
     *news = true;
-    // A limit's ramp-down is under way beyond what is queued. One start can wait at a time if it is
-    // a run's.
-    if (moves_on || motor->mode >= BUSHD_MCU_RAMP_DOWN || motor->mode == BUSHD_MCU_RUN_WAITS) {
-      return BUSHD_E_STATE;
-    }
+    if (moves_on || !bushd_mcu_may_be_followed(motor)) return BUSHD_E_STATE;
     return first < 0 ? BUSHD_E_LATE : BUSHD_OK;
   }
   if (!moves_on) return BUSHD_E_GAP;
   // Its run stands where its out-of-order range would be kept.
-  if (first > 0 && motor->mode != BUSHD_MCU_STREAM) return BUSHD_E_GAP;
+  if (first > 0 && !bushd_mcu_has_no_run(motor)) return BUSHD_E_GAP;
   if (first > 0 && motor->has_out_of_order) {
     const int32_t from = ticks_after(motor->out_of_order.from, motor->known_until);
     const int32_t until = ticks_after(motor->out_of_order.until, motor->known_until);
@@ -140,7 +139,7 @@ static bushd_status check_head(bushd_mcu* mcu, const bushd_mcu_tick_range* range
   bushd_mcu_update_state(mcu);
   const bool replace = (range->flags & BUSHD_TICKS_REPLACE) != 0;
   if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
-  if (range->mask & (mcu->autonomous | mcu->trigger.armed)) return BUSHD_E_STATE;
+  if (range->mask & bushd_mcu_not_for_ticks(mcu)) return BUSHD_E_STATE;
   const uint8_t ahead = (uint8_t)(range->epoch - mcu->stream.epoch);
   if (replace ? ahead == 0 || ahead > INT8_MAX : ahead != 0) return BUSHD_E_EPOCH;
   // The queue holds the ticks after the one prepared. All sums of tick numbers below are small once

@@ -3,8 +3,8 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/limits.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/stream.h"
-#include "firmware/core/velocity.h"
 
 bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
                             uint32_t* spare_ns) {
@@ -31,10 +31,68 @@ const bushd_run_tick* bushd_mcu_run_tick_of(bushd_mcu* mcu, uint8_t bank,
   return tick;
 }
 
+static inline const bushd_run_tick* run_tick_of(bushd_mcu* mcu, const bushd_mcu_motor* motor) {
+  return bushd_mcu_run_tick_of(mcu, (uint8_t)motor->table, motor->made.run.table);
+}
+
+void bushd_mcu_emit_runs(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t exact) {
+  const bool keep_slots = bushd_mcu_steps_keep_slots(mcu);
+  bushd_mcu_motor* motor = mcu->motor;
+  int16_t* steps = slot_buffer->steps;
+  const bushd_table* table = NULL;
+  const bushd_run_tick* tick = NULL;
+  uint16_t forward = 0;
+  uint16_t active = 0;
+  uint16_t bit = 1;
+  for (uint16_t left = exact; left != 0; left = (uint16_t)(left >> 1), ++motor, ++steps) {
+    if ((left & 1u) != 0) {
+      bushd_run* run = &motor->made.run;
+      // Mostly motors share a table.
+      if (run->table != table) tick = run_tick_of(mcu, motor);
+      table = run->table;
+      *steps = bushd_run_slots(run, tick, keep_slots ? bit : 0, slot_buffer->step);
+      if (run->direction > 0) forward |= bit;
+      if (*steps != 0) active |= bit;
+      motor->remainder = 0;  // until ticks follow (bushd_mcu_leave_run)
+      if (motor->mode == BUSHD_MCU_RAMP_DOWN && bushd_run_done(run)) {
+        bushd_mcu_give_to_queue(mcu, (uint8_t)(motor - mcu->motor));
+      }
+    }
+    bit = (uint16_t)(bit << 1);
+  }
+  mcu->direction = (mcu->direction & (uint16_t)~exact) | forward;
+  mcu->stream.begun |= exact;
+  slot_buffer->active |= active;
+}
+
+// Nobody asks for the share of the running step before. Its speed is rounded down, so that a stop
+// goes by a longer delay rather than a shorter one; 31 bits hold it, since no table makes more than
+// 127 steps a tick.
+void bushd_mcu_leave_run(bushd_mcu* mcu, uint8_t m) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_run* run = &motor->made.run;
+  const bushd_delay delay = bushd_run_delay(run);
+  if (delay == 0 || mcu->format != BUSHD_FORMAT_FINE) return;
+  bushd_run_note_fraction(run);
+  motor->remainder = (int16_t)(run->direction < 0 ? -run->fraction : run->fraction);
+  const uint32_t units = run_tick_of(mcu, motor)->units;
+  motor->still_ticks = 0;
+#if BUSHD_SLOW_RUNS
+  // Less than 1/256 step a tick: then by the time for one (note_speed).
+  if (!bushd_delay_is_code(delay) && delay > (uint64_t)units * 256u) {
+    const uint64_t apart = delay / (units * UINT64_C(256) + 1u) + 1u;
+    const uint16_t most = (uint16_t)(BUSHD_MCU_SELDOM - 1u);
+    motor->displacement = (uint16_t)(BUSHD_MCU_SELDOM + (apart < most ? (uint16_t)apart : most));
+    return;
+  }
+#endif
+  motor->displacement = (uint16_t)(units * 256u / delay);
+}
+
 void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_t ticks) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_mcu_note_start(mcu, m, first_tick);
-  motor->mode = BUSHD_MCU_RUN_WAITS;
+  bushd_mcu_give_motor(mcu, m, BUSHD_MCU_RUN_WAITS);
   motor->exact = true;
   motor->made.until = first_tick + ticks;
   motor->known_until = motor->made.until;
@@ -53,8 +111,7 @@ static bushd_status check_entry(const bushd_mcu* mcu, uint32_t first_tick,
   if (ticks_after(first_tick, motor->known_until) < 0) return BUSHD_E_LATE;
   if (motor->table != (int8_t)entry->bank) return BUSHD_E_NO_TABLE;
   if (!bushd_mcu_runs_so_slowly(mcu, entry->shortest_delay)) return BUSHD_E_FORMAT;
-  // There is room for one run.
-  return motor->mode == BUSHD_MCU_STREAM ? BUSHD_OK : BUSHD_E_STATE;
+  return bushd_mcu_has_no_run(motor) ? BUSHD_OK : BUSHD_E_STATE;
 }
 
 bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message) {
@@ -92,18 +149,13 @@ void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   // It was cut, or does so already.
   if (motor->mode == BUSHD_MCU_STREAM || motor->mode == BUSHD_MCU_RAMP_DOWN) return;
-  if (motor->mode == BUSHD_MCU_VELOCITY) {
-    bushd_mcu_brake(mcu, m);
-    return;
-  }
-  mcu->stream.queue_summary.stale = true;
   const bool begun = (mcu->stream.begun & motor_bit(m)) != 0;
   if (begun) bushd_run_ramp_down(&motor->made.run);
   if (begun && !bushd_run_done(&motor->made.run)) {
-    motor->mode = BUSHD_MCU_RAMP_DOWN;
+    bushd_mcu_give_motor(mcu, m, BUSHD_MCU_RAMP_DOWN);
     return;
   }
-  motor->mode = BUSHD_MCU_STREAM;
+  bushd_mcu_give_to_queue(mcu, m);
   mcu->stream.begun &= (uint16_t)~motor_bit(m);
 }
 
@@ -115,12 +167,11 @@ uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction)
 }
 
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
-                               bushd_delay shortest_delay) {
+                               bushd_delay shortest_delay, bushd_mcu_mode mode) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction,
                   shortest_delay);
-  motor->mode = BUSHD_MCU_AUTONOMOUS;
+  bushd_mcu_give_motor(mcu, m, mode);
   motor->exact = true;
   mcu->autonomous |= motor_bit(m);
-  mcu->stream.queue_summary.stale = true;
 }

@@ -7,6 +7,8 @@
 
 #include "engine/message.h"
 #include "engine/run_slots.h"
+#include "firmware/core/motor.h"
+#include "firmware/core/slot_buffer.h"
 
 typedef struct bushd_mcu bushd_mcu;
 
@@ -25,13 +27,19 @@ void bushd_mcu_begin_run(bushd_mcu* mcu, uint8_t m, uint32_t first_tick, uint32_
 // Steps that a motor may make in this direction from the end of the tick that is emitted on before
 // its position is beyond +-(2^31 - 1).
 uint32_t bushd_mcu_steps_counted(const bushd_mcu* mcu, uint8_t m, int direction);
-// A motor at rest begins a run of its table that nothing but its own end, a stop or the caller
-// ends: it is `autonomous` until it rests. `shortest_delay`: as of bushd_run_start. Precondition:
-// so many steps are counted.
+// A motor at rest begins a run of its table that nothing but its own end, a stop or the caller,
+// whose mode it has, ends: it is `autonomous` until it rests. `shortest_delay`: as of
+// bushd_run_start. Precondition: so many steps are counted.
 void bushd_mcu_begin_by_itself(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction,
-                               bushd_delay shortest_delay);
-// Ramps a motor in a run down, by the shortest way that its table allows. One that was stopped
-// otherwise since stays so.
+                               bushd_delay shortest_delay, bushd_mcu_mode mode);
+// The next tick of these motors' own runs. Sets the motors' bits in the masks of their steps, or
+// none if the emission decides where they lie.
+void bushd_mcu_emit_runs(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors);
+// Ticks take the place of the rest of a run: they go on from the share of the running step that has
+// passed.
+void bushd_mcu_leave_run(bushd_mcu* mcu, uint8_t m);
+// Ramps a motor in a run of its own down, by the shortest way that its table allows. One that was
+// stopped otherwise since stays so.
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m);
 
 #endif

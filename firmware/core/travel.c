@@ -15,6 +15,7 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/homing.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
 #include "firmware/core/trigger.h"
@@ -23,24 +24,15 @@ static bool is_run(const bushd_mcu_travel* travel) {
   return travel->stage == BUSHD_TRAVEL_RUN || travel->stage == BUSHD_TRAVEL_RETURN;
 }
 
-uint16_t bushd_mcu_travel_motor(const bushd_mcu* mcu) {
-  const uint8_t m = mcu->travel.motor;
-  const bool travels =
-      bushd_mcu_travels(&mcu->travel) && mcu->motor[m].mode == BUSHD_MCU_AUTONOMOUS;
-  return travels ? motor_bit(m) : (uint16_t)0;
-}
-
 static void end(bushd_mcu* mcu, bushd_travel_stage stage) {
   bushd_mcu_travel* travel = &mcu->travel;
-  bushd_mcu_motor* motor = &mcu->motor[travel->motor];
   if (travel->stage == BUSHD_TRAVEL_ARMED) {
     mcu->port.set_trigger(mcu->port.context, BUSHD_EDGE_NONE);
   }
   travel->stage = (uint8_t)stage;
-  mcu->stream.queue_summary.stale = true;
-  if (motor->mode != BUSHD_MCU_AUTONOMOUS) return;
-  motor->mode = BUSHD_MCU_STREAM;
-  motor->remainder = 0;
+  if (bushd_mcu_owner_of_motor(mcu, travel->motor) != BUSHD_MCU_OWNER_TRAVEL) return;
+  bushd_mcu_give_to_queue(mcu, travel->motor);
+  mcu->motor[travel->motor].remainder = 0;
 }
 
 static void wait_for_edge(bushd_mcu* mcu) {
@@ -159,7 +151,7 @@ void bushd_mcu_go_travel(bushd_mcu* mcu, uint16_t active_inputs) {
     if (is_run(travel)) mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
   }
   if (mcu->faults != 0) bushd_mcu_ramp_down_run(mcu, travel->motor);
-  if (mcu->motor[travel->motor].mode == BUSHD_MCU_AUTONOMOUS) {
+  if (bushd_mcu_owner_of_motor(mcu, travel->motor) == BUSHD_MCU_OWNER_TRAVEL) {
     go_on(mcu, active_inputs);
   } else {
     end(mcu, BUSHD_TRAVEL_STOPPED);
@@ -233,7 +225,7 @@ bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message) 
   bushd_mcu_travel* travel = &mcu->travel;
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
   if (message->kind == BUSHD_TRAVEL_NONE) {
-    if (bushd_mcu_travel_motor(mcu) & motor_bit(message->motor)) {
+    if (bushd_mcu_owner_of_motor(mcu, message->motor) == BUSHD_MCU_OWNER_TRAVEL) {
       bushd_mcu_ramp_down_run(mcu, message->motor);
       end(mcu, BUSHD_TRAVEL_STOPPED);
     }
@@ -249,7 +241,8 @@ bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message) 
   if (!bushd_mcu_make_run(mcu, &run, &spare_ns)) return BUSHD_E_CAPACITY;
   take(mcu, message, mcu->motor[message->motor].made.until, spare_ns);
   const bool steps = message->kind == BUSHD_TRAVEL_STEP;
-  bushd_mcu_begin_by_itself(mcu, message->motor, steps ? 1 : 0, message->direction, 0);
+  bushd_mcu_begin_by_itself(mcu, message->motor, steps ? 1 : 0, message->direction, 0,
+                            BUSHD_MCU_TRAVEL);
   if (steps) {
     travel->stage = BUSHD_TRAVEL_STEPS;
     travel->readings = (uint16_t)((travel->wait_ns + mcu->tick_ns - 1u) / mcu->tick_ns + 1u);

@@ -32,7 +32,6 @@ typedef struct bushd_mcu_travel {
 bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message);
 // Before every tick is prepared.
 void bushd_mcu_go_travel(bushd_mcu* mcu, uint16_t active_inputs);
-uint16_t bushd_mcu_travel_motor(const bushd_mcu* mcu);  // as a mask
 // The edge that it waits for (bushd_mcu_trigger).
 void bushd_mcu_travel_at_edge(bushd_mcu* mcu, int32_t time_in_tick_ns);
 // A limit is active in the direction of the one that travels; false if that is where it was to

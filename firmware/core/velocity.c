@@ -1,6 +1,7 @@
 #include "firmware/core/velocity.h"
 
 #include "firmware/core/access.h"
+#include "firmware/core/owner.h"
 #include "firmware/core/state.h"
 
 // 1/64 step/s that the port keeps up with, unless its build says less.
@@ -68,10 +69,9 @@ void bushd_mcu_steer(bushd_mcu* mcu, uint8_t m, int8_t direction, int32_t most) 
   if (motor->mode != BUSHD_MCU_VELOCITY) {
     bushd_velocity_init(&its->loop, its->settings.acceleration, its->settings.least);
     its->since_ns = 0;
-    motor->mode = BUSHD_MCU_VELOCITY;
+    bushd_mcu_give_motor(mcu, m, BUSHD_MCU_VELOCITY);
     motor->exact = true;
     mcu->autonomous |= motor_bit(m);
-    mcu->stream.queue_summary.stale = true;
   }
   const int32_t speed = its->settings.most < most ? its->settings.most : most;
   its->loop.wanted = direction > 0 ? speed : -speed;
@@ -197,8 +197,7 @@ static void emit(bushd_mcu* mcu, uint8_t m, bushd_slot_buffer* slot_buffer) {
   motor->remainder = 0;
   mcu->stream.begun |= bit;
   if (its->loop.now != 0 || its->loop.wanted != 0) return;
-  motor->mode = BUSHD_MCU_STREAM;
-  mcu->stream.queue_summary.stale = true;
+  bushd_mcu_give_to_queue(mcu, m);
 }
 
 uint16_t bushd_mcu_emit_velocity(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t exact) {
