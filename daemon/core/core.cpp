@@ -137,7 +137,7 @@ void Core::receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t>
 }
 
 void Core::pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus& status) {
-  installation_[bus].master.pulse_status(now_us, status);
+  installation_[bus].offers.pulse_port->pulse_status(now_us, status);
   supervisor_.handle_events(now_us, installation_[bus]);
 }
 
@@ -227,9 +227,9 @@ void Core::keep_up(std::int64_t now_us) {
   for (const BusId id : installation_.buses()) {
     const std::span<const std::uint8_t> bytes = installation_[id].master.step(now_us);
     if (!bytes.empty()) outputs_.send(id, bytes);
-    if (const link::PulseOrder* order = installation_[id].master.pulse_order()) {
-      outputs_.pulse(id, *order);
-    }
+    const link::PulsePort* port = installation_[id].offers.pulse_port;
+    const link::PulseOrder* order = port != nullptr ? port->pulse_order() : nullptr;
+    if (order != nullptr) outputs_.pulse(id, *order);
     supervisor_.handle_events(now_us, installation_[id]);
   }
   for (Service* service : services_) service->step(now_us);
@@ -264,7 +264,10 @@ void Core::shut_down(std::int64_t now_us) {
   end_overtaken(now_us);
   open_moves_.stopped_by(all, by);
   stops_.stop(now_us, all);
-  for (const BusId bus : installation_.buses()) installation_[bus].master.enable_no_more();
+  for (const BusId bus : installation_.buses()) {
+    link::SharedLine* line = installation_[bus].offers.shared_line;
+    if (line != nullptr) line->enable_no_more();
+  }
 }
 
 void Core::end_overtaken(std::int64_t now_us) {

@@ -59,7 +59,7 @@ class Core {
   void port_lost(std::int64_t now_us, BusId bus, const std::string& cause);
   void receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t> bytes);
   // Something of the bus has answered since its port was opened.
-  bool heard(BusId bus) const { return installation_[bus].master.heard(); }
+  bool heard(BusId bus) const { return installation_[bus].heard(); }
   // To be called soon after the output that ordered it.
   void pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus& status);
 

@@ -134,7 +134,7 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
                       .tick = mcu.view().tick,
                       .requests_open = mcu.busy(),
                       .emergency_stop_open = emergency_stop_.under_way(),
-                      .other_master = installation_.bus_of(mcu).master.two_masters(now_us)}));
+                      .other_master = installation_.bus_of(mcu).hears_two_masters(now_us)}));
   }
   journal_.after_report(mcu);
   for (Service* service : services_) service->reports(now_us, mcu);
@@ -160,7 +160,7 @@ void Supervisor::is_uncertain(const Mcu& mcu, Output output) {
 void Supervisor::watch_for_other_masters(std::int64_t now_us) {
   for (const BusId id : installation_.buses()) {
     Bus& bus = installation_[id];
-    const bool now = bus.master.two_masters(now_us);
+    const bool now = bus.hears_two_masters(now_us);
     if (std::exchange(bus.two_masters, now) == now) continue;
     installation_.changed = true;
     if (now) {
@@ -184,7 +184,7 @@ void Supervisor::set_up_again() {
   std::erase_if(to_set_up_, [this](McuId id) {
     Mcu& mcu = installation_[id];
     if (installation_.any_moves(mcu)) return false;
-    mcu.reconfigure(installation_.setup_of(id));
+    mcu.bus().reconfigure(mcu.on_bus(), installation_.setup_of(id));
     installation_.changed = true;
     return true;
   });

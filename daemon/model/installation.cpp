@@ -111,7 +111,7 @@ void Installation::add_mcus() {
     const McuId id{mcus_.size()};
     Bus& bus = *buses_[mcu.bus];
     const auto place = std::ranges::find(bus.mcus, id) - bus.mcus.begin();
-    mcus_.add(id, mcu, bus.master, link::McuIndex{static_cast<std::size_t>(place)});
+    mcus_.add(id, mcu, bus, link::McuIndex{static_cast<std::size_t>(place)});
   }
 }
 
@@ -172,7 +172,7 @@ std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const
 link::LineRun Mcu::line_run(const motion::LineShare& share, bushd_delay shortest_delay,
                             link::Tick ticks) const {
   // What really begins has its table there. A dry run may ask before: this is where it would be.
-  const auto bank = master_.bank_of(on_bus_, share.table->view());
+  const auto bank = offers.line_runs->bank_of(on_bus_, share.table->view());
   return {.bank = bank.value_or(BUSHD_SCRATCH_BANK),
           .shortest_delay = shortest_delay,
           .longest = share.longest,
@@ -193,7 +193,7 @@ bool Installation::rests(const Mcu& mcu) const {
 }
 
 bool Installation::by_table(const Mcu& mcu, std::int64_t steps, bushd_delay shortest_delay) const {
-  return (bus_of(mcu).config.table_runs || !mcu.streams()) && mcu.can_run_tables() &&
+  return (bus_of(mcu).config.table_runs || !mcu.offers.streams) && mcu.can_run_tables() &&
          (bushd_delay_is_code(shortest_delay) || mcu.can_run_slowly()) &&
          std::abs(steps) <= motion::Motor::kMaxPosition;
 }

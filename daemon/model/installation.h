@@ -49,9 +49,15 @@ class Bus final : public AxisSource {
       : config(as_configured),
         installation_(of),
         master_(new_master(as_configured, std::move(setup), *this)),
-        master(*master_) {}
+        master(*master_),
+        offers(master.offers()) {}
 
   motion::Axis* axis_of(link::McuIndex mcu, Output output) override;
+  // Kinds that nothing answers unasked take their port for the right one.
+  bool heard() const { return offers.shared_line == nullptr || offers.shared_line->heard(); }
+  bool hears_two_masters(std::int64_t now_us) const {
+    return offers.shared_line != nullptr && offers.shared_line->two_masters(now_us);
+  }
 
   const config::Bus& config;
 
@@ -61,25 +67,32 @@ class Bus final : public AxisSource {
 
  public:
   link::BusMaster& master;
+  const link::Offers offers;
   std::vector<McuId> mcus;  // by link::McuIndex
   std::string port_state = "not yet opened";
   std::string port;          // that is open; "": none
   bool two_masters = false;  // as told in the log last
 };
 
-// One MCU, and what can be asked of it; link::BusMaster says what each function does.
+// One MCU, and what is known of it. What is asked of it is asked of its bus, by its place there.
 class Mcu {
  public:
-  Mcu(McuId its_id, const config::Mcu& as_configured, link::BusMaster& master,
-      link::McuIndex on_bus)
-      : id(its_id), config(as_configured), master_(master), on_bus_(on_bus) {}
+  Mcu(McuId its_id, const config::Mcu& as_configured, Bus& bus, link::McuIndex on_bus)
+      : id(its_id),
+        config(as_configured),
+        offers(bus.offers),
+        master_(bus.master),
+        on_bus_(on_bus) {}
 
   const McuId id;
   const config::Mcu& config;
+  const link::Offers offers;  // of its bus
   const std::string& name() const { return config.id; }
   const std::vector<MotorId>& motors() const { return motors_; }  // in the order of outputs
   std::optional<MotorId> motor_at(Output output) const { return motor_at_[output.value]; }
   link::McuIndex on_bus() const { return on_bus_; }
+  link::BusMaster& bus() { return master_; }
+  const link::BusMaster& bus() const { return master_; }
 
   const link::McuView& view() const { return master_.view(on_bus_); }
   const bushd_report& report() const { return view().report; }
@@ -88,55 +101,40 @@ class Mcu {
   Result<void> must_be_online() const;
   // It has not yet answered all that it was asked, or not yet reported since.
   bool busy() const { return master_.busy(on_bus_); }
-  const link::McuHealth& health() const { return master_.health(on_bus_); }
-  bool one_at_a_time() const { return master_.one_at_a_time(); }
-  bool streams() const { return master_.streams(); }
   // Its drivers are disabled at rest (IdleDrivers), and enabled when one of its motors is to move.
   bool asleep = false;
-  bool can_run_tables() const { return master_.can_run_tables(on_bus_); }
-  bool can_run_slowly() const { return master_.can_run_slowly(on_bus_); }
+
+  // What its identity tells that it can: preconditions of what its bus offers.
+  bool can_run_tables() const { return can(BUSHD_CAN_TABLE_RUN); }
+  bool can_run_slowly() const { return can(BUSHD_CAN_SLOW_RUNS); }
+  bool can_trigger() const { return can(BUSHD_CAN_TRIGGER); }
+  bool can_arm_lines() const { return can_trigger() && can(BUSHD_CAN_LINE_RUN); }
+  bool can_compare_positions() const { return can(BUSHD_CAN_POSITION_COMPARE); }
+  bool can_travel() const { return can(BUSHD_CAN_TRAVEL); }
+  bool can_home() const { return can(BUSHD_CAN_HOME); }
+
+  // As link::LineRuns and link::Uploads say; of a bus without them the answer is no.
   bool has_table(const bushd_table& table) const {
-    return master_.bank_of(on_bus_, table).has_value();
+    return offers.line_runs != nullptr && offers.line_runs->bank_of(on_bus_, table).has_value();
+  }
+  bool makes_lines() const {
+    return offers.line_runs != nullptr && offers.line_runs->makes_lines(on_bus_);
   }
   bool keeps_up_with(const bushd_table& table, bushd_delay shortest_delay, bool alone) const {
-    return master_.keeps_up_with(on_bus_, table, shortest_delay, alone);
+    return offers.line_runs != nullptr &&
+           offers.line_runs->keeps_up_with(on_bus_, table, shortest_delay, alone);
   }
   bool can_run_line(const bushd_table& table, bushd_delay shortest_delay, bool alone) const {
-    return master_.can_run_line(on_bus_, table, shortest_delay, alone);
+    return offers.line_runs != nullptr &&
+           offers.line_runs->can_run_line(on_bus_, table, shortest_delay, alone);
   }
-  bool makes_lines() const { return master_.makes_lines(on_bus_); }
-  // A table for lines (link::BusMaster::upload). Precondition: it rests, and has answered.
-  bool can_upload(const bushd_table& table) const { return master_.can_upload(on_bus_, table); }
-  void upload(const bushd_table& table) { master_.upload(on_bus_, table); }
-  bool uploads() const { return master_.uploads(on_bus_); }
-  void end_upload() { master_.end_upload(on_bus_); }
-  bool can_trigger() const { return master_.can_trigger(on_bus_); }
-  bool can_arm_lines() const { return master_.can_arm_lines(on_bus_); }
-  bool can_compare_positions() const { return master_.can_compare_position(on_bus_); }
-  bool can_travel() const { return master_.can_travel(on_bus_); }
-  bool can_home() const { return master_.can_home(on_bus_); }
+  bool can_upload(const bushd_table& table) const {
+    return offers.uploads != nullptr && offers.uploads->can_upload(on_bus_, table);
+  }
+  bool uploads() const { return offers.uploads != nullptr && offers.uploads->uploads(on_bus_); }
 
   link::Tick earliest_start(std::int64_t now_us, Output output) const {
     return master_.earliest_start(now_us, on_bus_, output.value);
-  }
-  link::Tick earliest_replace(std::int64_t now_us,
-                              std::span<const link::ToReplace> together) const {
-    return master_.earliest_replace(now_us, together);
-  }
-  link::Tick earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
-                               link::Tick start) const {
-    return master_.earliest_retarget(now_us, together, start);
-  }
-  bool has_time_to_retarget(std::int64_t now_us) const {
-    return master_.has_time_to_retarget(now_us, on_bus_);
-  }
-  bool keeps_pace() const { return master_.keeps_pace(); }
-  void begin_in_pace(Output output, link::Tick start, const std::shared_ptr<link::LinePace>& pace) {
-    master_.begin_in_pace(on_bus_, output.value, start, link::LinePace::Place(pace));
-  }
-  void begin(Output output, link::Tick start) { master_.begin(on_bus_, output.value, start); }
-  void begin_table_run(Output output, link::Tick start, link::TableRun run) {
-    master_.begin_table_run(on_bus_, output.value, start, run);
   }
   // The run of a motor's share that the MCUs are to make themselves, in so many ticks.
   // Precondition: can_run_line of its line, or its table is yet to be uploaded.
@@ -145,49 +143,15 @@ class Mcu {
   link::LineRun line_run(const motion::Axis& axis) const {
     return line_run(*axis.line(), axis.shortest_delay(), axis.over_tick() - axis.start_tick());
   }
-  void begin_line_run(Output output, const motion::Axis& axis) {
-    master_.begin_line_run(on_bus_, output.value, axis.start_tick(), line_run(axis));
-  }
-  void follow_table_run(Output output, link::Tick start, link::TableRun run) {
-    master_.follow_run(on_bus_, output.value, start, run);
-  }
-  void follow_line_run(Output output, const motion::Axis& axis) {
-    master_.follow_run(on_bus_, output.value, axis.start_tick(), line_run(axis));
-  }
   link::ToReplace to_replace(std::uint16_t outputs) const {
     return {.mcu = on_bus_, .motors = outputs};
   }
-  void replace(std::uint16_t outputs, link::Tick first) {
-    master_.replace(on_bus_, outputs, first);
-  }
-  void drop(Output output) { master_.drop(on_bus_, output.value); }
-  std::uint8_t arm(bushd_edge edge, std::uint32_t delay_us,
-                   std::span<const link::BusMaster::Armed> moves) {
-    return master_.arm(on_bus_, edge, delay_us, moves);
-  }
-  std::uint8_t arm_line(bushd_edge edge, std::uint32_t delay_us,
-                        std::span<const link::BusMaster::ArmedOnLine> parts) {
-    return master_.arm_line(on_bus_, edge, delay_us, parts);
-  }
-  void disarm() { master_.disarm(on_bus_); }
-  void compare_positions(const bushd_position_compare& message) {
-    master_.position_compare(on_bus_, message);
-  }
-  void home(const bushd_home& message) { master_.home(on_bus_, message); }
-  std::uint8_t travel(const bushd_travel& message) { return master_.travel(on_bus_, message); }
-  void end_travel(Output output) { master_.end_travel(on_bus_, output.value); }
-  // Precondition: it is not online.
-  void bind_to_stop(bushd_stop_mode mode) { master_.bind_to_stop(on_bus_, mode); }
-  void inhibit_local(std::uint16_t outputs) { master_.inhibit_local(on_bus_, outputs); }
-  void control(std::uint8_t actions) { master_.control(on_bus_, actions); }
-  void set_position(Output output, std::int32_t position_steps) {
-    master_.set_position(on_bus_, output.value, position_steps);
-  }
-  void reconfigure(link::McuSetup setup) { master_.reconfigure(on_bus_, std::move(setup)); }
   Result<void> has_room(const link::McuSetup& setup) const;
 
  private:
   friend class Installation;
+  bool can(std::uint32_t capability) const { return master_.can(on_bus_, capability); }
+
   link::BusMaster& master_;
   link::McuIndex on_bus_;
   std::vector<MotorId> motors_;

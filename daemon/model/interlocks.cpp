@@ -20,7 +20,7 @@ Result<void> Interlocks::may_move(MotorId motor) const {
   if (auto online = mcu.must_be_online(); !online) return online;
   if (auto may = may_move_by(mcu); !may) return may;
   for (const MotorId other : mcu.motors()) {
-    if (!mcu.one_at_a_time() || other == motor || !installation_[other].has_plan()) continue;
+    if (!mcu.offers.one_at_a_time || other == motor || !installation_[other].has_plan()) continue;
     return fail(installation_[other].busy_text() + ", and the board " + mcu.name() +
                 " moves one motor at a time; wait for its end, or stop it");
   }

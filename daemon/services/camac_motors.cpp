@@ -133,7 +133,7 @@ bool CamacMotors::streams() const {
   const GroupId group = installation_.config()[motion_->motor].group;
   const tables::Table& in_mcu = *installation_.tables()[group];
   if (in_mcu.content_hash() == motion_->table->content_hash()) return false;
-  if (!installation_.mcu_of(motion_->motor).streams() || !tables_.waits_for_motors(group)) {
+  if (!installation_.mcu_of(motion_->motor).offers.streams || !tables_.waits_for_motors(group)) {
     return false;
   }
   const std::int64_t fastest_ns =

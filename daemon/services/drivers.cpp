@@ -73,7 +73,7 @@ void Drivers::begin(std::int64_t now_us, const api::Asker& asker, const api::Mot
   for (const McuId mcu : targets->out_of_reach) done += " " + installation_[mcu].name();
   open_.push_back({Confirmation(asker, targets->mcus, now_us), action, std::move(done)});
   for (const McuId mcu : targets->mcus) {
-    installation_[mcu].control(action);
+    installation_[mcu].bus().control(installation_[mcu].on_bus(), action);
     if (action != BUSHD_CONTROL_CLEAR_FAULTS && listener_) listener_(mcu);
   }
 }

@@ -87,7 +87,9 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
     }
     if (line) of_lines = std::max(of_lines, motors_.back().start);
     if (steps == 0 || buses_.contains(mcu.config.bus)) continue;
-    buses_.try_emplace(mcu.config.bus, installation[mcu.config.bus].master.snapshot(now_us));
+    const link::SharedLine* shared = mcu.offers.shared_line;
+    buses_.try_emplace(mcu.config.bus,
+                       shared != nullptr ? std::optional(shared->snapshot(now_us)) : std::nullopt);
   }
   if (!parts.empty() && parts.front().line && parts.front().line->track) {
     const motion::Path& path = parts.front().line->track->path();

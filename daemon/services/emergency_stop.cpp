@@ -41,7 +41,7 @@ void EmergencyStop::take_kept() {
 void EmergencyStop::bind(McuId id) {
   Mcu& mcu = installation_[id];
   bound_.insert(id);
-  mcu.bind_to_stop(installation_.bus_of(mcu).config.emergency_stop);
+  mcu.bus().bind_to_stop(mcu.on_bus(), installation_.bus_of(mcu).config.emergency_stop);
 }
 
 void EmergencyStop::heard_from(McuId id) {

@@ -8,7 +8,7 @@ namespace {
 
 api::McuHealth health_of(const Mcu& mcu) {
   const link::McuView& view = mcu.view();
-  const link::McuHealth& health = mcu.health();
+  const link::McuHealth& health = mcu.bus().health(mcu.on_bus());
   api::McuHealth out;
   out.mcu = mcu.name();
   out.address = mcu.config.address.value;
@@ -62,7 +62,8 @@ void HealthPublisher::step(std::int64_t now_us) {
   if (now_us < due_us_) return;
   for (const BusId id : installation_.buses()) {
     outputs_.publish(id, health_of(installation_[id]));
-    installation_[id].master.reset_low_water();
+    link::SharedLine* line = installation_[id].offers.shared_line;
+    if (line != nullptr) line->reset_low_water();
   }
   due_us_ = now_us + kPeriodUs;
 }

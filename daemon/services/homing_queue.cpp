@@ -222,7 +222,7 @@ void HomingQueue::begin(Mcu& mcu) {
   const bool ends = !may_begin(task.motor) || !task.ended_by.empty();
   if (kept_.keeps() || !idle_drivers_.none() || ends) return;
   task.phase = Phase::kHoming;
-  mcu.home(message_for(task));
+  mcu.offers.homing->home(mcu.on_bus(), message_for(task));
 }
 
 // Now that it is its turn.
@@ -266,7 +266,7 @@ void HomingQueue::ask(std::int64_t now_us, Mcu& mcu) {
   kept_.not_wanted(task.motor);
   if (!ready) return end(mcu, Outcome::kFault, ready.error().text());
   task.phase = Phase::kHoming;
-  mcu.home(message_for(task));
+  mcu.offers.homing->home(mcu.on_bus(), message_for(task));
 }
 
 void HomingQueue::reports(std::int64_t, Mcu& mcu) {
@@ -467,7 +467,8 @@ void HomingQueue::give_up(Task& task, const std::string& because) {
   task.ended_by = because;
   bushd_home message = message_for({.motor = task.motor, .shortest_delay = 0});
   message.most_steps = 0;
-  installation_.mcu_of(task.motor).home(message);
+  const Mcu& mcu = installation_.mcu_of(task.motor);
+  mcu.offers.homing->home(mcu.on_bus(), message);
 }
 
 void HomingQueue::stop(MotorId id) {

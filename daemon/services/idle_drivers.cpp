@@ -38,7 +38,8 @@ bool IdleDrivers::make_ready(std::int64_t now_us, McuId id) {
   Mcu& mcu = installation_[id];
   OfMcu& own = mcus_[id];
   own.rests = false;
-  if (mcu.asleep && !std::exchange(own.waking, true)) mcu.control(BUSHD_CONTROL_ENABLE);
+  if (mcu.asleep && !std::exchange(own.waking, true))
+    mcu.bus().control(mcu.on_bus(), BUSHD_CONTROL_ENABLE);
   if (mcu.asleep) return false;
   return !own.enabled || now_us >= own.enabled_us + settle_us(mcu);
 }
@@ -73,7 +74,7 @@ bool IdleDrivers::at_rest(const Mcu& mcu) const {
 }
 
 void IdleDrivers::fall_asleep(Mcu& mcu) {
-  mcu.control(BUSHD_CONTROL_DISABLE);
+  mcu.bus().control(mcu.on_bus(), BUSHD_CONTROL_DISABLE);
   mcu.asleep = true;
   mcus_[mcu.id].rests = false;
   installation_.changed = true;

@@ -311,7 +311,8 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
   if (!verdict.set_steps) return ask_for_kept(id);
   motors_[id].restoring = Restoring{.steps = *verdict.set_steps, .reason = verdict.reason};
   motor.restoring(true);
-  mcu.set_position(motor.output(), static_cast<std::int32_t>(*verdict.set_steps));
+  mcu.bus().set_position(mcu.on_bus(), motor.output().value,
+                         static_cast<std::int32_t>(*verdict.set_steps));
 }
 
 // Where it stands, or was bound for, is where it was told to go.

@@ -18,7 +18,9 @@ Result<void> few_enough(std::size_t motors) {
 }  // namespace
 
 Result<void> may_be_one_line(const Installation& installation, const std::vector<MotorId>& motors) {
-  const auto keeps_pace = [&](MotorId motor) { return installation.mcu_of(motor).keeps_pace(); };
+  const auto keeps_pace = [&](MotorId motor) {
+    return installation.mcu_of(motor).offers.paced_lines != nullptr;
+  };
   const auto at_port = std::ranges::find_if(motors, keeps_pace);
   if (at_port == motors.end()) return on_one_bus(installation, motors);
   if (auto few = few_enough(motors.size()); !few) return few;
@@ -48,8 +50,8 @@ Result<void> on_one_bus(const Installation& installation, const std::vector<Moto
     return installation.bus_of(installation.mcu_of(motor)).config.name;
   };
   for (const MotorId motor : motors) {
-    if (installation.mcu_of(motor).streams()) continue;
-    const bool lines = installation.mcu_of(motor).keeps_pace();
+    if (installation.mcu_of(motor).offers.streams) continue;
+    const bool lines = installation.mcu_of(motor).offers.paced_lines != nullptr;
     return fail(fmt::format("{} is on bus {}, which makes runs of tables {}; move it {}",
                             installation[motor].name(), bus_name(motor),
                             lines ? "and lines, but no paths" : "only, no lines or paths",

@@ -32,7 +32,10 @@ void LineTables::begin(std::int64_t now_us, const api::Request& request, Wait& w
   const auto waits = [this](McuId id) { return std::ranges::find(waiting_, id) != waiting_.end(); };
   if (std::ranges::any_of(wanted->all, waits)) return;
   waiting_.insert(waiting_.end(), wanted->all.begin(), wanted->all.end());
-  for (const McuId id : wanted->mcus) installation_[id].upload(wanted->table->view());
+  for (const McuId id : wanted->mcus) {
+    const Mcu& mcu = installation_[id];
+    mcu.offers.uploads->upload(mcu.on_bus(), wanted->table->view());
+  }
   wait.deadline_us = now_us + wanted->most_us;
   wait.table = std::move(wanted);
 }
@@ -51,7 +54,10 @@ bool LineTables::is_over(std::int64_t now_us, const Wait& wait) const {
 
 void LineTables::end(Wait& wait) {
   if (!wait.table) return;
-  for (const McuId id : wait.table->mcus) installation_[id].end_upload();
+  for (const McuId id : wait.table->mcus) {
+    const Mcu& mcu = installation_[id];
+    mcu.offers.uploads->end_upload(mcu.on_bus());
+  }
   std::erase_if(waiting_, [&](McuId id) {
     return std::ranges::find(wait.table->all, id) != wait.table->all.end();
   });

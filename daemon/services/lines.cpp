@@ -178,7 +178,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
   const std::map<BusId, motion::Tick> start = starts_of(now_us, motors);
   Straight* straight = line.straight();
   std::shared_ptr<link::LinePace> pace;  // paths are not of ports
-  if (straight != nullptr && installation_.mcu_of(motors.front()).keeps_pace()) {
+  if (straight != nullptr && installation_.mcu_of(motors.front()).offers.paced_lines != nullptr) {
     const std::int64_t ahead_ns = straight->pace ? straight->pace->most_ahead_ns() : 0;
     pace = std::make_shared<link::LinePace>(static_cast<unsigned>(motors.size()), ahead_ns);
     straight->pace = pace;

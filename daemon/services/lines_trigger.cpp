@@ -116,7 +116,7 @@ Result<void> Lines::check_table(const motion::Way& way, const Mcu& mcu) const {
 void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
   const bushd_delay shortest_delay = line.straight()->way.shortest_delay();
-  std::map<McuId, std::vector<link::BusMaster::ArmedOnLine>> parts;
+  std::map<McuId, std::vector<link::Trigger::ArmedOnLine>> parts;
   std::vector<motion::LineShare> shares;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     shares.push_back(line.share(i, 0, line.longest()));
@@ -128,9 +128,10 @@ void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
                              .run = mcu.line_run(shares.back(), shortest_delay, 0)});
   }
   std::map<McuId, std::uint8_t> numbers;
-  for (const auto& [mcu, of_mcu] : parts) {
-    numbers[mcu] =
-        installation_[mcu].arm_line(edge, static_cast<std::uint32_t>(request.delay_us), of_mcu);
+  for (const auto& [id, of_mcu] : parts) {
+    const Mcu& mcu = installation_[id];
+    numbers[id] = mcu.offers.trigger->arm_line(
+        mcu.on_bus(), edge, static_cast<std::uint32_t>(request.delay_us), of_mcu);
   }
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     motion::OnLine on_line;

@@ -21,7 +21,7 @@ void LinkFaults::reports(std::int64_t, Mcu& mcu) {
     outputs_.log(LogLevel::kWarning, mcu.id,
                  "MCU " + mcu.name() + ": " + motion::stop_cause(report) +
                      "; positions are read, clearing the fault");
-    mcu.control(BUSHD_CONTROL_CLEAR_FAULTS);
+    mcu.bus().control(mcu.on_bus(), BUSHD_CONTROL_CLEAR_FAULTS);
   }
   if (asked != faulty) installation_.changed = true;
   asked = faulty && report.moving == 0;

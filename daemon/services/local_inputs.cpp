@@ -64,7 +64,9 @@ void LocalInputs::tell(Mcu& mcu, std::uint16_t inhibited) {
   Task& task = tasks_[mcu.id];
   task.before = task.inhibited;
   task.inhibited = inhibited;
-  mcu.inhibit_local(inhibited);
+  if (mcu.offers.local_inputs != nullptr) {
+    mcu.offers.local_inputs->inhibit_local(mcu.on_bus(), inhibited);
+  }
 }
 
 // What came before the MCU took the message says nothing.

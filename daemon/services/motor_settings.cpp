@@ -205,7 +205,7 @@ void MotorSettings::put(MotorId id, const config::Settings& settings) {
     installation_.put(id, settings.drive);
     installation_[id].set_local(settings.drive.moved_by_people());
     Mcu& mcu = installation_.mcu_of(id);
-    mcu.reconfigure(installation_.setup_of(mcu.id));
+    mcu.bus().reconfigure(mcu.on_bus(), installation_.setup_of(mcu.id));
   }
   installation_.changed = true;
 }

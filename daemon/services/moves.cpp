@@ -12,6 +12,12 @@ namespace {
 // From one slice to the next, with what is done in between; for the common start of all motors.
 constexpr std::int64_t kSliceUs = 2'000;
 
+link::McuRun run_begun(const Mcu& mcu, const motion::Axis& axis,
+                       const motion::event::Started& started) {
+  if (axis.line()) return mcu.line_run(axis);
+  return link::TableRun{static_cast<std::int32_t>(started.steps), axis.shortest_delay()};
+}
+
 }  // namespace
 
 void Moves::request(std::int64_t now_us, const api::Asker& asker, const api::Move& move) {
@@ -44,7 +50,7 @@ Result<std::vector<Moves::Part>> Moves::parts_of(const api::Move& move) const {
     if (!part) return fail(part.error());
     for (const Part& other : parts) {
       const Mcu& mcu = installation_.mcu_of(other.motor);
-      if (!mcu.one_at_a_time() || mcu.id != installation_.mcu_of(part->motor).id) continue;
+      if (!mcu.offers.one_at_a_time || mcu.id != installation_.mcu_of(part->motor).id) continue;
       return fail("the board " + mcu.name() + " moves one motor at a time; move " +
                   installation_[part->motor].name() + " after " +
                   installation_[other.motor].name());
@@ -234,15 +240,16 @@ void Moves::begin(MotorId id) {
   const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
   // A jog will change, and of what is streamed only ticks that have not been run can be taken back.
   const bool by_table = installation_.by_table(mcu, steps, motor.axis().shortest_delay()) &&
-                        !(mcu.streams() && motor.jogs());
+                        !(mcu.offers.streams && motor.jogs());
   journal_.started(id, steps, start, 0, by_table);
   if (steps == 0) {
     end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
   } else if (by_table) {
-    mcu.begin_table_run(motor.output(), start,
-                        {static_cast<std::int32_t>(steps), motor.axis().shortest_delay()});
+    mcu.offers.table_runs->begin_table_run(
+        mcu.on_bus(), motor.output().value, start,
+        {static_cast<std::int32_t>(steps), motor.axis().shortest_delay()});
   } else {
-    mcu.begin(motor.output(), start);
+    mcu.bus().begin(mcu.on_bus(), motor.output().value, start);
   }
   installation_.changed = true;
 }
@@ -262,16 +269,19 @@ void Moves::begin_on_line(const std::vector<MotorId>& motors,
     const bool in_mcus = axis.line() && axis.line()->in_mcus;
     journal_.started(id, axis.target_steps() - axis.from_steps(), axis.start_tick(), 0, in_mcus);
     Mcu& mcu = installation_.mcu_of(id);
+    const std::uint8_t output = installation_[id].output().value;
     if (pace) {
-      mcu.begin_in_pace(installation_[id].output(), axis.start_tick(), pace);
+      mcu.offers.paced_lines->begin_in_pace(mcu.on_bus(), output, axis.start_tick(),
+                                            link::LinePace::Place(pace));
       continue;
     }
     // One that makes no step of it only waits.
     if (axis.end_tick() <= axis.start_tick()) continue;
     if (in_mcus) {
-      mcu.begin_line_run(installation_[id].output(), axis);
+      mcu.offers.line_runs->begin_line_run(mcu.on_bus(), output, axis.start_tick(),
+                                           mcu.line_run(axis));
     } else {
-      mcu.begin(installation_[id].output(), axis.start_tick());
+      mcu.bus().begin(mcu.on_bus(), output, axis.start_tick());
     }
   }
   installation_.changed = true;
@@ -326,7 +336,10 @@ void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
 }
 
 void Moves::disarm(const std::vector<MotorId>& motors) {
-  for (const McuId mcu : installation_.mcus_of(motors)) installation_[mcu].disarm();
+  for (const McuId id : installation_.mcus_of(motors)) {
+    const Mcu& mcu = installation_[id];
+    mcu.offers.trigger->disarm(mcu.on_bus());
+  }
 }
 
 // This motor waits no more: so do those that were armed with it. Those of its own MCU have ended by
@@ -365,7 +378,9 @@ void Moves::step(std::int64_t now_us) {
 // All MCUs of a line have to have time.
 bool Moves::has_time_to_retarget(std::int64_t now_us, MotorId motor) const {
   return std::ranges::all_of(installation_.with_lines({motor}), [&](MotorId id) {
-    return installation_.mcu_of(id).has_time_to_retarget(now_us);
+    const Mcu& mcu = installation_.mcu_of(id);
+    const link::SharedLine* line = mcu.offers.shared_line;
+    return line == nullptr || line->has_time_to_retarget(now_us, mcu.on_bus());
   });
 }
 
@@ -380,20 +395,15 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [&](const motion::event::Started& started) {
               journal_.started(id, started.steps, started.start, started.late_ns, true);
               // Perhaps it is over already, by the same report.
-              if (motor.axis().line()) {
-                mcu.follow_line_run(motor.output(), motor.axis());
-              } else {
-                mcu.follow_table_run(
-                    motor.output(), started.start,
-                    {static_cast<std::int32_t>(started.steps), motor.axis().shortest_delay()});
-              }
+              mcu.offers.trigger->follow_run(mcu.on_bus(), motor.output().value, started.start,
+                                             run_begun(mcu, motor.axis(), started));
             },
             [&](const motion::event::Executed& executed) { journal_.changed(id, executed.change); },
             [&](const motion::event::Replan&) {
               if (motor.axis().stopping()) return replan(now_us, {id});
               retarget(now_us, {id});
             },
-            [&](const motion::event::Drop&) { mcu.drop(motor.output()); },
+            [&](const motion::event::Drop&) { mcu.bus().drop(mcu.on_bus(), motor.output().value); },
             [&](const motion::event::Mismatch& mismatch) {
               outputs_.log(LogLevel::kError, id,
                            motor.name() + ": " + *motor.uncertain_reason() +
@@ -423,7 +433,8 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
 void Moves::end(MotorId id, const motion::event::Ended& ended) {
   const motion::Motor& motor = installation_[id];
   const bool begun = unbegun_.erase(id) == 0;
-  if (begun) installation_.mcu_of(id).drop(motor.output());
+  Mcu& mcu = installation_.mcu_of(id);
+  if (begun) mcu.bus().drop(mcu.on_bus(), motor.output().value);
   if (ended.was_armed) {
     cancel_armed_group(id);
   } else if (begun && !ended.was_paused) {

@@ -72,8 +72,8 @@ std::map<McuId, motion::Tick> Moves::ticks_to_change_at(std::int64_t now_us,
     const motion::Axis& axis = installation_[id].axis();
     const std::vector<link::ToReplace>& of_bus = together.at(mcu.config.bus);
     const motion::Tick first = axis.stopping()
-                                   ? mcu.earliest_replace(now_us, of_bus)
-                                   : mcu.earliest_retarget(now_us, of_bus, axis.start_tick());
+                                   ? mcu.bus().earliest_replace(now_us, of_bus)
+                                   : mcu.bus().earliest_retarget(now_us, of_bus, axis.start_tick());
     motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
     common = std::max(common, first);
   }
@@ -101,7 +101,7 @@ void Moves::at_one_tick_of_line(const std::vector<MotorId>& motors,
     for (const MotorId id : motors) {
       const auto* on_line = installation_[id].as<motion::OnLine>();
       const Mcu& mcu = installation_.mcu_of(id);
-      if (on_line == nullptr || !mcu.keeps_pace()) continue;
+      if (on_line == nullptr || mcu.offers.paced_lines == nullptr) continue;
       // One whose run is over has other ticks since.
       if (on_line->stands || mcu.view().tick >= installation_[id].axis().over_tick()) continue;
       motion::Tick& common = since_start.try_emplace(on_line->line, INT64_MIN).first->second;
@@ -161,8 +161,9 @@ void Moves::plan(std::int64_t now_us, const std::vector<MotorId>& motors) {
   for (const auto& [id, end] : common_ends(motors)) {
     if (changed.contains(id)) change(id, end);
   }
-  for (const auto& [mcu, mask] : masks) {
-    if (mask != 0) installation_[mcu].replace(mask, at.at(mcu));
+  for (const auto& [id, mask] : masks) {
+    Mcu& mcu = installation_[id];
+    if (mask != 0) mcu.bus().replace(mcu.on_bus(), mask, at.at(id));
   }
   installation_.changed = true;
 }

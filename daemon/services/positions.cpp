@@ -39,7 +39,8 @@ void Positions::request(std::int64_t now_us, const api::Asker& asker,
   for (const Part& part : plan->parts) motors.push_back(part.motor);
   open_.push_back({Confirmation(asker, installation_.mcus_of(motors), now_us), {}, {}});
   for (const auto& [id, steps, from_steps] : plan->parts) {
-    installation_.mcu_of(id).set_position(installation_[id].output(), steps);
+    Mcu& mcu = installation_.mcu_of(id);
+    mcu.bus().set_position(mcu.on_bus(), installation_[id].output().value, steps);
   }
   open_.back().parts = std::move(plan->parts);
   open_.back().offsets = std::move(plan->offsets);

@@ -286,7 +286,7 @@ void TablesInService::begin_upload(std::int64_t now_us, Change& change) {
   std::string absent;
   for (const McuId id : change.mcus) {
     Mcu& mcu = installation_[id];
-    mcu.reconfigure(installation_.setup_of(id));
+    mcu.bus().reconfigure(mcu.on_bus(), installation_.setup_of(id));
     if (mcu.offline()) {
       absent += " " + mcu.name();
     } else {
@@ -302,7 +302,7 @@ void TablesInService::begin_upload(std::int64_t now_us, Change& change) {
 }
 
 std::int64_t TablesInService::upload_us(const Mcu& mcu) const {
-  if (!mcu.streams()) return 0;  // nothing is sent
+  if (!mcu.offers.streams) return 0;  // nothing is sent
   std::size_t requests = 0;
   const link::McuSetup setup = installation_.setup_of(mcu.id);
   for (const link::TableRef& ref : setup.tables) {
@@ -332,7 +332,7 @@ void TablesInService::roll_back(Change& change) {
     add_sentence(who, "group " + name_of(part.group) + " keeps " + text_of(*part.before));
   }
   for (const McuId id : mcus_of(change.parts)) {
-    installation_[id].reconfigure(installation_.setup_of(id));
+    installation_[id].bus().reconfigure(installation_[id].on_bus(), installation_.setup_of(id));
   }
   change.notes = who;
 }
@@ -424,7 +424,7 @@ Result<void> TablesInService::restore(GroupId group, const std::string& wanted,
   installation_.put_in_service(group, table);
   wanted_[group] = wanted;
   for (const McuId id : installation_.mcus()) {
-    installation_[id].reconfigure(installation_.setup_of(id));
+    installation_[id].bus().reconfigure(installation_[id].on_bus(), installation_.setup_of(id));
   }
   outputs_.log(LogLevel::kInfo, {},
                "group " + name_of(group) + " has table " + wanted + ", " + text_of(*table) +

@@ -90,7 +90,7 @@ auto Trajectories::begin(const api::Asker& asker, const api::Follow& request) ->
                       "to one bus",
                       installation_[motors->front()].name(), motor.name()));
     }
-    if (!mcu.streams()) {
+    if (!mcu.offers.streams) {
       return fail(
           fmt::format("{} is on bus {}, which makes runs of tables only and cannot follow a "
                       "trajectory; move it from point to point",

@@ -118,7 +118,7 @@ void Travels::ask(std::int64_t now_us, Mcu& mcu) {
   if (ready && (!*ready || !powered || mcu.busy())) return;
   kept_.not_wanted(task.motor);
   if (!ready) return end(mcu, Outcome::kFault, ready.error().text());
-  task.number = mcu.travel(task.message);
+  task.number = mcu.offers.travel->travel(mcu.on_bus(), task.message);
 }
 
 void Travels::end_overtaken(std::int64_t) {
@@ -139,7 +139,7 @@ void Travels::stop(MotorId id) {
   if (!task || task->motor != id || task->given_up) return;
   if (!task->number) return end(mcu, Outcome::kStopped, "it was stopped before it began");
   task->given_up = true;
-  mcu.end_travel(installation_[id].output());
+  mcu.offers.travel->end_travel(mcu.on_bus(), installation_[id].output().value);
 }
 
 const bushd_report* Travels::progress(MotorId id) const {
@@ -173,13 +173,13 @@ void Travels::goes_offline(Mcu& mcu, const std::string& cause) {
 
 // What an MCU still does was asked for by a daemon before, or by this one before the MCU was lost.
 void Travels::goes_online(Mcu& mcu) {
-  if (!is_under_way(mcu.report())) return;
+  if (mcu.offers.travel == nullptr || !is_under_way(mcu.report())) return;
   for (const MotorId id : mcu.motors()) {
     const Output output = installation_[id].output();
     if (!has_bit(mcu.report().autonomous, output)) continue;
     outputs_.log(LogLevel::kWarning, id,
                  installation_[id].name() + ": its travel of before does not go on");
-    mcu.end_travel(output);
+    mcu.offers.travel->end_travel(mcu.on_bus(), output.value);
   }
 }
 

@@ -22,7 +22,7 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   if (!motors) return asker.answer(api::Refused{motors.error().text()});
   asker.answer(api::Accepted{});
   open_moves_.open(asker, *motors, OpenMoves::Purpose::kArm);
-  std::map<McuId, std::vector<link::BusMaster::Armed>> moves;
+  std::map<McuId, std::vector<link::Trigger::Armed>> moves;
   const std::vector<std::int64_t> steps = steps_of(*motors, request);
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId motor = (*motors)[i];
@@ -32,9 +32,10 @@ void Trigger::request(const api::Asker& asker, const api::Arm& request) {
   }
   const auto edge = request.edge == api::Edge::kRising ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;
   std::map<McuId, std::uint8_t> numbers;
-  for (const auto& [mcu, of_mcu] : moves) {
-    numbers[mcu] =
-        installation_[mcu].arm(edge, static_cast<std::uint32_t>(request.delay_us), of_mcu);
+  for (const auto& [id, of_mcu] : moves) {
+    const Mcu& mcu = installation_[id];
+    numbers[id] = mcu.offers.trigger->arm(mcu.on_bus(), edge,
+                                          static_cast<std::uint32_t>(request.delay_us), of_mcu);
   }
   for (std::size_t i = 0; i < motors->size(); ++i) {
     const MotorId motor = (*motors)[i];
@@ -126,7 +127,10 @@ void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
   std::erase_if(motors,
                 [this](MotorId motor) { return !installation_[motor].is<motion::Armed>(); });
   open_moves_.stopped_by(motors, text_of(asker));
-  for (const McuId mcu : installation_.mcus_of(motors)) installation_[mcu].disarm();
+  for (const McuId id : installation_.mcus_of(motors)) {
+    const Mcu& mcu = installation_[id];
+    mcu.offers.trigger->disarm(mcu.on_bus());
+  }
   if (!unknown.empty() || (may_begin && !mcus.empty())) {
     return asker.answer(api::Completed{
         .outcome = unknown.empty() ? api::Outcome::kLink : api::Outcome::kFault,

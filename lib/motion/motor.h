@@ -66,7 +66,7 @@ struct OnLine : Moving {
 };
 // Waits for the trigger, or for the MCU to say that it does: the axis has no start yet.
 struct Armed {
-  std::uint8_t number;  // of link::BusMaster::arm
+  std::uint8_t number;  // of link::Trigger::arm
   std::int64_t steps;
   bool confirmed = false;                 // the MCU has said that it waits
   bool stops = false;                     // as soon as it has started: that came before disarming

@@ -465,7 +465,7 @@ void arm(Bus& bus, Input& input) {
   const link::McuIndex mcu{input.u8() % kMcus};
   const unsigned mask = 1u + input.u8() % ((1u << kMotors) - 1u);
   const std::uint32_t delay_us = BUSHD_TRIGGER_MIN_DELAY_US + input.u16();
-  if (!bus.online(mcu) || !bus.master().can_trigger(mcu)) return;
+  if (!bus.online(mcu) || !bus.master().can(mcu, BUSHD_CAN_TRIGGER)) return;
   if (bus.master().view(mcu).report.armed != 0) return;
   std::vector<link::Rs485Master::Armed> moves;
   for (std::uint8_t m = 0; m < kMotors; ++m) {
@@ -489,7 +489,7 @@ void position_compare(Bus& bus, Input& input) {
   const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const auto arrivals = static_cast<std::uint8_t>(input.u8() % 4u);
-  if (!bus.online(mcu) || !bus.master().can_compare_position(mcu)) return;
+  if (!bus.online(mcu) || !bus.master().can(mcu, BUSHD_CAN_POSITION_COMPARE)) return;
   bus.master().position_compare(mcu, {.motor = motor,
                                       .arrivals = arrivals,
                                       .position_steps = 70,

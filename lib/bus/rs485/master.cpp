@@ -252,7 +252,7 @@ void Rs485Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
   streams_.replace(mcu, motors, first, stepped_us_);
 }
 
-std::optional<BusSnapshot> Rs485Master::snapshot(std::int64_t now_us) const {
+BusSnapshot Rs485Master::snapshot(std::int64_t now_us) const {
   return BusSnapshot{.setup = &setup_,
                      .mcus = mcus_,
                      .clock = clock(),

@@ -42,11 +42,33 @@
 namespace bushd::link {
 
 class Rs485Master final : public BusMaster,
+                          public SharedLine,
+                          public Homing,
+                          public TableRuns,
+                          public LineRuns,
+                          public Uploads,
+                          public Trigger,
+                          public Travel,
+                          public LocalInputs,
+                          public PositionCompare,
                           private Transactions::Listener,
                           private Connector::Listener {
  public:
   // `source` outlives it.
   Rs485Master(BusSetup setup, TickSource& source);
+
+  Offers offers() override {
+    return {.streams = true,
+            .shared_line = this,
+            .homing = this,
+            .table_runs = this,
+            .line_runs = this,
+            .uploads = this,
+            .trigger = this,
+            .travel = this,
+            .local_inputs = this,
+            .position_compare = this};
+  }
 
   void port_opened(std::int64_t now_us) override;
   void port_lost(std::int64_t now_us, const std::string& cause) override;
@@ -65,7 +87,6 @@ class Rs485Master final : public BusMaster,
     return !connector_.queue(mcu).empty() || mcus_[mcu].poll_wanted || mcus_[mcu].answered;
   }
   bool heard() const override { return heard_; }
-  bool streams() const override { return true; }
   // By this master or by an MCU.
   bool two_masters(std::int64_t now_us) const override { return synchroniser_.two_masters(now_us); }
 
@@ -123,7 +144,7 @@ class Rs485Master final : public BusMaster,
     connector_.inhibit_local(mcu, motors);
   }
   void position_compare(McuIndex mcu, const bushd_position_compare& message) override;
-  std::optional<BusSnapshot> snapshot(std::int64_t now_us) const override;
+  BusSnapshot snapshot(std::int64_t now_us) const override;
 
  private:
   bool answered(std::int64_t now_us, const Transactions::Answer& answer) override;

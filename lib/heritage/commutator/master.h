@@ -38,6 +38,8 @@ class CommutatorMaster final : public link::BusMaster {
   // `source` outlives it. Preconditions: the setup has one MCU, with outputs 0..7.
   CommutatorMaster(Setup setup, link::BusSetup bus, link::TickSource& source);
 
+  link::Offers offers() override { return {.one_at_a_time = true}; }
+
   void port_opened(std::int64_t now_us) override;
   void port_lost(std::int64_t now_us, const std::string& cause) override;
   void receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) override;
@@ -50,9 +52,7 @@ class CommutatorMaster final : public link::BusMaster {
   link::Tick tick_at(std::int64_t now_us) const override { return plan_ns(now_us) / tick_ns_; }
   const link::McuHealth& health(link::McuIndex) const override { return board_.health; }
   const link::BusHealth& bus_health() const override { return health_; }
-  void reset_low_water() override {}
   bool busy(link::McuIndex) const override { return report_wanted_; }
-  bool one_at_a_time() const override { return true; }
 
   link::Tick earliest_start(std::int64_t now_us, link::McuIndex mcu,
                             std::uint8_t motor) const override;

@@ -41,7 +41,12 @@ constexpr std::int64_t us_of(std::int64_t ns) {
   return (ns + 999) / 1000;
 }
 
-class SerialPulseMaster final : public link::BusMaster, private link::LinePort {
+class SerialPulseMaster final : public link::BusMaster,
+                                public link::PulsePort,
+                                public link::Homing,
+                                public link::TableRuns,
+                                public link::PacedLines,
+                                private link::LinePort {
  public:
   // Bytes under way, at most: where one takes nearly as long or longer, it and as much before it.
   static constexpr std::int64_t kMostAheadUs = 20'000;
@@ -59,6 +64,10 @@ class SerialPulseMaster final : public link::BusMaster, private link::LinePort {
   // kept position is known again.
   SerialPulseMaster(link::BusSetup setup, link::TickSource& source, std::uint64_t unique_id);
 
+  link::Offers offers() override {
+    return {.pulse_port = this, .homing = this, .table_runs = this, .paced_lines = this};
+  }
+
   void port_opened(std::int64_t now_us) override;
   void port_lost(std::int64_t now_us, const std::string& cause) override;
   void receive(std::int64_t, std::span<const std::uint8_t>) override {}  // RXD is not connected
@@ -73,7 +82,6 @@ class SerialPulseMaster final : public link::BusMaster, private link::LinePort {
   link::Tick tick_at(std::int64_t now_us) const override;
   const link::McuHealth& health(link::McuIndex) const override { return health_; }
   const link::BusHealth& bus_health() const override { return bus_health_; }
-  void reset_low_water() override {}
   bool busy(link::McuIndex) const override { return requests_open_; }
 
   link::Tick earliest_start(std::int64_t now_us, link::McuIndex, std::uint8_t) const override;
@@ -82,7 +90,6 @@ class SerialPulseMaster final : public link::BusMaster, private link::LinePort {
   link::Tick earliest_retarget(std::int64_t now_us, std::span<const link::ToReplace> together,
                                link::Tick start) const override;
   void begin(link::McuIndex, std::uint8_t, link::Tick start) override;
-  bool keeps_pace() const override { return true; }
   void begin_in_pace(link::McuIndex, std::uint8_t, link::Tick start,
                      link::LinePace::Place place) override;
   void begin_table_run(link::McuIndex mcu, std::uint8_t motor, link::Tick start,

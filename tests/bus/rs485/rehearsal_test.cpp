@@ -22,7 +22,7 @@ class RehearsalTest : public testing::Test {
     moves = {{McuIndex{0}, 0, start, {}}, {McuIndex{0}, 2, start, {}}, {McuIndex{1}, 1, start, {}}};
   }
   std::optional<link::Traffic> rehearse(std::uint64_t max_frames = 1000) {
-    link::Rehearsal rehearsal(*bus.master->snapshot(bus.now_us), bus.source, moves, max_frames);
+    link::Rehearsal rehearsal(bus.master->snapshot(bus.now_us), bus.source, moves, max_frames);
     while (rehearsal.step()) {
     }
     return rehearsal.traffic();
@@ -60,7 +60,7 @@ TEST_F(RehearsalTest, TooManyFramesAreNotCounted) {
 // What becomes of the bus while a rehearsal is under way is no concern of it.
 TEST_F(RehearsalTest, CountsWhatWasAtItsBegin) {
   const auto traffic = rehearse();
-  link::Rehearsal rehearsal(*bus.master->snapshot(bus.now_us), bus.source, moves, 1000);
+  link::Rehearsal rehearsal(bus.master->snapshot(bus.now_us), bus.source, moves, 1000);
   rehearsal.step();
   bus.master->begin(McuIndex{0}, 3, start);
   bus.run_for(500'000);
