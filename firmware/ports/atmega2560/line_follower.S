@@ -11,27 +11,25 @@
 
 #define LAST_SLOT 127
 
-    ; lead -= apart_late; with a borrow the step is one part earlier.
+    ; The lead and one of the follower's fields; a borrow, or a carry, remains.
+    .macro to_lead first, rest, field
+    ldd r0, Y+\field
+    \first r10, r0
+    ldd r0, Y+\field+1
+    \rest r11, r0
+    ldd r0, Y+\field+2
+    \rest r12, r0
+    ldd r0, Y+\field+3
+    \rest r13, r0
+    .endm
+
+    ; With a borrow the step is one part earlier.
     .macro next_lead
-    ldd r0, Y+FOLLOWER_APART_LATE
-    sub r10, r0
-    ldd r0, Y+FOLLOWER_APART_LATE+1
-    sbc r11, r0
-    ldd r0, Y+FOLLOWER_APART_LATE+2
-    sbc r12, r0
-    ldd r0, Y+FOLLOWER_APART_LATE+3
-    sbc r13, r0
+    to_lead sub, sbc, FOLLOWER_APART_LATE
     .endm
 
     .macro add_increment
-    ldd r0, Y+FOLLOWER_INCREMENT
-    add r10, r0
-    ldd r0, Y+FOLLOWER_INCREMENT+1
-    adc r11, r0
-    ldd r0, Y+FOLLOWER_INCREMENT+2
-    adc r12, r0
-    ldd r0, Y+FOLLOWER_INCREMENT+3
-    adc r13, r0
+    to_lead add, adc, FOLLOWER_INCREMENT
     .endm
 
     .text
