@@ -18,13 +18,15 @@ std::size_t memory_of(std::monostate) {
 std::size_t memory_of(const std::vector<MotorResult>& motors) {
   std::size_t bytes = 0;
   for (const MotorResult& motor : motors) {
-    bytes += sizeof motor + memory_of(motor.motor) + memory_of(motor.table) + memory_of(motor.who);
+    bytes += sizeof motor + memory_of(motor.motor) + memory_of(motor.unit) +
+             memory_of(motor.table) + memory_of(motor.who);
   }
   return bytes;
 }
 
 std::size_t memory_of(const MovePlan& plan) {
-  std::size_t bytes = sizeof plan;
+  std::size_t bytes =
+      sizeof plan + memory_of(plan.limited_by) + plan.points_us.size() * sizeof(std::int64_t);
   for (const MovePlan::Motor& motor : plan.motors) bytes += sizeof motor + memory_of(motor.motor);
   return bytes;
 }

@@ -104,7 +104,7 @@ struct MovePlan {
     const fields::If counted{self.traffic.has_value()};
     visit("frames", traffic.frames, counted);
     visit("bytes", traffic.bytes, counted);
-    visit("limited_by", self.limited_by);
+    visit("limited_by", self.limited_by, fields::If{!self.limited_by.empty()});
     visit.list("motor_count", "motors", self.motors);
     visit.list("point_count", "points_us", self.points_us);
     visit.set(self.traffic, traffic.frames < 0 ? std::optional<Traffic>{} : traffic);
@@ -121,11 +121,12 @@ struct TableEntry {
   double max_steps_per_s = 0;
   static void fields(auto& self, auto& visit) {
     visit("name", self.name);
-    visit("table", self.table);
+    const fields::If good{self.fault.empty()};
+    visit("table", self.table, good);
     visit("fault", self.fault);
-    visit("codes", self.codes);
-    visit("start_steps_per_s", self.start_steps_per_s);
-    visit("max_steps_per_s", self.max_steps_per_s);
+    visit("codes", self.codes, good);
+    visit("start_steps_per_s", self.start_steps_per_s, good);
+    visit("max_steps_per_s", self.max_steps_per_s, good);
   }
 };
 struct TableList {

@@ -19,9 +19,8 @@
 namespace bushd::api {
 
 // Microseconds as seconds, where they mean something.
-struct InSeconds {
-  bool meant;
-  bool nothing(std::int64_t /*us*/) const { return !meant; }
+struct InSeconds : fields::If {
+  using If::If;
   static double told(std::int64_t us) { return static_cast<double>(us) * 1e-6; }
   // What hostile numbers make of it need only be some number.
   static bool taken(double told, std::int64_t& us) {

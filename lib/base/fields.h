@@ -28,9 +28,10 @@
 // lib/base/fields_json.h has the one that makes JSON.
 //
 // A form converts a member to another type and back. told(value) is what is told of it; taken(told,
-// value) puts it back, and returns false for what is not allowed. nothing(value), if a form has it:
-// there is none, whatever is told in its place. An unsigned number of 32 or 64
-// bits without a form is told by the signed one of the same bits.
+// value) puts it back, and returns false for what is not allowed. nothing(value), optional: true
+// where the member has no value; told() gives something in its place then. A form is made before a
+// visitor that reads has read the field. An unsigned number of 32 or 64 bits without a form is told
+// by the signed one of the same bits.
 #pragma once
 
 #include <cstdint>

@@ -8,7 +8,7 @@
 
 namespace bushd::fieldbus {
 
-inline constexpr std::int64_t kPollPeriodUs = 50'000;  // each MCU is asked this often
+inline constexpr std::int64_t kPollPeriodUs = 50'000;  // each MCU is asked this often, or oftener
 inline constexpr std::int64_t kSyncPeriodUs = 500'000;
 // What one lost frame can cost: so many ticks, and so much time, half of what queues hold.
 inline constexpr unsigned kMaxTicksPerFrame = 16;

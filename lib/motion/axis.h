@@ -102,8 +102,8 @@ class Axis {
              bushd_delay shortest_delay = 0);
 
   // The same for a part of a line; `shortest_delay` in the line's time units.
-  // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks; of a path late_ns
-  // is 0.
+  // Precondition: !busy(), the run of all of it takes at most kMaxDurationTicks; of a path, and
+  // of a line that goes on (share.from > 0), late_ns is 0.
   void start_line(std::int64_t from_steps, LineShare share, Tick start, bushd_delay shortest_delay,
                   std::uint32_t late_ns = 0);
 
@@ -275,8 +275,8 @@ class Axis {
   Tick end_of(const Place& place) const;
   Tick own_end_of(const Place& place) const;
   void plan_end();
-  // A streamed line that goes on tells in its first tick, before it goes on, what motors stand from
-  // their whole steps.
+  // The first tick of a streamed line that goes on tells how far each motor is from its last whole
+  // step; the run begins a tick later.
   bool stands_first() const;
   void restart(bushd_run& run, std::uint32_t steps, int direction,
                bushd_delay shortest_delay) const;

@@ -71,8 +71,9 @@ class PathRun {
   std::uint32_t delay() const;                         // of the running step; 0: done
   std::int64_t ns_to(std::uint32_t step) const;  // from now, or after its first tick if that is
                                                  // still to come, to the end of that step
-  // A run that begins within the path tells in its first tick, before it goes on, what motors stand
-  // from their whole steps: told together with their first way, a step that is near would be late.
+  // The first tick of a run that begins within the path tells how far each motor is from its last
+  // whole step, and the run goes on a tick later: told together with the first way, a step that is
+  // near would be late.
   bool stands() const { return stands_; }
   void tick(std::uint32_t tick_ns);
   // See PathTrack::ending. Precondition: !done().

@@ -185,8 +185,7 @@ TYPED_TEST(Wire, NoiseBehindTheFingerprintIsRejectedOrAnotherValidMessage) {
   }
 }
 
-// A payload of the largest size whose lists are as long as its bytes allow. A motor of a result is
-// told by 66 bytes at least, and takes less than 400.
+// A motor of a result is told by some 70 bytes at least, and takes less than 400.
 TEST(Decode, MemoryIsASmallMultipleOfThePayload) {
   Answer answer;
   answer.motors.resize(400);  // without texts

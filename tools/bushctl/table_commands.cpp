@@ -123,7 +123,8 @@ int show_table(Client& client, const std::string& wanted, bool as_json) {
     return kFailed;
   }
   if (as_json) {
-    fmt::print("{}\n", bushd::json_text(bushd::json_of(*file)));
+    fmt::print("{}\n", bushd::json_text(bushd::json_of(
+                           api::TableFile{table, bushd::tables::content_hash(table)})));
   } else {
     print(table);
   }

@@ -10,8 +10,8 @@ r = N / L, all rounded up,
 
 In ticks a motor's position is told in 1/256 step, rounded down; it ends on a whole step, which it does not go beyond, and before
 its first step it rises twice as fast, from 0. So the tick of a motor's first step is judged as a first tick. A run that a trigger has started begins
-"late_ns" after the beginning of its start tick. That of a line that goes on begins a tick late, if ticks are fine: in the first one motors are told what they
-stand from their whole steps.
+"late_ns" after the beginning of its start tick. That of a line that goes on begins a tick later, if ticks are fine: the first one tells how far each motor is
+from its last whole step.
 """
 
 from fractions import Fraction
@@ -161,14 +161,13 @@ class LineMove(Move):
         self._longest = line["longest"]
         self._from = line["from"]
         self._envelope = envelope
-        super().__init__(event, table)
+        goes_on = self._from > 0 and event["format"] == "fine" and event.get("moves", "stream") == "stream"
+        super().__init__(event | {"late_ns": event.get("late_ns", 0) + (event["tick_ns"] if goes_on else 0)}, table)
         self.direction = line["direction"]
         self._first = self._made(self._from)
         self._rests = [(-1, self._rest())]  # from which tick of the move on, where it will rest, in steps of the line
 
     def _planned(self, event):
-        if self.fine and self._from > 0 and event.get("moves", "stream") == "stream":
-            self.late_ns += self.tick_ns
         return Run(self.late_ns, self._envelope, event["line"]["to"] - self._from, event.get("shortest_delay", 0))
 
     def _made(self, s):

@@ -32,7 +32,8 @@ class BusClock {
   Tick ticks_in(std::int64_t us) const { return (us * 1000 + tick_ns_ - 1) / tick_ns_; }
 
  private:
-  // At one report per 50 ms: under two seconds, in which crystals drift by less than 0.2 ms.
+  // At one report per 50 ms, or more: under two seconds, in which crystals drift by less than 0.2
+  // ms.
   static constexpr std::size_t kWindow = 32;
 
   std::int64_t tick_ns_;

@@ -117,13 +117,15 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   events_.push_back(McuReported{index});
 }
 
-// As soon as its report can tell that a motor has come to rest. This clock lags behind the MCU's:
-// in that tick the MCU is there.
+// The master's clock lags behind the MCU's, so the MCU has reached the end's tick when the clock
+// has.
 void Rs485Master::ask_at_end(std::int64_t now_us, McuIndex mcu) {
   const std::optional<Tick> end = streams_.next_end(mcu);
   const Tick now = clock().tick_at(now_us);
-  if (!end || *end > now + clock().ticks_in(2 * fieldbus::kPollPeriodUs)) return;
-  poller_.ask_at(mcu, now_us + std::max<Tick>(*end - now, 0) * setup_.tick_ns / 1000);
+  // What lies farther ahead the next report asks for.
+  const bool soon = end && *end <= now + clock().ticks_in(2 * fieldbus::kPollPeriodUs);
+  poller_.expect_news(
+      mcu, soon ? now_us + std::max<Tick>(*end - now, 0) * setup_.tick_ns / 1000 : INT64_MAX);
 }
 
 void Rs485Master::found(std::int64_t now_us, McuIndex) {

@@ -17,8 +17,8 @@ using fieldbus::kWindowGuardUs;
 constexpr std::int64_t kMaxCycleUs = 60'000;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
-constexpr std::int64_t kLeastApartUs = 10'000;
-constexpr int kMaxMissedReplies = 10;  // about half a second
+constexpr std::int64_t kExtraShare = 4;  // extra polls take one part of so many
+constexpr int kMaxMissedReplies = 10;    // about half a second
 
 }  // namespace
 
@@ -34,7 +34,9 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   }
   std::vector<McuIndex> asked;
   for (const McuIndex i : mcus_.indices()) {
-    const bool soon = doubtful || polled_[i].due_us <= now_us + kPollPeriodUs / 2;
+    // One that will have news soon is asked then, not before and then again.
+    const bool waits = polled_[i].news_us < polled_[i].routine_us && polled_[i].news_us > now_us;
+    const bool soon = doubtful || (polled_[i].routine_us <= now_us + kPollPeriodUs / 2 && !waits);
     const bool along = mcus_[i].view.phase != McuPhase::kOffline && soon;
     if (mcus_[i].poll_wanted || along) asked.push_back(i);
   }
@@ -86,24 +88,27 @@ bool Poller::send_wanted(std::int64_t now_us) {
   const std::size_t size =
       bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data());
   transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, windows, kWindowGuardUs);
+  bool extra = false;
   for (const Transactions::ReplyWindow& window : windows) {
     mcus_[window.mcu].poll_wanted = false;
-    polled_[window.mcu].due_us = now_us + kPollPeriodUs;
-    polled_[window.mcu].asked_us = now_us;
+    Polled& polled = polled_[window.mcu];
+    polled.routine_us = now_us + kPollPeriodUs;
+    if (polled.news_us > now_us) continue;
+    polled.news_us = INT64_MAX;
+    extra = true;
+  }
+  if (extra) {
+    const std::int64_t took_us = writer_.line_us(size + BUSHD_FRAME_OVERHEAD + 1) +
+                                 windows.back().end_us + transactions_.patience_us();
+    extra_from_us_ = now_us + kExtraShare * took_us;
   }
   return true;
-}
-
-void Poller::ask_at(McuIndex mcu, std::int64_t at_us) {
-  Polled& polled = polled_[mcu];
-  at_us = std::max(at_us, polled.asked_us + std::max(kLeastApartUs, 4 * cycle_us()));
-  if (at_us < polled.due_us + kLeastApartUs) polled.due_us = at_us;
 }
 
 bool Poller::send_due(std::int64_t now_us) {
   bool due = false;
   for (const McuIndex i : mcus_.indices()) {
-    if (mcus_[i].view.phase == McuPhase::kOffline || polled_[i].due_us > now_us) continue;
+    if (mcus_[i].view.phase == McuPhase::kOffline || due_us(i) > now_us) continue;
     mcus_[i].poll_wanted = due = true;
   }
   return due && send_wanted(now_us);
@@ -113,7 +118,7 @@ bool Poller::missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
   ++mcus_[mcu].health.timeouts;
   if (++polled_[mcu].missed_replies >= kMaxMissedReplies) return true;
   // Sooner than usual; but a dead MCU must not starve the others.
-  if (type == BUSHD_MSG_POLL) polled_[mcu].due_us = now_us + kPollAgainUs;
+  if (type == BUSHD_MSG_POLL) polled_[mcu].routine_us = now_us + kPollAgainUs;
   return false;
 }
 
@@ -123,6 +128,7 @@ void Poller::follow_report(McuIndex mcu) {
 
 void Poller::went_offline(McuIndex mcu) {
   polled_[mcu].missed_replies = 0;
+  polled_[mcu].news_us = INT64_MAX;
   mcus_[mcu].poll_wanted = mcus_[mcu].answered = false;
 }
 

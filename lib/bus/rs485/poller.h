@@ -3,6 +3,7 @@
 // one too, the one after it ends the waiting.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -23,11 +24,15 @@ class Poller {
   bool send_due(std::int64_t now_us);
   // How long the line is taken by a poll of all MCUs that are not offline, its answers included.
   std::int64_t cycle_us() const;
-  // Its report has something new at this time, so its turn comes then, sooner or a little later
-  // than it would otherwise. Polls asked for so leave three quarters of the line to others.
-  void ask_at(McuIndex mcu, std::int64_t at_us);
+  // At this time the MCU's report will have something new: it is asked then, unless its turn comes
+  // before. INT64_MAX: nothing is expected. Such extra polls take at most a quarter of the time, so
+  // they may come later; no routine poll does.
+  void expect_news(McuIndex mcu, std::int64_t at_us) { polled_[mcu].news_us = at_us; }
   // When the MCU's turn comes. Precondition: it is not offline.
-  std::int64_t due_us(McuIndex mcu) const { return polled_[mcu].due_us; }
+  std::int64_t due_us(McuIndex mcu) const {
+    const Polled& polled = polled_[mcu];
+    return std::min(polled.routine_us, std::max(polled.news_us, extra_from_us_));
+  }
 
   // An answer to whatever request.
   void answered(McuIndex mcu) { polled_[mcu].missed_replies = 0; }
@@ -39,9 +44,9 @@ class Poller {
 
  private:
   struct Polled {
-    std::int64_t due_us = 0;
-    std::int64_t asked_us = 0;  // last
-    int missed_replies = 0;     // requests in a row without an answer
+    std::int64_t routine_us = 0;       // its turn
+    std::int64_t news_us = INT64_MAX;  // expect_news
+    int missed_replies = 0;            // requests in a row without an answer
     ReportedCounters counters;
   };
 
@@ -52,6 +57,7 @@ class Poller {
   Transactions& transactions_;
   const FrameWriter& writer_;
   PerMcu<Polled> polled_;
+  std::int64_t extra_from_us_ = 0;  // no extra poll before
 };
 
 }  // namespace bushd::link

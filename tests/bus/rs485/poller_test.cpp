@@ -71,6 +71,45 @@ TEST_F(Polling, WantedOneIsAskedAtOnceAndFirst) {
   EXPECT_THAT(asked(), ElementsAre(4, 1, 2)) << "those whose turn comes soon are asked along";
 }
 
+TEST_F(Polling, NewsIsAskedForWhenItComes) {
+  poller.send_due(1'000'000);
+  asked();
+  poller.expect_news(kSecond, 1'012'345);
+  EXPECT_EQ(poller.due_us(kSecond), 1'012'345);
+  EXPECT_FALSE(poller.send_due(1'012'344));
+  ASSERT_TRUE(poller.send_due(1'012'345));
+  EXPECT_THAT(asked(), ElementsAre(2));
+  EXPECT_EQ(poller.due_us(kSecond), 1'062'345) << "a routine poll next";
+  poller.expect_news(kFirst, 1'070'000);
+  EXPECT_EQ(poller.due_us(kFirst), 1'050'000) << "no routine poll is later for it";
+}
+
+TEST_F(Polling, ExtraPollsLeaveTheLineToOthers) {
+  poller.send_due(1'000'000);
+  asked();
+  poller.expect_news(kFirst, 1'010'000);
+  poller.expect_news(kSecond, 1'010'001);
+  ASSERT_TRUE(poller.send_due(1'010'000));
+  EXPECT_THAT(asked(), ElementsAre(1));
+  // The poll, its window and the patience with the answer: three more times as long.
+  const std::int64_t window_us =
+      begins_us[0] + writer.line_us(BUSHD_REPORT_SIZE(4) + BUSHD_FRAME_OVERHEAD + 1);
+  const std::int64_t took_us =
+      writer.line_us(2 + 3 + BUSHD_FRAME_OVERHEAD + 1) + window_us + transactions.patience_us();
+  EXPECT_GE(poller.due_us(kSecond), std::min<std::int64_t>(1'010'000 + 4 * took_us, 1'050'000));
+  EXPECT_LE(poller.due_us(kSecond), 1'050'000);
+}
+
+TEST_F(Polling, WhoWillHaveNewsIsNotAskedAlongBefore) {
+  poller.send_due(1'000'000);
+  asked();
+  poller.expect_news(kSecond, 1'045'000);
+  mcus[McuIndex{2}].poll_wanted = true;
+  ASSERT_TRUE(poller.send_wanted(1'030'000));
+  EXPECT_THAT(asked(), ElementsAre(3, 1, 4));
+  EXPECT_EQ(poller.due_us(kSecond), 1'045'000);
+}
+
 TEST_F(Polling, WhoMissedItsReplyAnswersFirstAndNotAlone) {
   poller.send_due(1'000'000);
   asked();
