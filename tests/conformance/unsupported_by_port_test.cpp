@@ -20,7 +20,7 @@ struct Unsupported {
 };
 constexpr bool (*kByCapability)(PulseBench&) = nullptr;
 const std::vector<Unsupported> kUnsupported = {
-    {"TICKS", 0, [](PulseBench& bench) { return !bench.master().streams(); },
+    {"TICKS", 0, [](PulseBench& bench) { return !bench.master().offers().streams; },
      "no step can be put at a time: bytes leave when they leave"},
     {"several_motors", 0,
      [](PulseBench& bench) { return bench.master().view({0}).identity.motors == 1; },
