@@ -152,7 +152,7 @@ void Supervisor::is_uncertain(const Mcu& mcu, Output output) {
   if (!id) return;
   const std::string& reason = mcu.view().uncertain_reason;
   motion::Motor& motor = installation_[*id];
-  motor.position_is_uncertain(reason);
+  motor.trust().is_uncertain(reason);
   outputs_.log(LogLevel::kError, *id, motor.name() + ": its position is uncertain: " + reason);
   installation_.changed = true;
 }

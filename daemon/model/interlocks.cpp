@@ -15,7 +15,7 @@ Result<void> Interlocks::may_move() const {
 
 Result<void> Interlocks::may_move(MotorId motor) const {
   if (auto may = may_move(); !may) return may;
-  if (auto may = installation_[motor].may_be_used(); !may) return may;
+  if (auto may = installation_[motor].reach().may_be_used(); !may) return may;
   const Mcu& mcu = installation_.mcu_of(motor);
   if (auto online = mcu.must_be_online(); !online) return online;
   if (auto may = may_move_by(mcu); !may) return may;

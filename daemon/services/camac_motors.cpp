@@ -80,12 +80,12 @@ MotorStatus CamacMotors::status(int number) {
 bool CamacMotors::move(const Program& program) {
   const MotorId id = config_.motors[static_cast<std::size_t>(program.motor)];
   const motion::Motor& motor = installation_[id];
-  Result<void> may = motor.may_be_used();
+  Result<void> may = motor.reach().may_be_used();
   if (may && motor.has_plan()) may = fail("moves, by another's request");
   const auto table = table_of_program(program, config_.f_start_hz, name_);
   if (may && !table) may = fail(table.error());
   const std::int64_t steps = program.left ? -std::int64_t{program.steps} : program.steps;
-  if (may) may = motor.may_move_to(motor.position_steps() + steps);
+  if (may) may = motor.reach().may_move_to(motor.position_steps() + steps);
   if (!may) {
     warn(id, motor.name() + ": " + may.error().text());
     return false;

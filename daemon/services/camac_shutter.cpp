@@ -59,7 +59,7 @@ Result<void> CamacShutter::may_begin(std::int64_t steps) const {
   const motion::Motor& motor = installation_[motor_];
   if (auto may = interlocks_.may_move(motor_); !may) return may;
   if (motor.has_plan()) return fail("moves, by another's request");
-  return motor.may_move_to(motor.position_steps() + steps);
+  return motor.reach().may_move_to(motor.position_steps() + steps);
 }
 
 bool CamacShutter::takes(Motion motion, const Result<void>& may) {

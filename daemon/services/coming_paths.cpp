@@ -117,7 +117,7 @@ Result<ComingPaths::Incoming> ComingPaths::begin_points(const api::Asker& asker,
     motors.push_back({&along.tables.back()->view(), *shortest_delay});
     incoming.shortest_delays.push_back(*shortest_delay);
     begin.push_back(installation_[id].position_steps());
-    incoming.scales.push_back(installation_[id].coordinates().scale());
+    incoming.scales.push_back(installation_[id].scale().coordinates().scale());
     incoming.low.push_back({0, begin.back()});
     incoming.high.push_back({0, begin.back()});
   }
@@ -135,7 +135,7 @@ Result<ComingPaths::Incoming> ComingPaths::begin_points(const api::Asker& asker,
 Result<void> ComingPaths::same_scales(const Incoming& incoming) const {
   for (std::size_t m = 0; m < incoming.scales.size(); ++m) {
     const motion::Motor& motor = installation_[incoming.motors[m]];
-    if (motor.coordinates().scale() == incoming.scales[m]) continue;
+    if (motor.scale().coordinates().scale() == incoming.scales[m]) continue;
     return fail(
         motor.name() +
         ": its offset or direction has changed since the path's first points were received; send "
@@ -156,7 +156,7 @@ Result<void> ComingPaths::add_points(Incoming& incoming, const api::MovePath& re
       const auto wrong = [&](const std::string& why) {
         return fail(fmt::format("point {}, {}: {}", row, motor.name(), why));
       };
-      const auto steps = motor.steps_of_position(api::UserUnits{request.positions[at + m]});
+      const auto steps = motor.scale().steps_of_position(api::UserUnits{request.positions[at + m]});
       if (!steps) return wrong(steps.error().message);
       if (std::abs(*steps) > motion::Motor::kMaxPosition)
         return wrong(fmt::format("it is beyond +-{} steps", motion::Motor::kMaxPosition));
@@ -205,7 +205,7 @@ Result<void> ComingPaths::may_follow(const Incoming& incoming) const {
   for (std::size_t m = 0; m < incoming.motors.size(); ++m) {
     const motion::Motor& motor = installation_[incoming.motors[m]];
     for (const auto& [row, steps] : {incoming.low[m], incoming.high[m]}) {
-      const auto may = motor.may_move_to(steps, incoming.shortest_delays[m]);
+      const auto may = motor.reach().may_move_to(steps, incoming.shortest_delays[m]);
       if (may) continue;
       const std::string where = row == 0 ? "" : fmt::format("point {}, ", row);
       return fail(fmt::format("{}{}: {}", where, motor.name(), may.error().text()));

@@ -19,8 +19,8 @@ Holds::Holds(Installation& installation, Interlocks& interlocks, Moves& moves,
       outputs_(outputs) {
   interlocks.add([this](MotorId id) -> Result<void> {
     const motion::Motor& motor = installation_[id];
-    if (!motor.is_held()) return {};
-    return fail(motor.held_text() + "; run " + words::remedy("release", motor.name()));
+    if (!motor.hold().is_set()) return {};
+    return fail(motor.hold().text() + "; run " + words::remedy("release", motor.name()));
   });
 }
 
@@ -30,9 +30,9 @@ void Holds::take_kept() {
     const auto found = kept.find(state::kHeldKey);
     if (found == kept.end()) continue;
     motion::Motor& motor = installation_[id];
-    motor.hold(found->second.value);
+    motor.hold().set(found->second.value);
     outputs_.log(LogLevel::kInfo, id,
-                 motor.name() + ": " + motor.held_text() + "; run " +
+                 motor.name() + ": " + motor.hold().text() + "; run " +
                      words::remedy("release", motor.name()));
   }
   for (auto& [name, settings] : kept_.settings_of_others()) {
@@ -51,7 +51,7 @@ void Holds::keep(MotorId id) {
   state::Settings settings = kept_.settings(id);
   settings.erase(state::kHeldKey);
   const motion::Motor& motor = installation_[id];
-  if (motor.is_held()) settings[state::kHeldKey] = {.value = *motor.held()};
+  if (motor.hold().is_set()) settings[state::kHeldKey] = {.value = *motor.hold().how()};
   kept_.keep(id, std::move(settings));
 }
 
@@ -68,15 +68,15 @@ void Holds::note(MotorId id, const char* what, const api::Asker& by) {
 // Who was first has it held: a release is for all of them.
 void Holds::hold(MotorId id, const api::Asker& by) {
   motion::Motor& motor = installation_[id];
-  if (motor.is_held()) return;
-  motor.hold("by " + (by.session ? by.session->text() : "the daemon") + " since " +
-             state::time_text(outputs_.wall_clock_us()));
+  if (motor.hold().is_set()) return;
+  motor.hold().set("by " + (by.session ? by.session->text() : "the daemon") + " since " +
+                   state::time_text(outputs_.wall_clock_us()));
   keep(id);
   note(id, "hold", by);
 }
 
 void Holds::release(MotorId id, const api::Asker& by) {
-  installation_[id].release();
+  installation_[id].hold().release();
   keep(id);
   note(id, "release", by);
 }
@@ -113,7 +113,7 @@ void Holds::request(const api::Asker& asker, const api::Release& request) {
   asker.answer(api::Accepted{});
   std::size_t held = 0;
   for (const MotorId motor : *motors) {
-    if (!installation_[motor].is_held()) continue;
+    if (!installation_[motor].hold().is_set()) continue;
     release(motor, asker);
     ++held;
   }
@@ -129,7 +129,7 @@ void Holds::answer_open() {
     for (const MotorId id : holding.motors) {
       const motion::Motor& motor = installation_[id];
       if (!local_inputs_.has_told(id)) return false;
-      if (!motor.is_held() || !installation_.drives()[id].moved_by_people()) continue;
+      if (!motor.hold().is_set() || !installation_.drives()[id].moved_by_people()) continue;
       if (const auto refusal = local_inputs_.refusal(id))
         not_held += "; " + motor.name() + ": " + *refusal;
       if (!installation_.mcu_of(id).online()) {

@@ -125,8 +125,8 @@ void HomingQueue::begin(Mcu& mcu) {
 
 // Now that it is its turn.
 Result<void> HomingQueue::may_begin(MotorId id) const {
-  if (const motion::Motor& motor = installation_[id]; motor.is_held()) {
-    return fail("it was held before it was its turn to be homed, " + *motor.held());
+  if (const motion::Motor& motor = installation_[id]; motor.hold().is_set()) {
+    return fail("it was held before it was its turn to be homed, " + *motor.hold().how());
   }
   if (auto may = interlocks_.may_begin(id); !may)
     return fail("not homed, because " + may.error().text());
@@ -221,8 +221,9 @@ void HomingQueue::follow_moving_on(Mcu& mcu) {
   }
   const bool reached = !motor.has_plan() && motor.position_steps() == task.then_steps;
   queues_[mcu.id].pop_front();
-  follow_sequence(task.motor, reached,
-                  "it was homed, and did not reach " + motor.coordinates().text(task.then_steps));
+  follow_sequence(
+      task.motor, reached,
+      "it was homed, and did not reach " + motor.scale().coordinates().text(task.then_steps));
   begin(mcu);
 }
 
@@ -383,7 +384,7 @@ void HomingQueue::goes_online(Mcu& mcu) {
     const auto& home = installation_.config()[id].home;
     const motion::Motor& motor = installation_[id];
     const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
-    if (!home || !home->at_start || (homed && !motor.uncertain_reason())) continue;
+    if (!home || !home->at_start || (homed && !motor.trust().uncertain_reason())) continue;
     const auto shortest_delay = shortest_delay_of(id, {});
     auto may = shortest_delay ? may_home(id) : fail(shortest_delay.error());
     if (may) may = may_home_by(id, *shortest_delay);

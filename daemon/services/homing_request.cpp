@@ -59,8 +59,8 @@ Result<void> HomingQueue::may_home(MotorId id) const {
                 words::set_remedy(installation_[id].name()));
   }
   const bushd_home message = message_for({.motor = id, .shortest_delay = 0});
-  return installation_[id].may_be_moved_within(std::int64_t{message.most_steps} +
-                                               message.slow_steps);
+  return installation_[id].reach().may_be_moved_within(std::int64_t{message.most_steps} +
+                                                       message.slow_steps);
 }
 
 // An MCU without slow runs is told no longer delays than 16 bits hold.
@@ -85,7 +85,7 @@ Result<bushd_delay> HomingQueue::shortest_delay_of(MotorId id,
   const auto& home = installation_.config()[id].home;
   std::optional<api::Speed> asked = speed;
   if (!asked && home && home->speed) asked = api::Speed{.per_s = *home->speed};
-  auto shortest_delay = installation_[id].shortest_delay_at(asked);
+  auto shortest_delay = installation_[id].reach().shortest_delay_at(asked);
   if (!shortest_delay)
     return fail(installation_[id].name() + ": " + shortest_delay.error().message);
   return shortest_delay;

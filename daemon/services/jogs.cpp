@@ -68,19 +68,21 @@ Result<void> Jogs::may_jog(std::int64_t now_us, MotorId motor, const api::Asker&
 
 Result<Jogs::Course> Jogs::course_of(MotorId id, const api::Jog& request) const {
   const motion::Motor& motor = installation_[id];
-  const auto shortest_delay = motor.shortest_delay_at(
+  const auto shortest_delay = motor.reach().shortest_delay_at(
       api::Speed{.per_s = std::abs(request.per_s), .in_steps = request.in_steps});
   if (!shortest_delay) return fail(shortest_delay.error());
-  const bool mirrored = !request.in_steps && motor.coordinates().scale().negative;
+  const bool mirrored = !request.in_steps && motor.scale().coordinates().scale().negative;
   const int direction = (request.per_s > 0) != mirrored ? 1 : -1;
-  const std::int64_t target = motor.farthest(direction, *shortest_delay);
+  const std::int64_t target = motor.reach().farthest(direction, *shortest_delay);
   // Beyond it, one that moves back would turn round.
-  const bool beyond = !motor.stands_within_soft_limits();
+  const bool beyond = !motor.reach().stands_within_soft_limits();
   if (target == motor.position_steps() && (beyond || !motor.has_plan())) {
     return fail("stands at or beyond its soft limit, at " +
-                motor.coordinates().text(motor.position_steps()) + "; jog it the other way");
+                motor.scale().coordinates().text(motor.position_steps()) +
+                "; jog it the other way");
   }
-  if (const auto may = motor.may_move_to(target, *shortest_delay); !may) return fail(may.error());
+  if (const auto may = motor.reach().may_move_to(target, *shortest_delay); !may)
+    return fail(may.error());
   return Course{.direction = direction, .target = target, .shortest_delay = *shortest_delay};
 }
 
@@ -110,12 +112,12 @@ void Jogs::run(std::int64_t now_us, const api::Asker& asker, MotorId id, const a
 }
 
 void Jogs::say_limit(MotorId id) {
-  const std::string at = installation_[id].coordinates().text(jogs_.at(id).course.target);
-  open_.say(
-      id, api::Outcome::kReached,
-      {.outcome = api::Outcome::kLimit,
-       .reason = installation_[id].soft_limits() ? "stands at its soft limit, " + at
-                                                 : "stands where its jog must end, at " + at});
+  const std::string at = installation_[id].scale().coordinates().text(jogs_.at(id).course.target);
+  open_.say(id, api::Outcome::kReached,
+            {.outcome = api::Outcome::kLimit,
+             .reason = installation_[id].scale().soft_limits()
+                           ? "stands at its soft limit, " + at
+                           : "stands where its jog must end, at " + at});
 }
 
 void Jogs::change(std::int64_t now_us, const api::Asker& asker, MotorId id, const Course& course) {
@@ -156,7 +158,8 @@ void Jogs::renew(std::int64_t now_us, const api::Asker& asker, MotorId id) {
   asker.answer(api::Accepted{});
   // Without a limit it ends where a run is as long as it may be; but not as long as it is renewed.
   const motion::Motor& motor = installation_[id];
-  const std::int64_t farthest = motor.farthest(jog.course.direction, jog.course.shortest_delay);
+  const std::int64_t farthest =
+      motor.reach().farthest(jog.course.direction, jog.course.shortest_delay);
   if (std::abs(farthest - jog.course.target) >
       std::abs(jog.course.target - motor.position_steps())) {
     jog.course.target = farthest;
@@ -210,12 +213,12 @@ void Jogs::end_after(std::int64_t now_us, MotorId id, std::int64_t steps,
   const int direction = axis.direction();
   const std::int64_t from = axis.steps_at(now);
   const std::int64_t target = from + direction * steps;
-  const std::string after =
-      std::to_string(steps) + " steps after the stop event at " + motor.coordinates().text(from);
+  const std::string after = std::to_string(steps) + " steps after the stop event at " +
+                            motor.scale().coordinates().text(from);
   if (now < axis.start_tick()) {
     return ramp_down(now_us, id, {ended.outcome, ended.reason + " before it began"});
   }
-  if ((motor.farthest(direction, jog.course.shortest_delay) - target) * direction < 0) {
+  if ((motor.reach().farthest(direction, jog.course.shortest_delay) - target) * direction < 0) {
     return ramp_down(
         now_us, id,
         {api::Outcome::kStopped, after + " would be beyond its soft limit; ramped down at once"});
@@ -255,7 +258,7 @@ void Jogs::follow(std::int64_t now_us, MotorId id, Jog& jog) {
         now_us, id,
         {api::Outcome::kStopped,
          "its table needs " + std::to_string(std::abs(axis.planned_end_steps() - after.from)) +
-             " steps to stop from " + motor.coordinates().text(after.from) +
+             " steps to stop from " + motor.scale().coordinates().text(after.from) +
              ", where the stop event was, not " + std::to_string(after.steps)});
   }
   if (jog.ends || axis.stopping()) return;
@@ -272,7 +275,7 @@ void Jogs::follow(std::int64_t now_us, MotorId id, Jog& jog) {
 void Jogs::has_ended(std::int64_t now_us, MotorId id, const Jog& jog) {
   const motion::Motor& motor = installation_[id];
   const std::string where =
-      motor.name() + " stands at " + motor.coordinates().text(motor.position_steps());
+      motor.name() + " stands at " + motor.scale().coordinates().text(motor.position_steps());
   const api::Asker* by = open_.asker_of(id);
   for (const api::Asker& waiting : jog.waiting) {
     waiting.answer(api::done(by == nullptr ? where : motor.name() + " was given a new target"));

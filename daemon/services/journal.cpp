@@ -236,8 +236,8 @@ void Journal::offset_set(MotorId id, const api::Asker& by) {
   nlohmann::json line = {{"event", "offset"},
                          {"motor", motor.name()},
                          {"position_steps", motor.position_steps()},
-                         {"user", motor.coordinates().user_of(motor.position_steps())},
-                         {"offset", motor.coordinates().scale().offset},
+                         {"user", motor.scale().coordinates().user_of(motor.position_steps())},
+                         {"offset", motor.scale().coordinates().scale().offset},
                          {"number", by.number}};
   if (by.session) line["client"] = by.session->client_id();
   outputs_.move_log(json_text(line));

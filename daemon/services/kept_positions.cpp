@@ -17,7 +17,7 @@ constexpr int kMostReading = 16;  // anybody may ask for a history
 
 // "" of a motor without a unit: its positions are steps.
 std::string scale_text(const motion::Motor& motor) {
-  const units::Coordinates& coordinates = motor.coordinates();
+  const units::Coordinates& coordinates = motor.scale().coordinates();
   return coordinates.has_unit() ? units::to_text(coordinates.scale().steps_per_unit)
                                 : std::string();
 }
@@ -27,9 +27,9 @@ bool has(std::uint16_t mask, const motion::Motor& motor) {
 }
 
 state::Trust trust_of(const motion::Motor& motor) {
-  if (motor.uncertain_reason()) return state::Trust::kUncertain;
-  if (motor.restored_reason()) return state::Trust::kRestored;
-  return motor.confirmed() ? state::Trust::kKnown : state::Trust::kUnconfirmed;
+  if (motor.trust().uncertain_reason()) return state::Trust::kUncertain;
+  if (motor.trust().restored_reason()) return state::Trust::kRestored;
+  return motor.trust().confirmed() ? state::Trust::kKnown : state::Trust::kUnconfirmed;
 }
 
 }  // namespace
@@ -103,7 +103,7 @@ void KeptPositions::request(const api::Asker& asker, const api::Confirm& request
   for (const MotorId id : *motors) {
     motion::Motor& motor = installation_[id];
     const std::string who = text_of(asker);
-    motor.position_is_known();
+    motor.trust().is_known();
     outputs_.log(LogLevel::kInfo, id,
                  motor.name() + ": position " + std::to_string(motor.position_steps()) +
                      " confirmed by " + who);
@@ -221,8 +221,8 @@ void KeptPositions::past(state::PastMove move) {
   if (!keeper_) return;
   move.utime_us = outputs_.wall_clock_us();
   const auto motor = installation_.find(move.motor);
-  if (motor && installation_[*motor].coordinates().has_unit()) {
-    const units::Coordinates& coordinates = installation_[*motor].coordinates();
+  if (motor && installation_[*motor].scale().coordinates().has_unit()) {
+    const units::Coordinates& coordinates = installation_[*motor].scale().coordinates();
     if (move.from_text.empty()) move.from_text = coordinates.text(move.from_steps);
     if (move.to_text.empty()) move.to_text = coordinates.text(move.to_steps);
   }
@@ -257,8 +257,8 @@ state::Seen KeptPositions::seen(const Mcu& mcu, MotorId id) const {
   const std::optional<state::Record>& kept = keeper_->kept(id).record;
   const state::Record* told = before ? &before->record : kept ? &*kept : nullptr;
   const bool has_text = told != nullptr && told->steps_per_unit == scale_text(motor) &&
-                        motor.coordinates().has_unit();
-  std::string text = has_text ? motor.coordinates().text(told->steps) : std::string();
+                        motor.scale().coordinates().has_unit();
+  std::string text = has_text ? motor.scale().coordinates().text(told->steps) : std::string();
   return {.mcu = mcu.name(),
           .unique_id = heard.unique_id,
           .boot_number = heard.boot_number,
@@ -303,14 +303,14 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
   state::Verdict verdict = state::on_connecting(keeper_->kept(id), seen);
   note_unmoved(id, seen, verdict);
   // What the MCU itself reports of before this daemon.
-  if (first && motor.uncertain_reason() && verdict.trust != state::Trust::kUncertain) {
+  if (first && motor.trust().uncertain_reason() && verdict.trust != state::Trust::kUncertain) {
     verdict.trust = state::Trust::kUncertain;
-    verdict.reason = *motor.uncertain_reason();
+    verdict.reason = *motor.trust().uncertain_reason();
   }
   take(id, verdict);
   if (!verdict.set_steps) return ask_for_kept(id);
   motors_[id].restoring = Restoring{.steps = *verdict.set_steps, .reason = verdict.reason};
-  motor.restoring(true);
+  motor.trust().restoring(true);
   mcu.bus().set_position(mcu.on_bus(), motor.output().value,
                          static_cast<std::int32_t>(*verdict.set_steps));
 }
@@ -319,7 +319,7 @@ void KeptPositions::connect(Mcu& mcu, MotorId id, bool first) {
 void KeptPositions::ask_for_kept(MotorId id) {
   motion::Motor& motor = installation_[id];
   const std::optional<state::Record>& kept = keeper_->kept(id).record;
-  if (!kept || kept->target_parts == 0 || motor.uncertain_reason()) return;
+  if (!kept || kept->target_parts == 0 || motor.trust().uncertain_reason()) return;
   motor.ask_for(units::Steps{kept->target_steps, kept->target_parts});
 }
 
@@ -327,16 +327,16 @@ void KeptPositions::take(MotorId id, const state::Verdict& verdict) {
   motion::Motor& motor = installation_[id];
   switch (verdict.trust) {
     case state::Trust::kUnconfirmed:
-      motor.position_is_unconfirmed();
+      motor.trust().is_unconfirmed();
       break;
     case state::Trust::kKnown:
-      motor.position_is_known();
+      motor.trust().is_known();
       break;
     case state::Trust::kRestored:
-      motor.position_is_restored(verdict.reason);
+      motor.trust().is_restored(verdict.reason);
       break;
     case state::Trust::kUncertain:
-      motor.position_is_uncertain(verdict.reason);
+      motor.trust().is_uncertain(verdict.reason);
       outputs_.log(LogLevel::kWarning, id, motor.name() + ": is uncertain: " + verdict.reason);
       break;
   }
@@ -353,7 +353,7 @@ void KeptPositions::keep_heard(const Mcu& mcu) {
     const motion::Motor& motor = installation_[id];
     state::Record record = *kept;
     record.steps = motor.position_steps();
-    record.utime_us = motor.trust({}).heard_utime_us.value_or(outputs_.wall_clock_us());
+    record.utime_us = motor.position_trust({}).heard_utime_us.value_or(outputs_.wall_clock_us());
     const bool is_its_own = state::same_counter(record, {.unique_id = heard->unique_id,
                                                          .output = motor.output().value}) &&
                             record.boot_number == heard->boot_number;
@@ -366,7 +366,7 @@ void KeptPositions::goes_offline(Mcu& mcu, const std::string&) {
   for (const MotorId id : mcu.motors()) {
     // It begins again when the MCU is back.
     if (!std::exchange(motors_[id].restoring, std::nullopt)) continue;
-    installation_[id].restoring(false);
+    installation_[id].trust().restoring(false);
     mcus_[mcu.id].heard.reset();
   }
 }
@@ -379,17 +379,17 @@ void KeptPositions::follow_restoring(const Mcu& mcu, MotorId id) {
   if (mcu.busy()) return;
   motion::Motor& motor = installation_[id];
   const Restoring restoring = *std::exchange(motors_[id].restoring, std::nullopt);
-  motor.restoring(false);
+  motor.trust().restoring(false);
   installation_.changed = true;
   if (motor.position_steps() != restoring.steps) {
-    motor.position_is_uncertain("MCU " + mcu.name() + " did not take its kept position of " +
-                                std::to_string(restoring.steps) + " steps");
-    outputs_.log(LogLevel::kError, id, motor.name() + ": " + *motor.uncertain_reason());
+    motor.trust().is_uncertain("MCU " + mcu.name() + " did not take its kept position of " +
+                               std::to_string(restoring.steps) + " steps");
+    outputs_.log(LogLevel::kError, id, motor.name() + ": " + *motor.trust().uncertain_reason());
     return;
   }
   journal_.position_set(id, 0, {});
   ask_for_kept(id);
-  if (motor.restored_reason()) {
+  if (motor.trust().restored_reason()) {
     outputs_.log(LogLevel::kInfo, id,
                  motor.name() + ": position " + std::to_string(restoring.steps) +
                      " is restored: " + restoring.reason);
@@ -435,7 +435,7 @@ void KeptPositions::keep_at_rest(const Mcu& mcu, MotorId id) {
   state::Record record = record_of(mcu, id);
   const bool as_before =
       unmoved && record.steps == unmoved->steps &&
-      installation_[id].uncertain_reason() == unmoved->reason &&
+      installation_[id].trust().uncertain_reason() == unmoved->reason &&
       // Whose position it was may have gone to another output: then nobody else keeps it.
       (unmoved->record || keeper_->other_at(id, record.unique_id, record.output));
   if (!as_before) {
@@ -453,8 +453,8 @@ state::Record KeptPositions::record_of(const Mcu& mcu, MotorId id) const {
   return {.steps = motor.position_steps(),
           .steps_per_unit = scale_text(motor),
           .trust = trust_of(motor),
-          .reason = motor.uncertain_reason() ? *motor.uncertain_reason()
-                                             : motor.restored_reason().value_or(""),
+          .reason = motor.trust().uncertain_reason() ? *motor.trust().uncertain_reason()
+                                                     : motor.trust().restored_reason().value_or(""),
           .utime_us = outputs_.wall_clock_us(),
           .target_steps = is_whole ? 0 : asked_for.whole,
           .target_parts = asked_for.parts,

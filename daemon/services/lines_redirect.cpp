@@ -41,7 +41,8 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
     const motion::Motor& motor = installation_[motors[i]];
     const bool absolute = request.kind == api::Move::Kind::kAbsolute;
     const api::Amount& amount = request.motors[i].amount;
-    const auto steps = absolute ? motor.position_of(amount) : motor.distance_of(amount);
+    const auto steps =
+        absolute ? motor.scale().position_of(amount) : motor.scale().distance_of(amount);
     if (!steps) return fail(motor.name() + ": " + steps.error().message);
     const auto at =
         static_cast<std::size_t>(std::ranges::find(line.motors, motors[i]) - line.motors.begin());
@@ -50,7 +51,7 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
       return fail(fmt::format("{}: {} steps is out of range; allowed: +-{}", motor.name(),
                               steps->whole, motion::Motor::kMaxPosition));
     }
-    const auto from = absolute ? Result<units::Steps>() : motor.distance_from();
+    const auto from = absolute ? Result<units::Steps>() : motor.reach().distance_from();
     if (!from) return fail(motor.name() + ": " + from.error().message);
     targets[at] = *steps + *from;
     if (way.increment(at) != way.longest()) continue;
@@ -63,7 +64,7 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
       return fail(
           fmt::format("{}: {} is beyond the ends of the line that is under way; run {} first, "
                       "or wait for its result",
-                      motor.name(), motor.coordinates().text(targets[i].whole),
+                      motor.name(), motor.scale().coordinates().text(targets[i].whole),
                       words::remedy("stop", motor.name())));
     }
     const auto s = static_cast<std::uint32_t>(*step);
@@ -72,8 +73,8 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
     return fail(
         fmt::format("{}: {} is not on the line that is under way, which leads through {} "
                     "there; run {} first, or wait for its result",
-                    motor.name(), motor.coordinates().text(targets[i].whole),
-                    motor.coordinates().text(on_way), words::remedy("stop", motor.name())));
+                    motor.name(), motor.scale().coordinates().text(targets[i].whole),
+                    motor.scale().coordinates().text(on_way), words::remedy("stop", motor.name())));
   }
   return static_cast<std::uint32_t>(*step);
 }

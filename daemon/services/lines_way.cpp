@@ -43,7 +43,7 @@ Result<std::vector<Straight::Point>> Lines::points_of(const std::vector<MotorId>
     const auto target =
         moves_.target_of(motors[i], request.motors[i].amount, request.kind, *shortest_delay);
     if (!target) return fail(target.error());
-    const auto legs = motor.legs_to(target->whole, *shortest_delay);
+    const auto legs = motor.reach().legs_to(target->whole, *shortest_delay);
     if (!legs) return fail(motor.name() + ": " + legs.error().message);
     const motion::Leg& last = legs->back();
     const bool straight = legs->size() == 1;

@@ -39,7 +39,7 @@ bool LocalInputs::has_told(MotorId id) const {
   const Mcu& mcu = installation_.mcu_of(id);
   const bool told = (tasks_[mcu.id].inhibited & bit_of(motor)) != 0;
   if (!installation_.drives()[id].moved_by_people() || !mcu.online()) return true;
-  return !motor.is_held() || refusal(id) || (told && !mcu.busy());
+  return !motor.hold().is_set() || refusal(id) || (told && !mcu.busy());
 }
 
 std::optional<std::string> LocalInputs::refusal(MotorId id) const {
@@ -55,7 +55,7 @@ std::uint16_t LocalInputs::held(const Mcu& mcu) const {
   unsigned held = 0;
   for (const MotorId id : mcu.motors()) {
     const bool theirs = installation_.drives()[id].moved_by_people();
-    if (theirs && installation_[id].is_held()) held |= bit_of(installation_[id]);
+    if (theirs && installation_[id].hold().is_set()) held |= bit_of(installation_[id]);
   }
   return static_cast<std::uint16_t>(held);
 }

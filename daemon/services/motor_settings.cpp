@@ -49,9 +49,9 @@ MotorSettings::MotorSettings(Installation& installation, const Positions& positi
 config::Settings MotorSettings::settings_of(MotorId id) const {
   config::Settings settings = in_file_[id];
   const motion::Motor& motor = installation_[id];
-  settings.coordinates = motor.coordinates();
-  settings.soft_limits = motor.soft_limits();
-  settings.max_speed = motor.max_speed();
+  settings.coordinates = motor.scale().coordinates();
+  settings.soft_limits = motor.scale().soft_limits();
+  settings.max_speed = motor.scale().max_speed();
   settings.drive = installation_.drives()[id];
   return settings;
 }
@@ -154,8 +154,8 @@ void MotorSettings::carry_out(const Plan& plan, const api::Asker& asker) {
   std::map<MotorId, std::string> from;
   for (std::size_t i = 0; i < plan.motors.size(); ++i) {
     const motion::Motor& motor = installation_[plan.motors[i]];
-    if (motor.coordinates().has_unit()) {
-      from[plan.motors[i]] = motor.coordinates().text(motor.position_steps());
+    if (motor.scale().coordinates().has_unit()) {
+      from[plan.motors[i]] = motor.scale().coordinates().text(motor.position_steps());
     }
     put(plan.motors[i], plan.settings[i]);
     keep(plan.motors[i]);
@@ -191,16 +191,16 @@ void MotorSettings::offset_set(MotorId id, const units::Coordinates& before, con
               .from_steps = motor.position_steps(),
               .to_steps = motor.position_steps(),
               .result = std::string(api::word(api::Outcome::kDone)),
-              .reason = assignment(SettingKey::kOffset, offset(motor.coordinates())) + ", was " +
-                        offset(before),
+              .reason = assignment(SettingKey::kOffset, offset(motor.scale().coordinates())) +
+                        ", was " + offset(before),
               .from_text = before.text(motor.position_steps()),
-              .to_text = motor.coordinates().text(motor.position_steps())});
+              .to_text = motor.scale().coordinates().text(motor.position_steps())});
 }
 
 void MotorSettings::put(MotorId id, const config::Settings& settings) {
-  installation_[id].set_coordinates(settings.coordinates);
-  installation_[id].set_soft_limits(settings.soft_limits);
-  installation_[id].set_max_speed(settings.max_speed);
+  installation_[id].scale().set_coordinates(settings.coordinates);
+  installation_[id].scale().set_soft_limits(settings.soft_limits);
+  installation_[id].scale().set_max_speed(settings.max_speed);
   if (settings.drive != installation_.drives()[id]) {
     installation_.put(id, settings.drive);
     installation_[id].set_local(settings.drive.moved_by_people());
@@ -286,7 +286,7 @@ std::string MotorSettings::text_of(const Plan& plan) const {
     }
     // Where nobody has heard of it there is nothing to be said.
     if (!installation_.mcu_of(id).online()) continue;
-    const auto within = motor.stands_within_soft_limits();
+    const auto within = motor.reach().stands_within_soft_limits();
     if (!within) text += "; " + within.error().message;
   }
   if (!kept_.keeps()) text += "; counts until bushd ends, as there is no state store";

@@ -66,7 +66,7 @@ Result<Moves::Part> Moves::part_of(MotorId motor, const api::Amount& amount,
   if (!shortest_delay) return fail(shortest_delay.error());
   const auto target = target_of(motor, amount, move.kind, *shortest_delay);
   if (!target) return fail(target.error());
-  auto legs = installation_[motor].legs_to(target->whole, *shortest_delay);
+  auto legs = installation_[motor].reach().legs_to(target->whole, *shortest_delay);
   if (!legs) return fail(installation_[motor].name() + ": " + legs.error().message);
   return Part{.motor = motor, .target = *target, .legs = std::move(*legs)};
 }
@@ -74,7 +74,7 @@ Result<Moves::Part> Moves::part_of(MotorId motor, const api::Amount& amount,
 Result<bushd_delay> Moves::shortest_delay_of(MotorId id,
                                              const std::optional<api::Speed>& speed) const {
   const motion::Motor& motor = installation_[id];
-  auto shortest_delay = motor.shortest_delay_at(speed);
+  auto shortest_delay = motor.reach().shortest_delay_at(speed);
   if (!shortest_delay) return fail(motor.name() + ": " + shortest_delay.error().message);
   return shortest_delay;
 }
@@ -83,7 +83,8 @@ Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api
                                       bushd_delay shortest_delay) const {
   const motion::Motor& motor = installation_[id];
   const bool absolute = kind == api::Move::Kind::kAbsolute;
-  const auto counted = absolute ? motor.position_of(amount) : motor.distance_of(amount);
+  const auto counted =
+      absolute ? motor.scale().position_of(amount) : motor.scale().distance_of(amount);
   if (!counted) return fail(motor.name() + ": " + counted.error().message);
   const std::int64_t steps = counted->whole;
   // Compared before any arithmetic: the sum of two values from outside could overflow.
@@ -94,10 +95,10 @@ Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api
   }
   const auto refuse = [&motor](const Error& why) { return fail(motor.name() + ": " + why.text()); };
   if (const auto may = interlocks_.may_move(id); !may) return refuse(may.error());
-  const auto from = absolute ? Result<units::Steps>() : motor.distance_from();
+  const auto from = absolute ? Result<units::Steps>() : motor.reach().distance_from();
   if (!from) return refuse(from.error());
   const units::Steps target = *from + *counted;
-  if (const auto may = motor.may_move_to(target.whole, shortest_delay); !may)
+  if (const auto may = motor.reach().may_move_to(target.whole, shortest_delay); !may)
     return refuse(may.error());
   return target;
 }
@@ -406,7 +407,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [&](const motion::event::Drop&) { mcu.bus().drop(mcu.on_bus(), motor.output().value); },
             [&](const motion::event::Mismatch& mismatch) {
               outputs_.log(LogLevel::kError, id,
-                           motor.name() + ": " + *motor.uncertain_reason() +
+                           motor.name() + ": " + *motor.trust().uncertain_reason() +
                                (mismatch.stopped ? "; it is stopped"
                                                  : "; it is left to the other master on the bus, "
                                                    "only an emergency stop reaches it"));

@@ -113,7 +113,7 @@ void OpenMoves::end(MotorId id, api::Outcome outcome, const std::string& why, bo
 
 api::MotorResult OpenMoves::result_of(MotorId id, api::Outcome outcome, std::int64_t position_steps,
                                       const api::Asker& asker) const {
-  const units::Coordinates& coordinates = installation_[id].coordinates();
+  const units::Coordinates& coordinates = installation_[id].scale().coordinates();
   return {.motor = installation_[id].name(),
           .outcome = outcome,
           .position_steps = position_steps,

@@ -51,7 +51,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   const std::string mcus = installation_.not_online(named);
   if (!mcus.empty()) {
     const bool may_move = !request.motors.empty() || std::ranges::any_of(named, [this](MotorId id) {
-      return installation_[id].lost_in_motion();
+      return installation_[id].trust().lost_in_motion();
     });
     pausing.not_done(may_move ? api::Outcome::kLink : api::Outcome::kDone,
                      "not online, so it is unknown whether they stand:" + mcus);

@@ -16,7 +16,8 @@ bushd_position_compare message_of(const api::PositionCompare& request, const mot
   if (!request.arrivals.any()) return message;
   if (request.arrivals.positive) message.arrivals |= BUSHD_ARRIVES_POSITIVE;
   if (request.arrivals.negative) message.arrivals |= BUSHD_ARRIVES_NEGATIVE;
-  message.position_steps = static_cast<std::int32_t>(*motor.steps_of_position(request.position));
+  message.position_steps =
+      static_cast<std::int32_t>(*motor.scale().steps_of_position(request.position));
   message.delay_us = static_cast<std::uint32_t>(request.delay_us);
   message.width_us = static_cast<std::uint32_t>(request.width_us);
   return message;
@@ -43,7 +44,7 @@ Result<MotorId> PositionCompare::check(const api::PositionCompare& request) cons
     return fail("MCU " + mcu.name() + " has no position compare output");
   }
   if (!request.arrivals.any()) return id;
-  const auto position = installation_[*id].steps_of_position(request.position);
+  const auto position = installation_[*id].scale().steps_of_position(request.position);
   if (!position) return fail(request.motor + ": " + position.error().message);
   if (!within(*position, -motion::Motor::kMaxPosition, motion::Motor::kMaxPosition)) {
     return fail(request.motor + ": positions lie within +-" +

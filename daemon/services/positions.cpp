@@ -80,12 +80,12 @@ Result<void> Positions::may_be_set(MotorId id) const {
 
 Result<void> Positions::add(MotorId id, const api::Amount& position, bool dial, Plan& plan) const {
   const motion::Motor& motor = installation_[id];
-  const units::Coordinates& coordinates = motor.coordinates();
+  const units::Coordinates& coordinates = motor.scale().coordinates();
   const auto* user = std::get_if<api::UserUnits>(&position);
   if (user != nullptr && !dial && coordinates.has_unit()) {
-    if (motor.uncertain_reason()) {
+    if (motor.trust().uncertain_reason()) {
       return fail(
-          "its position is uncertain, because " + *motor.uncertain_reason() +
+          "its position is uncertain, because " + *motor.trust().uncertain_reason() +
           "; home it, or say where it stands on the dial: " + words::set_remedy(motor.name()));
     }
     auto moved = coordinates.with_user(user->value, motor.position_steps());
@@ -94,7 +94,7 @@ Result<void> Positions::add(MotorId id, const api::Amount& position, bool dial, 
     return {};
   }
   const auto steps = user != nullptr && dial ? coordinates.steps_of_dial(user->value)
-                                             : motor.steps_of_position(position);
+                                             : motor.scale().steps_of_position(position);
   if (!steps) return fail(steps.error());
   if (*steps > motion::Motor::kMaxPosition || *steps < -motion::Motor::kMaxPosition) {
     return fail("positions lie within +-" + std::to_string(motion::Motor::kMaxPosition));
@@ -145,8 +145,8 @@ Result<void> Positions::outcome(const Setting& setting, const Result<void>& conf
 
 void Positions::put(Offset& offset, const api::Asker& by) {
   motion::Motor& motor = installation_[offset.motor];
-  const units::Coordinates before = motor.coordinates();
-  motor.set_coordinates(std::move(offset.coordinates));
+  const units::Coordinates before = motor.scale().coordinates();
+  motor.scale().set_coordinates(std::move(offset.coordinates));
   motor.ask_for({});
   journal_.offset_set(offset.motor, by);
   if (offset_listener_) offset_listener_(offset.motor, before, by);
@@ -154,7 +154,7 @@ void Positions::put(Offset& offset, const api::Asker& by) {
 
 void Positions::note(const Part& part, const api::Asker& by) {
   motion::Motor& motor = installation_[part.motor];
-  motor.position_is_known();
+  motor.trust().is_known();
   motor.ask_for({});
   journal_.position_set(part.motor, part.from_steps, by);
   if (listener_) listener_(part.motor, part.from_steps, by);

@@ -75,7 +75,7 @@ bool differs(const units::Steps& a, const units::Steps& b) {
 
 // A motor without a unit has whole steps only.
 api::Amount amount_of(const motion::Motor& motor, double user, const units::Steps& steps) {
-  if (motor.coordinates().has_unit()) return api::UserUnits{user};
+  if (motor.scale().coordinates().has_unit()) return api::UserUnits{user};
   return steps.whole;
 }
 
@@ -189,7 +189,7 @@ api::MotorResult PseudoAxes::result_of(const Place& place, const api::Completed&
   std::vector<double> at;
   for (const MotorId id : pseudo.motors) {
     const motion::Motor& motor = installation_[id];
-    at.push_back(motor.coordinates().user_of(motor.position_steps()));
+    at.push_back(motor.scale().coordinates().user_of(motor.position_steps()));
   }
   const double position = positions_of(pseudo.law, at)[place.axis];
   api::MotorResult result{.motor = axis.name,
@@ -303,10 +303,10 @@ Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
   std::vector<double> now;
   for (const MotorId id : pseudo.motors) {
     const motion::Motor& motor = installation_[id];
-    const auto steps = motor.distance_from();
+    const auto steps = motor.reach().distance_from();
     if (!steps) return fail(motor.name() + ": " + steps.error().message);
     from.push_back(*steps);
-    now.push_back(motor.coordinates().user_of(*steps));
+    now.push_back(motor.scale().coordinates().user_of(*steps));
   }
   const auto positions = positions_asked(move, pseudo, now);
   if (!positions) return fail(positions.error());
@@ -318,7 +318,7 @@ Result<api::Request> PseudoAxes::of_motors(const api::Move& move) const {
   bool steps = false;  // some motor makes one
   for (std::size_t j = 0; j < motors->size(); ++j) {
     const motion::Motor& motor = installation_[pseudo.motors[j]];
-    const auto target = motor.coordinates().unrounded_of_user((*motors)[j]);
+    const auto target = motor.scale().coordinates().unrounded_of_user((*motors)[j]);
     if (!target) return fail(motor.name() + ": " + target.error().message);
     longest = std::max(longest, std::abs((*motors)[j] - now[j]));
     if (!differs(*target, from[j])) continue;
@@ -369,7 +369,7 @@ api::StateSnapshot PseudoAxes::state(std::size_t index, const StateOf& state_of)
     const motion::Motor& of = installation_[id];
     positions.push_back(motor.user);
     targets.push_back(motor.user_target);
-    const double way = of.coordinates().user_of(1) - of.coordinates().user_of(0);
+    const double way = of.scale().coordinates().user_of(1) - of.scale().coordinates().user_of(0);
     later.push_back(motor.user + way * motor.velocity_steps_per_s * kLaterS);
     take_worst(all, motor);
     if (!installation_.mcu_of(id).online()) snapshot.state = api::McuState::kOffline;
@@ -378,7 +378,7 @@ api::StateSnapshot PseudoAxes::state(std::size_t index, const StateOf& state_of)
     }
   }
   const auto* curved = std::get_if<pseudo::CurvedAxis>(&pseudo.law);
-  const units::Coordinates& first = installation_[pseudo.motors.front()].coordinates();
+  const units::Coordinates& first = installation_[pseudo.motors.front()].scale().coordinates();
   const double step = std::abs(first.user_of(1) - first.user_of(0));
   // The step that is nearest to an end may be beyond it.
   if (curved != nullptr && curved->beyond(positions) > step / 2 &&

@@ -131,10 +131,10 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   api::MotorState state;
   state.name = motor.name();
   state.position_steps = motor.position_steps();
-  state.user = motor.coordinates().user_of(motor.position_steps());
-  state.dial = motor.coordinates().dial_of(motor.position_steps());
+  state.user = motor.scale().coordinates().user_of(motor.position_steps());
+  state.dial = motor.scale().coordinates().dial_of(motor.position_steps());
   state.target_steps = motor.target_steps();
-  state.user_target = motor.coordinates().user_of(motor.target_steps());
+  state.user_target = motor.scale().coordinates().user_of(motor.target_steps());
   state.velocity_steps_per_s = motor.velocity_steps_per_s();
   state.activity = activity_of(motor);
   if (motor.is<motion::OnLine>()) state.line = line_of(mcu, motor.axis());
@@ -152,7 +152,7 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
                      .negative = reports(view.report.forbidden_negative)};
   std::optional<std::uint16_t> boot_number;
   if (view.identified) boot_number = view.identity.boot_number;
-  motion::PositionTrust trust = motor.trust(boot_number);
+  motion::PositionTrust trust = motor.position_trust(boot_number);
   const bool good = trust.trust == api::Trust::kKnown || trust.trust == api::Trust::kRestored;
   if (good && view.outdated_us > 0) {
     trust = {api::Trust::kStale,
@@ -164,7 +164,7 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   state.uncertain_reason = std::move(trust.reason);
   state.heard_utime_us = trust.heard_utime_us;
   state.paused = motor.is_paused();
-  state.held = motor.is_held();
+  state.held = motor.hold().is_set();
   const api::Asker* asker = open_moves_.asker_of(*mcu.motor_at(motor.output()));
   if (motor.is<motion::Armed>() && asker != nullptr) state.armed_by = text_of(*asker);
   return state;
@@ -201,7 +201,7 @@ api::Description StatePublisher::description_of(const Mcu& mcu) const {
                                .motors = {}};
   for (const MotorId motor : mcu.motors()) {
     const config::Motor& config = installation_.config()[motor];
-    const units::Coordinates& coordinates = installation_[motor].coordinates();
+    const units::Coordinates& coordinates = installation_[motor].scale().coordinates();
     units::Scale scale = coordinates.scale();
     scale.decimals = coordinates.precision();
     description.motors.push_back({.name = config.name,
@@ -210,7 +210,7 @@ api::Description StatePublisher::description_of(const Mcu& mcu) const {
                                   .table = ref_to(*installation_.table_of(motor)),
                                   .text = config.description,
                                   .scale = std::move(scale),
-                                  .soft_limits = installation_[motor].soft_limits()});
+                                  .soft_limits = installation_[motor].scale().soft_limits()});
   }
   return description;
 }

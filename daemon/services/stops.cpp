@@ -48,8 +48,8 @@ bool Stops::may_run_on(const std::vector<MotorId>& motors, bool named) const {
   if (named || std::ranges::none_of(motors, is_online)) {
     return !std::ranges::all_of(motors, is_online);
   }
-  return std::ranges::any_of(motors,
-                             [this](MotorId id) { return installation_[id].lost_in_motion(); });
+  return std::ranges::any_of(
+      motors, [this](MotorId id) { return installation_[id].trust().lost_in_motion(); });
 }
 
 std::string Stops::not_online_text(const std::vector<MotorId>& motors) const {

@@ -101,11 +101,11 @@ auto Trajectories::begin(const api::Asker& asker, const api::Follow& request) ->
     const tables::TablePtr table = installation_.table_of(id);
     loaded.parts.push_back({.motor = id,
                             .table = table,
-                            .coordinates = motor.coordinates(),
+                            .coordinates = motor.scale().coordinates(),
                             .bounds = {.table = &table->view(),
                                        .shortest_delay = *shortest_delay,
-                                       .lowest = motor.lowest(),
-                                       .highest = motor.highest()}});
+                                       .lowest = motor.scale().lowest(),
+                                       .highest = motor.scale().highest()}});
   }
   const auto idle = [](const Loaded& one) { return !one.followed && !one.waits; };
   if (std::ranges::count_if(trajectories_, idle) >= static_cast<std::ptrdiff_t>(kMostLoaded)) {

@@ -18,11 +18,12 @@ Result<void> Trajectories::may_run(const Loaded& loaded) const {
     const auto& [id, table, coordinates, bounds] = loaded.parts[m];
     const motion::Motor& motor = installation_[id];
     auto may = interlocks_.may_move(id);
-    if (may) may = motor.may_move_to(motor.position_steps());
+    if (may) may = motor.reach().may_move_to(motor.position_steps());
     if (may && motor.has_plan()) may = fail("it moves; stop it, or wait for its result");
     if (!may) return fail(motor.name() + ": " + may.error().text());
-    if (table != installation_.table_of(id) || coordinates.scale() != motor.coordinates().scale() ||
-        bounds.lowest != motor.lowest() || bounds.highest != motor.highest()) {
+    if (table != installation_.table_of(id) ||
+        coordinates.scale() != motor.scale().coordinates().scale() ||
+        bounds.lowest != motor.scale().lowest() || bounds.highest != motor.scale().highest()) {
       return fail(motor.name() +
                   ": its table, offset, direction or limits have changed since the trajectory was "
                   "checked; load it again");

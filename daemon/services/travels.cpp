@@ -67,8 +67,8 @@ Result<void> Travels::may_travel(MotorId id, const bushd_travel& message) const 
   const Mcu& mcu = installation_.mcu_of(id);
   if (auto may = interlocks_.may_move(id); !may) return may;
   if (motor.has_plan()) return fail("moves, by another's request");
-  if (motor.is_held()) {
-    return fail(motor.held_text() + "; run " + words::remedy("release", motor.name()) + " first");
+  if (motor.hold().is_set()) {
+    return fail(motor.hold().text() + "; run " + words::remedy("release", motor.name()) + " first");
   }
   if (!mcu.can_travel() || (message.edge != BUSHD_EDGE_NONE && !mcu.can_trigger())) {
     return fail("the firmware of MCU " + mcu.name() + " cannot do that by itself");
@@ -84,7 +84,7 @@ Result<void> Travels::may_travel(MotorId id, const bushd_travel& message) const 
                 " travel; one at a time");
   }
   const std::int64_t steps = std::int64_t{message.steps} * message.direction;
-  return motor.may_move_to(motor.position_steps() + steps);
+  return motor.reach().may_move_to(motor.position_steps() + steps);
 }
 
 void Travels::request(const api::Asker& asker, MotorId id, const bushd_travel& message) {
@@ -190,7 +190,7 @@ void Travels::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   motor.end_travel();
   const bool cut = installation_.config()[task.motor].limit_action == BUSHD_STOP_IMMEDIATE;
   if (task.number && cut && mcu.report().homing == BUSHD_TRAVEL_EARLY && mcu.online()) {
-    motor.position_is_uncertain(
+    motor.trust().is_uncertain(
         "it was stopped immediately at its limit switch and may have overrun");
   }
   if (outcome != Outcome::kReached && !task.given_up) {

@@ -119,7 +119,7 @@ void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
   // Where all motors are meant, those count that were lost while they waited or moved.
   const bool may_begin =
       !request.motors.empty() || std::ranges::any_of(motors, [this](MotorId motor) {
-        return installation_[motor].lost_in_motion();
+        return installation_[motor].trust().lost_in_motion();
       });
   const std::string mcus = installation_.not_online(motors);
   const std::string away =

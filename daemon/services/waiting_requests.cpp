@@ -52,8 +52,9 @@ std::optional<std::vector<MotorId>> WaitingRequests::motors_of(const api::Reques
   const bool moves = !std::holds_alternative<api::SetPosition>(request);
   // What is refused anyway leaves the disk alone.
   for (const MotorId motor : *found) {
-    const bool may = moves ? interlocks_.may_move(motor) && !installation_[motor].uncertain_reason()
-                           : installation_.mcu_of(motor).online();
+    const bool may =
+        moves ? interlocks_.may_move(motor) && !installation_[motor].trust().uncertain_reason()
+              : installation_.mcu_of(motor).online();
     if (!may) return std::nullopt;
   }
   return *found;

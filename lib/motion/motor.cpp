@@ -112,10 +112,20 @@ void Motor::stop(std::optional<std::string> ended_by) {
   }
 }
 
+void Motor::home() {
+  activity_ = Homing{};
+  asked_for_.reset();
+}
+
 void Motor::end_homing(bool found) {
   if (!is<Homing>()) return;
-  if (found) position_is_known();
+  if (found) trust_.is_known();
   rest();
+}
+
+void Motor::travel() {
+  activity_ = Travelling{};
+  asked_for_.reset();
 }
 
 void Motor::end_travel() {
@@ -143,15 +153,14 @@ void Motor::take_limits(const bushd_report& report) {
 // Positions are counts since the MCU's boot: a boot whose positions nobody has seen has lost them.
 void Motor::goes_online(const bushd_report& report, bool first, bool restarted) {
   const std::int64_t before = std::exchange(position_, report.motor[output().value].position_steps);
-  boot_number_ = report.boot_number;
-  lost_.reset();
-  if (restarted) uncertain_reason_ = "MCU " + setup_.mcu + " restarted";
+  trust_.goes_online(report.boot_number);
+  if (restarted) trust_.lose_steps("MCU " + setup_.mcu + " restarted");
   if (!first && !restarted) follow_count(before);
   // Nobody here has seen whether it moved when it was stopped.
   const bool immediate = stops_immediately(report);
   const bool unpowered = (report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
   if ((immediate || unpowered) && (first || position_ != before)) {
-    uncertain_reason_ = immediate ? stopped_immediately(report, setup_.mcu) : kUnpowered;
+    trust_.lose_steps(immediate ? stopped_immediately(report, setup_.mcu) : kUnpowered);
   }
   take_limits(report);
   follow_autonomous(report, false);
@@ -160,7 +169,7 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
 void Motor::goes_offline(std::int64_t heard_utime_us) {
   // What waits for a trigger may have had it, and people may use the inputs.
   const bool in_motion = !is<Resting>() || setup_.local;
-  lost_ = Lost{.heard_utime_us = heard_utime_us, .in_motion = in_motion};
+  trust_.goes_offline(heard_utime_us, in_motion);
   if (is<Local>()) activity_ = Resting{};
 }
 
@@ -189,8 +198,8 @@ void Motor::follow_asked_for() {
 void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output().value));
   if (before && !autonomous_) {
-    if (stops_immediately(report)) uncertain_reason_ = stopped_immediately(report, setup_.mcu);
-    if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) uncertain_reason_ = kUnpowered;
+    if (stops_immediately(report)) trust_.lose_steps(stopped_immediately(report, setup_.mcu));
+    if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) trust_.lose_steps(kUnpowered);
   }
   const bool free = is<Resting>() || is<Local>();
   // The bit alone may be that of a plan of this daemon's that has just ended.
@@ -244,8 +253,8 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
       return;
     }
     now.position_mismatch = true;
-    uncertain_reason_ = "MCU " + setup_.mcu + " counted position " + std::to_string(position_) +
-                        " where the table leads to " + std::to_string(planned);
+    trust_.lose_steps("MCU " + setup_.mcu + " counted position " + std::to_string(position_) +
+                      " where the table leads to " + std::to_string(planned));
     if (report.other_master) {
       // It may go by that one's plan: a ramp-down from where it should be here would cross it.
       now.faults |= BUSHD_FAULT_LINK;
@@ -370,6 +379,15 @@ bool Motor::follow_armed(const Report& report, std::vector<Event>& events) {
                               "a fault of " + name + " disarmed it; 'bushctl status' tells which"));
   }
   return false;
+}
+
+// MCUs count in 32 bits, and go on at the other end: no motor makes so many steps between two
+// reports. Nor may it stand beyond what can be set.
+void Motor::follow_count(std::int64_t before) {
+  if (std::abs(position_ - before) <= kMaxPosition && position_ >= -kMaxPosition) return;
+  trust_.lose_steps("MCU " + setup_.mcu + " has moved it from " + std::to_string(before) +
+                    " beyond +-" + std::to_string(kMaxPosition) +
+                    " steps, where no more are counted");
 }
 
 }  // namespace bushd::motion

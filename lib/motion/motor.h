@@ -14,6 +14,10 @@
 #include "base/units/coordinates.h"
 #include "engine/message.h"
 #include "motion/axis.h"
+#include "motion/motor_hold.h"
+#include "motion/motor_reach.h"
+#include "motion/motor_scale.h"
+#include "motion/motor_trust.h"
 #include "words/amount.h"
 #include "words/words.h"
 
@@ -32,18 +36,10 @@ struct MotorSetup {
   bool limit_immediate = false;
   bool emergency_stop_immediate = false;
   bool emergency_input_immediate = false;
-  units::Coordinates coordinates{};
-  std::optional<units::SoftLimits> soft_limits{};
-  std::optional<double> max_speed{};  // user units/s
+  MotorScale scale{};
   double backlash = 0;  // user units; its sign is that of the last approach; 0: from either side
   std::optional<double> backlash_speed{};  // user units/s, of the last approach
   Tick settle_ticks = 0;                   // it has ended when it has stood for so long
-};
-
-// A motion is made of these, with a rest between any two.
-struct Leg {
-  std::int64_t target;
-  bushd_delay shortest_delay;  // of Axis
 };
 
 // What a motor does. Any other than Resting keeps other motions away from it.
@@ -86,13 +82,6 @@ struct Report {
   bool other_master = false;  // talks on the bus, and may have moved it
 };
 
-// What its position is worth.
-struct PositionTrust {
-  words::Trust trust;
-  std::string reason;                            // why it is not known; "" while it is
-  std::optional<std::int64_t> heard_utime_us{};  // if stale
-};
-
 // What follows from a report, to be done in this order.
 namespace event {
 struct Waits {};  // for the trigger: an edge from now on starts it
@@ -129,16 +118,22 @@ using Event = std::variant<event::Waits, event::Started, event::Executed, event:
 
 class Motor {
  public:
-  // MCUs count positions in 32 bits.
-  static constexpr std::int64_t kMaxPosition = INT32_MAX;
+  static constexpr std::int64_t kMaxPosition = MotorScale::kMaxPosition;
 
-  Motor(MotorSetup setup, Axis axis) : setup_(std::move(setup)), axis_(axis) {}
+  Motor(MotorSetup setup, Axis axis) : setup_(std::move(setup)), axis_(axis), trust_(setup_.mcu) {}
 
   const std::string& name() const { return setup_.name; }
   Output output() const { return setup_.output; }
-  const units::Coordinates& coordinates() const { return setup_.coordinates; }
-  const std::optional<units::SoftLimits>& soft_limits() const { return setup_.soft_limits; }
-  const std::optional<double>& max_speed() const { return setup_.max_speed; }
+
+  // What its numbers mean.
+  MotorScale& scale() { return setup_.scale; }
+  const MotorScale& scale() const { return setup_.scale; }
+  // What its position is worth. What follows from reports it is told here.
+  MotorTrust& trust() { return trust_; }
+  const MotorTrust& trust() const { return trust_; }
+  // Whether motions of it are held back.
+  MotorHold& hold() { return hold_; }
+  const MotorHold& hold() const { return hold_; }
 
   const Activity& activity() const { return activity_; }
   template <class A>
@@ -159,57 +154,25 @@ class Motor {
   bool has_plan() const { return moves() || is<Armed>(); }
   std::string busy_text() const;  // "theta moves"
 
-  // As reported last; the MCU's boot that it belongs to, nothing before the first report.
+  // As reported last.
   std::int64_t position_steps() const { return position_; }
-  std::optional<std::uint16_t> boot_number() const { return boot_number_; }
   // `boot_number`: of the MCU now.
-  PositionTrust trust(std::optional<std::uint16_t> boot_number) const;
+  PositionTrust position_trust(std::optional<std::uint16_t> boot_number) const {
+    return trust_.judged(boot_number, position_, scale().coordinates());
+  }
   // Where it will stand when all is done, and it has been resumed if it is paused. Where it is, as
   // long as nobody has said where it is to stand.
   std::int64_t target_steps() const;
-  // What a distance is counted from: where it stands, or has been told to go, as it was asked for,
-  // not rounded to a step; or, if it is being stopped, where it will stand. Error: nobody has said
-  // where, or the motion there is paused.
-  Result<units::Steps> distance_from() const;
   // Where it was told to go last, while it is there or bound for it.
   const std::optional<units::Steps>& asked_for() const { return asked_for_; }
   double velocity_steps_per_s() const { return moves() ? axis_.velocity_steps_per_s() : 0.0; }
-  // Why steps may be lost, so that it may not move. Nothing: none are, as far as this daemon knows.
-  const std::optional<std::string>& uncertain_reason() const { return uncertain_reason_; }
-  // Somebody has said where it stands, in this run of the daemon or as was kept.
-  bool confirmed() const { return confirmed_; }
-  // Its MCU is offline, and was lost while it moved, so it may have run on.
-  bool lost_in_motion() const { return lost_ && lost_->in_motion; }
-  // Since then its MCU has lost power, and it stood.
-  const std::optional<std::string>& restored_reason() const { return restored_reason_; }
 
   // The plan; only while has_plan().
   Axis& axis() { return axis_; }
   const Axis& axis() const { return axis_; }
 
-  // What it may do now, as far as it depends on the motor alone. A motor that moves may be given
-  // another target, and nothing else.
-  Result<void> may_be_used() const;  // for any motion
-  // Beyond that.
-  Result<void> may_move_to(std::int64_t target, bushd_delay shortest_delay = 0) const;
-  // Whether it may be moved by its MCU alone, as much as so many steps to either side.
-  Result<void> may_be_moved_within(std::int64_t steps) const;
-  // How far it may go from here in a direction: to its soft limit, as far as positions are counted,
-  // or for as long as a run may take. Where it stands, if that is not in this direction.
-  std::int64_t farthest(int direction, bushd_delay shortest_delay) const;
-  // The legs of a move there, in place of what it does now. Errors: one of them may not be made.
-  Result<std::vector<Leg>> legs_to(std::int64_t target, bushd_delay shortest_delay) const;
-  // The shortest delay of runs at max_speed and at this speed, whichever is slower. Error: no
-  // speed, or one slower than any delay.
-  Result<bushd_delay> shortest_delay_at(const std::optional<words::Speed>& speed) const;
-  // An amount in steps. Errors: not finite, beyond what is counted.
-  Result<std::int64_t> steps_of_position(const words::Amount& position) const;
-  // The same, not rounded.
-  Result<units::Steps> position_of(const words::Amount& position) const;
-  Result<units::Steps> distance_of(const words::Amount& distance) const;
-  // Where it may be, by its soft limits, or as far as positions are counted.
-  std::int64_t lowest() const;
-  std::int64_t highest() const;
+  // What it may do now.
+  MotorReach reach() const { return MotorReach(*this); }
 
   // Requests. Preconditions: it may. Shortest delays are those of Axis.
   // From rest, or from the turning point of a motion.
@@ -243,13 +206,6 @@ class Motor {
     if (now) asked_for_.reset();
   }
   bool jogs() const { return jogs_; }
-  // No motion of it is to begin. `how`: by whom and since when, "by panel since ... UTC".
-  void hold(std::string how) { held_ = std::move(how); }
-  void release() { held_.reset(); }
-  bool is_held() const { return held_.has_value(); }
-  const std::optional<std::string>& held() const { return held_; }
-  // Precondition: it is held.
-  std::string held_text() const { return "it is held " + *held_; }
   void arm(std::uint8_t number, std::int64_t steps, bushd_delay shortest_delay = 0);
   void arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
                 bushd_delay shortest_delay);
@@ -264,33 +220,11 @@ class Motor {
   bool change(Tick at, std::uint32_t least_end = 0) {
     return has_plan() && axis_.change(at, least_end);
   }
-  void home() {
-    activity_ = Homing{};
-    asked_for_.reset();
-  }
+  void home();
   void end_homing(bool found);
-  void travel() {
-    activity_ = Travelling{};
-    asked_for_.reset();
-  }
+  void travel();
   void end_travel();
-  void set_coordinates(units::Coordinates coordinates) {
-    setup_.coordinates = std::move(coordinates);
-  }
-  void set_soft_limits(std::optional<units::SoftLimits> limits) { setup_.soft_limits = limits; }
-  // User units/s, for the motions that begin from now on.
-  void set_max_speed(std::optional<double> speed) { setup_.max_speed = speed; }
   void set_local(bool local) { setup_.local = local; }
-  // Error: how far it is from where it may be.
-  Result<void> stands_within_soft_limits() const;
-  void position_is_known();
-  // What was kept from before the MCU, or the daemon, was started.
-  void position_is_restored(std::string reason);
-  void position_is_uncertain(std::string reason);
-  void position_is_unconfirmed();  // nobody has said where it stands
-  // The MCU's counter is being set to what was kept: until then it is not its position.
-  void restoring(bool now) { restoring_ = now; }
-  bool is_restoring() const { return restoring_; }
   // Another table. Precondition: !has_plan().
   void set_axis(Axis axis) { axis_ = axis; }
 
@@ -306,21 +240,14 @@ class Motor {
   std::optional<event::Ended> end(Outcome outcome, std::string reason);
 
  private:
+  friend class MotorReach;
+
   bool rests_in_pause() const { return pause_ == Pause::kStands || pause_ == Pause::kOver; }
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
   Moving& moving_now() { return const_cast<Moving&>(*moving()); }
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   void follow_end_of_line(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
-  Result<void> is_amount(const words::Amount& amount) const;
-  // Steps within the soft limits; there are some.
-  struct Range {
-    std::int64_t low;
-    std::int64_t high;
-  };
-  Range allowed_steps() const;
-  std::string text_of(const Range& range) const;
-  Result<void> within_soft_limits(std::int64_t target) const;
   void take_limits(const bushd_report& report);
   void follow(const Report& report, std::vector<Event>& events);
   bool follow_armed(const Report& report, std::vector<Event>& events);
@@ -336,31 +263,19 @@ class Motor {
   void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();
   std::string did_not_start() const;
-  Result<std::int64_t> rounded_distance_from() const;
   void follow_asked_for();
 
   MotorSetup setup_;
   Axis axis_;
+  MotorTrust trust_;
+  MotorHold hold_;
   Activity activity_;
   std::vector<Leg> further_;                         // after the run that it makes
   enum class Pause { kNo, kRamps, kStands, kOver };  // kOver: stopped where it stood
   Pause pause_ = Pause::kNo;
   bool jogs_ = false;
-  std::optional<std::string> held_;
   std::optional<units::Steps> asked_for_;
   std::int64_t position_ = 0;
-  std::optional<std::uint16_t> boot_number_;
-  // Somebody has said where it stands, or its switch has. What an earlier daemon was told, and
-  // whether steps were lost since, this one does not know.
-  bool confirmed_ = false;
-  struct Lost {
-    std::int64_t heard_utime_us;
-    bool in_motion;
-  };
-  std::optional<Lost> lost_;  // its MCU is offline
-  std::optional<std::string> uncertain_reason_;
-  std::optional<std::string> restored_reason_;
-  bool restoring_ = false;
   bool autonomous_ = false;  // as reported last: its MCU moves it by itself
   bool moved_by_other_ =
       false;  // as reported last: it has moved and still does, without a plan here

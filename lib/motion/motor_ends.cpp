@@ -41,7 +41,7 @@ event::Ended Motor::end_at_limit() {
   std::string reason =
       "stopped by " + switch_at(moving()->limit) + ", stands at " + std::to_string(position_);
   if (setup_.limit_immediate && position_ != axis_.from_steps()) {
-    uncertain_reason_ = "it was stopped immediately at its limit switch and may have overrun";
+    trust_.lose_steps("it was stopped immediately at its limit switch and may have overrun");
     reason += "; stopped immediately, it may have overrun, so check the position, and run " +
               words::set_remedy(name());
   }
@@ -54,12 +54,12 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   const bool stepped = position_ != axis_.from_steps() && !rests_in_pause();
   const std::string mcu = "MCU " + setup_.mcu;
   if (moves() && moving()->position_mismatch) {
-    return ended(Outcome::kFault,
-                 *uncertain_reason_ + "; check the position, and run " + words::set_remedy(name()));
+    return ended(Outcome::kFault, *trust_.uncertain_reason() + "; check the position, and run " +
+                                      words::set_remedy(name()));
   }
   if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
     const std::string why = mcu + " disabled its drivers because " + stop_cause(report);
-    if (stepped) uncertain_reason_ = kUnpowered;
+    if (stepped) trust_.lose_steps(kUnpowered);
     return ended(Outcome::kFault,
                  stepped
                      ? why + "; check the position, and run " + words::set_remedy(name())
@@ -69,7 +69,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
     const std::string by = stopper(report, setup_.mcu);
     const bool overran = stops_immediately(report) && stepped;
-    if (overran) uncertain_reason_ = stopped_immediately(report, setup_.mcu);
+    if (overran) trust_.lose_steps(stopped_immediately(report, setup_.mcu));
     return ended(Outcome::kStopped,
                  overran ? "stopped immediately by " + by +
                                "; it may have overrun, so check the position, and run " +

@@ -1,41 +1,46 @@
-// What a motor's position is worth.
-#include <cstdlib>
+#include "motion/motor_trust.h"
+
 #include <string>
 #include <utility>
 
-#include "motion/motor.h"
-
 namespace bushd::motion {
 
-void Motor::position_is_known() {
+void MotorTrust::is_known() {
   confirmed_ = true;
   uncertain_reason_.reset();
   restored_reason_.reset();
 }
 
-void Motor::position_is_restored(std::string reason) {
+void MotorTrust::is_restored(std::string reason) {
   confirmed_ = true;
   uncertain_reason_.reset();
   restored_reason_ = std::move(reason);
 }
 
-void Motor::position_is_uncertain(std::string reason) {
+void MotorTrust::is_uncertain(std::string reason) {
   restored_reason_.reset();
   uncertain_reason_ = std::move(reason);
 }
 
-void Motor::position_is_unconfirmed() {
-  position_is_known();
+void MotorTrust::is_unconfirmed() {
+  is_known();
   confirmed_ = false;
 }
 
-PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
+void MotorTrust::goes_online(std::uint16_t boot_number) {
+  boot_number_ = boot_number;
+  lost_.reset();
+}
+
+PositionTrust MotorTrust::judged(std::optional<std::uint16_t> boot_number,
+                                 std::int64_t position_steps,
+                                 const units::Coordinates& coordinates) const {
   using words::Trust;
-  const std::string mcu = "MCU " + setup_.mcu;
+  const std::string mcu = "MCU " + mcu_;
   if (!boot_number_) return {Trust::kUnknown, mcu + " has not reported where it stands yet"};
   if (boot_number && *boot_number != *boot_number_) {
-    std::string at = std::to_string(position_);
-    if (setup_.coordinates.has_unit()) at += " (" + setup_.coordinates.text(position_) + ")";
+    std::string at = std::to_string(position_steps);
+    if (coordinates.has_unit()) at += " (" + coordinates.text(position_steps) + ")";
     return {Trust::kUnknown, mcu + " restarted; before, it was heard at " + at};
   }
   if (restoring_) return {Trust::kUnknown, "its position is being restored"};
@@ -51,15 +56,6 @@ PositionTrust Motor::trust(std::optional<std::uint16_t> boot_number) const {
   }
   if (restored_reason_) return {Trust::kRestored, *restored_reason_};
   return {Trust::kKnown, {}};
-}
-
-// MCUs count in 32 bits, and go on at the other end: no motor makes so many steps between two
-// reports. Nor may it stand beyond what can be set.
-void Motor::follow_count(std::int64_t before) {
-  if (std::abs(position_ - before) <= kMaxPosition && position_ >= -kMaxPosition) return;
-  uncertain_reason_ = "MCU " + setup_.mcu + " has moved it from " + std::to_string(before) +
-                      " beyond +-" + std::to_string(kMaxPosition) +
-                      " steps, where no more are counted";
 }
 
 }  // namespace bushd::motion

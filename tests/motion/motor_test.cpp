@@ -29,7 +29,7 @@ class MotorTest : public testing::Test {
   MotorTest() {
     mcu.motor_count = 16;
     motor.goes_online(mcu, true, false);
-    motor.position_is_known();
+    motor.trust().is_known();
   }
 
   // What the MCU says when its motors have done their plans up to `tick`.
@@ -58,8 +58,8 @@ class MotorTest : public testing::Test {
     return nullptr;
   }
   std::string refusal(std::int64_t target) const {
-    if (const auto used = motor.may_be_used(); !used) return used.error().text();
-    const auto may = motor.may_move_to(target);
+    if (const auto used = motor.reach().may_be_used(); !used) return used.error().text();
+    const auto may = motor.reach().may_move_to(target);
     return may ? "" : may.error().text();
   }
 
@@ -113,7 +113,7 @@ TEST_F(MotorTest, RunDownByAFaultThatAnotherMasterHasClearedIsNoMismatch) {
       {.of_mcu = mcu, .tick = kStart + 60, .requests_open = false, .emergency_stop_open = false});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLink);
-  EXPECT_EQ(motor.uncertain_reason(), std::nullopt);
+  EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
 }
 
 TEST_F(MotorTest, WhatAnotherMasterMovesIsNotAtRest) {
@@ -153,7 +153,7 @@ TEST_F(MotorTest, ACountThatDiffersStopsItAndMakesItsPositionUncertain) {
   EXPECT_EQ(find<event::Ended>(last)->outcome, Outcome::kFault);
   EXPECT_THAT(find<event::Ended>(last)->reason, HasSubstr("counted position 1"));
   EXPECT_THAT(refusal(10), HasSubstr("position is uncertain"));
-  motor.position_is_known();
+  motor.trust().is_known();
   EXPECT_EQ(refusal(10), "");
 }
 
@@ -164,7 +164,7 @@ TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
       {.of_mcu = mcu, .tick = kStart + 30, .requests_open = false, .emergency_stop_open = false});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLink);
-  EXPECT_EQ(motor.uncertain_reason(), std::nullopt);
+  EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
 }
 
 TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {
@@ -258,7 +258,7 @@ TEST_F(MotorTest, OneThatAnotherMasterMayMoveIsLeftToIt) {
       {.of_mcu = mcu, .tick = kStart + 40, .requests_open = false, .emergency_stop_open = false});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kFault);
-  EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("where the table leads to"));
+  EXPECT_THAT(*motor.trust().uncertain_reason(), HasSubstr("where the table leads to"));
 }
 
 TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
@@ -271,7 +271,8 @@ TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
       {.of_mcu = mcu, .tick = kStart + 22, .requests_open = false, .emergency_stop_open = true});
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
-  EXPECT_THAT(*motor.uncertain_reason(), HasSubstr("stopped immediately by an emergency stop"));
+  EXPECT_THAT(*motor.trust().uncertain_reason(),
+              HasSubstr("stopped immediately by an emergency stop"));
 }
 
 TEST_F(MotorTest, OneThatIsStoppedTwiceInAPauseStood) {
@@ -299,7 +300,7 @@ TEST_F(MotorTest, AnEmergencyStopLeavesAPausedMotorKnown) {
   const auto events = report(motor.axis().end_tick() + 10);
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
-  EXPECT_FALSE(motor.uncertain_reason());
+  EXPECT_FALSE(motor.trust().uncertain_reason());
 }
 
 TEST_F(MotorTest, ALimitSwitchThatEndsAPauseIsNoStopOnRequest) {
@@ -342,7 +343,7 @@ TEST_F(MotorTest, LocalInputsHaveItAsLongAsTheyMoveIt) {
   report(kStart + 10, 9);
   EXPECT_TRUE(motor.is<Resting>());
   EXPECT_EQ(motor.position_steps(), 9);
-  EXPECT_EQ(motor.uncertain_reason(), std::nullopt);
+  EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
 }
 
 TEST_F(MotorTest, LocalInputsThatCameFirstEndAMove) {
@@ -358,55 +359,55 @@ TEST_F(MotorTest, LocalInputsThatCameFirstEndAMove) {
 
 TEST_F(MotorTest, HasNoPositionBeforeItsMcuHasReported) {
   const Motor unheard(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
-  EXPECT_EQ(unheard.trust({}).trust, words::Trust::kUnknown);
-  EXPECT_THAT(unheard.trust({}).reason, HasSubstr("MCU hall:1 has not reported"));
-  EXPECT_EQ(motor.trust(0).trust, words::Trust::kKnown);
-  EXPECT_EQ(motor.trust(0).reason, "");
+  EXPECT_EQ(unheard.position_trust({}).trust, words::Trust::kUnknown);
+  EXPECT_THAT(unheard.position_trust({}).reason, HasSubstr("MCU hall:1 has not reported"));
+  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kKnown);
+  EXPECT_EQ(motor.position_trust(0).reason, "");
   report(kStart, 42);
-  EXPECT_EQ(motor.trust(1).trust, words::Trust::kUnknown) << "its MCU is in another boot";
-  EXPECT_THAT(motor.trust(1).reason, HasSubstr("heard at 42"));
-  motor.set_coordinates(units::Coordinates::make({"mm", {4, 1}, false, 0.5, 2}).value());
-  EXPECT_THAT(motor.trust(1).reason, HasSubstr("heard at 42 (11.00 mm)"));
+  EXPECT_EQ(motor.position_trust(1).trust, words::Trust::kUnknown) << "its MCU is in another boot";
+  EXPECT_THAT(motor.position_trust(1).reason, HasSubstr("heard at 42"));
+  motor.scale().set_coordinates(units::Coordinates::make({"mm", {4, 1}, false, 0.5, 2}).value());
+  EXPECT_THAT(motor.position_trust(1).reason, HasSubstr("heard at 42 (11.00 mm)"));
 }
 
 TEST_F(MotorTest, SaysHowItStandsToItsSoftLimits) {
-  EXPECT_TRUE(motor.stands_within_soft_limits());
+  EXPECT_TRUE(motor.reach().stands_within_soft_limits());
   report(kStart, 42);
-  motor.set_soft_limits(units::SoftLimits{0, 42});
-  EXPECT_TRUE(motor.stands_within_soft_limits());
-  motor.set_soft_limits(units::SoftLimits{43, 50});
-  EXPECT_THAT(motor.stands_within_soft_limits().error().message,
+  motor.scale().set_soft_limits(units::SoftLimits{0, 42});
+  EXPECT_TRUE(motor.reach().stands_within_soft_limits());
+  motor.scale().set_soft_limits(units::SoftLimits{43, 50});
+  EXPECT_THAT(motor.reach().stands_within_soft_limits().error().message,
               HasSubstr("it stands at 42 steps, beyond its soft limits of 43 steps to 50 steps"));
-  EXPECT_FALSE(motor.may_move_to(41));
-  EXPECT_TRUE(motor.may_move_to(45));
+  EXPECT_FALSE(motor.reach().may_move_to(41));
+  EXPECT_TRUE(motor.reach().may_move_to(45));
 }
 
 TEST_F(MotorTest, IsUncertainUntilSomebodySaysWhereItStandsButMayMove) {
   Motor found(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
   found.goes_online(mcu, true, false);
-  EXPECT_EQ(found.trust(0).trust, words::Trust::kUncertain);
-  EXPECT_THAT(found.trust(0).reason, HasSubstr("neither set nor homed"));
-  EXPECT_TRUE(found.may_move_to(5));
+  EXPECT_EQ(found.position_trust(0).trust, words::Trust::kUncertain);
+  EXPECT_THAT(found.position_trust(0).reason, HasSubstr("neither set nor homed"));
+  EXPECT_TRUE(found.reach().may_move_to(5));
   found.home();
   found.end_homing(true);
-  EXPECT_EQ(found.trust(0).trust, words::Trust::kKnown);
+  EXPECT_EQ(found.position_trust(0).trust, words::Trust::kKnown);
 }
 
 TEST_F(MotorTest, IsStaleWhileItsMcuIsOffline) {
   motor.goes_offline(4711);
-  EXPECT_EQ(motor.trust(0).trust, words::Trust::kStale);
-  EXPECT_EQ(motor.trust(0).heard_utime_us, 4711);
-  EXPECT_THAT(motor.trust(0).reason, HasSubstr("it rested"));
+  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kStale);
+  EXPECT_EQ(motor.position_trust(0).heard_utime_us, 4711);
+  EXPECT_THAT(motor.position_trust(0).reason, HasSubstr("it rested"));
   motor.goes_online(mcu, false, false);
   motor.start(kSteps, kStart);
   report(kStart + 20);
   motor.goes_offline(4712);
   motor.end(Outcome::kLink, "lost");
-  EXPECT_EQ(motor.trust(0).trust, words::Trust::kStale);
-  EXPECT_EQ(motor.trust(0).heard_utime_us, 4712);
-  EXPECT_THAT(motor.trust(0).reason, HasSubstr("may have run on"));
+  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kStale);
+  EXPECT_EQ(motor.position_trust(0).heard_utime_us, 4712);
+  EXPECT_THAT(motor.position_trust(0).reason, HasSubstr("may have run on"));
   motor.goes_online(mcu, false, false);
-  EXPECT_EQ(motor.trust(0).trust, words::Trust::kKnown);
+  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kKnown);
 }
 
 TEST_F(MotorTest, WhatPeopleMayMoveUnheardMayHaveRunOnFromRest) {
@@ -414,9 +415,9 @@ TEST_F(MotorTest, WhatPeopleMayMoveUnheardMayHaveRunOnFromRest) {
   local.local = true;
   Motor other(local, Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
   other.goes_online(mcu, true, false);
-  other.position_is_known();
+  other.trust().is_known();
   other.goes_offline(4711);
-  EXPECT_THAT(other.trust(0).reason, HasSubstr("may have run on"));
+  EXPECT_THAT(other.position_trust(0).reason, HasSubstr("may have run on"));
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST(HomingQueue, MotorsOfAnMcuAreHomedOneAfterTheOther) {
   const api::Completed result = bench.result(1);
   EXPECT_EQ(result.outcome, api::Outcome::kReached) << result.reason;
   EXPECT_TRUE(bench.homing.empty());
-  EXPECT_FALSE(bench.of("m02").uncertain_reason());
+  EXPECT_FALSE(bench.of("m02").trust().uncertain_reason());
 }
 
 // The next of a sequence begins when the one before has moved on: its MCU is asked once.

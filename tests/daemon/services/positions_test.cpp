@@ -49,11 +49,11 @@ TEST(Positions, SettingMakesThemKnown) {
   bench.line.reboot(0, 10'000'000);
   ASSERT_TRUE(bench.run_until([&] { return !bench.all_online(); }));
   ASSERT_TRUE(bench.run_until([&] { return bench.all_online(); }));
-  ASSERT_TRUE(bench.of("m01").uncertain_reason()) << "its MCU has booted anew";
+  ASSERT_TRUE(bench.of("m01").trust().uncertain_reason()) << "its MCU has booted anew";
   bench.set(1, {{"m01", 5}});
   EXPECT_EQ(bench.result(1).outcome, api::Outcome::kDone);
-  EXPECT_FALSE(bench.of("m01").uncertain_reason());
-  EXPECT_TRUE(bench.of("m02").uncertain_reason()) << "that one was not set";
+  EXPECT_FALSE(bench.of("m01").trust().uncertain_reason());
+  EXPECT_TRUE(bench.of("m02").trust().uncertain_reason()) << "that one was not set";
 }
 
 TEST(Positions, AreSetAtRestOnlyAndWithinTheirRange) {

@@ -30,7 +30,7 @@ TEST(Stops, RampDownTheMotorsThatAreNamed) {
   EXPECT_GT(bench.shaft_steps("m01"), 0);
   EXPECT_LT(bench.shaft_steps("m01"), 5000);
   EXPECT_EQ(bench.of("m01").position_steps(), bench.shaft_steps("m01"));
-  EXPECT_FALSE(bench.of("m01").uncertain_reason()) << "a ramp loses no step";
+  EXPECT_FALSE(bench.of("m01").trust().uncertain_reason()) << "a ramp loses no step";
   EXPECT_EQ(bench.result(2).outcome, api::Outcome::kReached) << "not named";
 }
 
