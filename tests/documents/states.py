@@ -18,13 +18,15 @@ END = "<!-- end of picture -->\n"
 START = "[*]"
 
 # Under `heading` are a table of the states and one of their transitions. The states are those of the enum, without the
-# prefix of its names. Each function below `folder` in which `changed_by` is found makes a transition.
+# prefix of its names, or the alternatives of the variant. Each function below `folder` in which `changed_by` is found makes a transition.
 Machine = namedtuple("Machine", "heading header enum prefix folder changed_by")
 MACHINES = [
     Machine("Owners of a motor", "firmware/core/owner.h", "bushd_mcu_motor_owner", "BUSHD_MCU_OWNER_", "firmware/core",
             r"bushd_mcu_give_(motor|to_queue)\(|mcu->trigger\.armed = |mcu->line\.motors = mcu"),
     Machine("States of an MCU", "lib/engine/message_base.h", "bushd_state", "BUSHD_STATE_", "firmware/core",
             r"mcu->faults [|&]= |mcu->flags [|&]?= .*BUSHD_FLAG_(ENABLED|SYNCED|CONFIGURED)\b"),
+    Machine("Activity of a motor", "lib/motion/motor.h", "Activity", "", "lib/motion", r"activity_ = "),
+    Machine("Phases of an MCU", "lib/bus/rs485/mcu_record.h", "McuPhase", "k", "lib/bus/rs485", r"view\.phase = "),
 ]
 Transition = namedtuple("Transition", "sources targets when function file")
 
@@ -35,8 +37,11 @@ def without_comments(text):
 
 def names_of(machine, source=SOURCE):
     text = without_comments((source / machine.header).read_text(encoding="utf-8"))
+    variant = re.search(rf"using {machine.enum} = std::variant<(.*?)>;", text, re.DOTALL)
+    if variant:
+        return [name.strip() for name in variant[1].split(",")]
     body = re.search(rf"enum(?: class)? {machine.enum}\b[^{{]*{{(.*?)}}", text, re.DOTALL)[1]
-    return [name.removeprefix(machine.prefix) for name in re.findall(r"^\s*(\w+)", body, re.MULTILINE)]
+    return [name.removeprefix(machine.prefix) for name in re.findall(r"(?:^|,)\s*(\w+)", body, re.MULTILINE)]
 
 
 def functions(path):
