@@ -1,6 +1,9 @@
 // One motor: where it stands and whether that is certain, what it does, and what it may do now.
 // Requests and reports of its MCU go in; what is to be done on the bus and to be told to clients
 // comes out. It has no I/O and knows no other motor.
+//
+// Its parts have a purpose each: scale() what its numbers mean, trust() what its position is worth,
+// hold() whether motions may begin, reach() where it may go.
 #pragma once
 
 #include <cstdint>
