@@ -8,6 +8,7 @@
 #include "engine/slots.h"
 #include "engine/tables.h"
 #include "motion/axis.h"
+#include "motion/first_interval.h"
 #include "motion/path_judge.h"
 
 namespace bushd::motion {
@@ -168,22 +169,11 @@ TEST(AxisOnAPath, FirstStepAfterAPauseIsNotLate) {
   on_path.path->plan(SIZE_MAX);
   start(on_path, std::make_shared<const PathTrack>(on_path.path, 390), 10);
   Axis& axis = on_path.axes[1];
-  std::vector<double> steps_ns;  // as an MCU makes them, evenly within a tick
-  std::int64_t told_256 = 0;
-  for (Tick tick = 8; steps_ns.size() < 2; ++tick) {
-    std::int16_t moved = 0;
-    axis.render(tick, 1, &moved, 1);
-    const std::int64_t next_256 = (told_256 / 256 + 1) * 256;
-    if (told_256 + moved >= next_256) {
-      const double part = static_cast<double>(next_256 - told_256) / moved;
-      steps_ns.push_back((static_cast<double>(tick) + part) * on_path.tick_ns);
-    }
-    told_256 += moved;
-    ASSERT_LT(tick, 100);
-  }
+  const auto interval_ns = test::first_interval_ns(axis);
+  ASSERT_TRUE(interval_ns);
   const auto& codes = on_path.tables[1]->view()->accel;
   // A tick's displacement is told to 1/256 step, of which each end may take that of the first code.
-  EXPECT_GE(steps_ns[1] - steps_ns[0], codes.code[1] * 40'000.0 - codes.code[0] * 40'000.0 / 128);
+  EXPECT_GE(*interval_ns, codes.code[1] * 40'000.0 - codes.code[0] * 40'000.0 / 128);
 }
 
 }  // namespace
