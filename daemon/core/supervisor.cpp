@@ -52,7 +52,7 @@ void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
           service->refuses(mcu_of(event), event.type, event.status);
         }
       },
-      [&](const link::StartMissed& event) { starts_late(mcu_of(event), Output{event.motor}); },
+      [&](const link::StartMissed& event) { misses_start(mcu_of(event), Output{event.motor}); },
       [&](const link::PositionUncertain& event) {
         is_uncertain(mcu_of(event), Output{event.motor});
       },
@@ -140,11 +140,9 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
   for (Service* service : services_) service->reports(now_us, mcu);
 }
 
-void Supervisor::starts_late(Mcu& mcu, Output output) {
+void Supervisor::misses_start(const Mcu& mcu, Output output) {
   const auto id = mcu.motor_at(output);
-  if (!id) return;
-  const auto ended = installation_[*id].starts_late(mcu.report());
-  if (ended) moves_.end(*id, *ended);
+  if (id && installation_[*id].misses_start(mcu.report())) moves_.misses_start(*id);
 }
 
 void Supervisor::is_uncertain(const Mcu& mcu, Output output) {

@@ -31,7 +31,7 @@ class Supervisor {
   void follow_position(MotorId motor, std::int64_t before_steps);
   void reports(std::int64_t now_us, Mcu& mcu);
   void set_up_again();
-  void starts_late(Mcu& mcu, Output output);
+  void misses_start(const Mcu& mcu, Output output);
   void is_uncertain(const Mcu& mcu, Output output);
   void replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs);
 

@@ -9,9 +9,6 @@
 namespace bushd::daemon {
 namespace {
 
-// From one slice to the next, with what is done in between; for the common start of all motors.
-constexpr std::int64_t kSliceUs = 2'000;
-
 link::McuRun run_begun(const Mcu& mcu, const motion::Axis& axis,
                        const motion::event::Started& started) {
   if (axis.line()) return mcu.line_run(axis);
@@ -103,87 +100,6 @@ Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api
   return target;
 }
 
-void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts) {
-  std::vector<MotorId> motors;
-  std::vector<MotorId> moving;
-  // All motors of a bus that are at rest start in the same tick: the earliest that suits every one
-  // of them.
-  std::map<BusId, motion::Tick> start;
-  std::size_t starting = 0;
-  for (const Part& part : parts) {
-    motors.push_back(part.motor);
-    if (installation_[part.motor].has_plan()) moving.push_back(part.motor);
-    if (!installation_[part.motor].stands()) continue;
-    ++starting;
-    const Mcu& mcu = installation_.mcu_of(part.motor);
-    const motion::Tick earliest = mcu.earliest_start(now_us, installation_[part.motor].output());
-    motion::Tick& common = start.try_emplace(mcu.config.bus, earliest).first->second;
-    common = std::max(common, earliest);
-  }
-  const std::size_t slices = starting / kBeginsPerSlice;
-  for (auto& [bus, tick] : start) {
-    tick += static_cast<motion::Tick>(slices) * kSliceUs / installation_[bus].config.tick_us;
-  }
-  asker.answer(api::Accepted{});
-  take_over(moving, asker);
-  open_.open(asker, motors, OpenMoves::Purpose::kMove);
-  for (const Part& part : parts) {
-    motion::Motor& motor = installation_[part.motor];
-    const auto& [target, shortest_delay] = part.legs.front();
-    if (!motor.stands()) {
-      motor.aim(target, shortest_delay);
-    } else {
-      motor.start(target, start[installation_.mcu_of(part.motor).config.bus], shortest_delay);
-      unbegun_.insert(part.motor);
-      to_begin_.push_back(part.motor);
-    }
-    motor.go_on({part.legs.begin() + 1, part.legs.end()});
-    motor.ask_for(part.target);
-    const auto fastest = std::ranges::min_element(part.legs, {}, &motion::Leg::shortest_delay);
-    open_.planned(part.motor, static_cast<int>(part.legs.size()),
-                  motor.axis().most_steps_per_s(fastest->shortest_delay));
-  }
-  if (unbegun_.size() <= kBeginsPerSlice) work();
-  retarget(now_us, moving);
-}
-
-void Moves::work() {
-  for (unsigned i = 0; i < kBeginsPerSlice && begins(); ++i) begin_next();
-}
-
-void Moves::begin_next() {
-  const MotorId next = to_begin_.front();
-  to_begin_.pop_front();
-  ++units_;
-  if (unbegun_.erase(next) != 0) begin(next);
-}
-
-void Moves::end_overtaken(std::int64_t) {
-  for (const MotorId id : std::set<MotorId>(unbegun_)) {
-    const auto by = open_.precedence().overtaken(open_.asker_of(id)->after_stops, {id});
-    if (!by) continue;
-    open_.stopped_by({id}, by->by);
-    cancel(id, "stopped before it began");
-  }
-}
-
-// Nobody has been told of it, nor does the log of moves know of it.
-void Moves::cancel(MotorId motor, const std::string& reason) {
-  unbegun_.insert(motor);
-  end(motor, *installation_[motor].end(api::Outcome::kStopped, reason));
-}
-
-// Whether runs may begin whose plans are made.
-bool Moves::may_begin(const std::vector<MotorId>& motors) {
-  for (const MotorId held_back : motors) {
-    const auto may = interlocks_.may_begin(held_back);
-    if (may) continue;
-    for (const MotorId id : motors) cancel(id, "not begun, because " + may.error().text());
-    return false;
-  }
-  return true;
-}
-
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
 void Moves::take_over(const std::vector<MotorId>& motors, const api::Asker& by) {
   for (const MotorId motor : motors) {
@@ -204,8 +120,7 @@ void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::i
   motor.go_on({});
   if (!motor.stands()) return redirect(now_us, id, target, shortest_delay);
   open_.planned(id, 1, motor.axis().most_steps_per_s(shortest_delay));
-  const Mcu& mcu = installation_.mcu_of(id);
-  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), shortest_delay);
+  start_run(now_us, id, {.target = target, .shortest_delay = shortest_delay});
 }
 
 void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target,
@@ -215,51 +130,14 @@ void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target,
   retarget(now_us, {id});
 }
 
-void Moves::start_run(MotorId id, std::int64_t target, motion::Tick start,
-                      bushd_delay shortest_delay) {
-  installation_[id].start(target, start, shortest_delay);
-  begin(id);
-}
-
 Result<std::int64_t> Moves::go_on(std::int64_t now_us, MotorId id, const api::Amount& position) {
   if (const auto may = interlocks_.may_move(); !may) return fail(may.error());
   const auto part = part_of(id, position, {.kind = api::Move::Kind::kAbsolute});
   if (!part) return fail(part.error());
-  const auto& [target, shortest_delay] = part->legs.front();
   installation_[id].go_on({part->legs.begin() + 1, part->legs.end()});
   installation_[id].ask_for(part->target);
-  const Mcu& mcu = installation_.mcu_of(id);
-  start_run(id, target, mcu.earliest_start(now_us, installation_[id].output()), shortest_delay);
+  start_run(now_us, id, part->legs.front());
   return part->legs.back().target;
-}
-
-void Moves::begin(MotorId id) {
-  if (!may_begin({id})) return;
-  motion::Motor& motor = installation_[id];
-  Mcu& mcu = installation_.mcu_of(id);
-  const motion::Tick start = motor.axis().start_tick();
-  const std::int64_t steps = motor.axis().target_steps() - motor.axis().from_steps();
-  // A jog will change, and of what is streamed only ticks that have not been run can be taken back.
-  const bool by_table = installation_.by_table(mcu, steps, motor.axis().shortest_delay()) &&
-                        !(mcu.offers.streams && motor.jogs());
-  journal_.started(id, steps, start, 0, by_table);
-  if (steps == 0) {
-    end(id, *motor.end(api::Outcome::kReached, "stands at its target already"));
-  } else if (by_table) {
-    mcu.offers.table_runs->begin_table_run(
-        mcu.on_bus(), motor.output().value, start,
-        {static_cast<std::int32_t>(steps), motor.axis().shortest_delay()});
-  } else {
-    mcu.bus().begin(mcu.on_bus(), motor.output().value, start);
-  }
-  installation_.changed = true;
-}
-
-void Moves::start_leg(std::int64_t now_us, MotorId id) {
-  const motion::Leg leg = installation_[id].take_leg();
-  const Mcu& mcu = installation_.mcu_of(id);
-  start_run(id, leg.target, mcu.earliest_start(now_us, installation_[id].output()),
-            leg.shortest_delay);
 }
 
 void Moves::begin_on_line(const std::vector<MotorId>& motors,
@@ -296,6 +174,8 @@ void Moves::pause(std::int64_t now_us, const std::vector<MotorId>& motors) {
   while (begins()) begin_next();
   std::vector<MotorId> changed;
   for (const MotorId id : motors) {
+    // It is begun, as those above, and stopped before it moves.
+    if (installation_[id].is_late()) start_leg(now_us, id);
     installation_[id].pause();
     if (installation_[id].needs_change()) changed.push_back(id);
   }
@@ -366,6 +246,7 @@ void Moves::retarget(std::int64_t now_us, const std::vector<MotorId>& motors) {
 }
 
 void Moves::step(std::int64_t now_us) {
+  start_anew(now_us);
   std::vector<MotorId> now;
   std::erase_if(to_retarget_, [&](MotorId id) {
     const bool needed = installation_[id].needs_change();
@@ -412,6 +293,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
                                                  : "; it is left to the other master on the bus, "
                                                    "only an emergency stop reaches it"));
             },
+            [&](const motion::event::MissedStart&) { misses_start(id); },
             [&](const motion::event::Turn&) {
               journal_.ended(id, "turned");
               start_leg(now_us, id);
@@ -429,11 +311,13 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [&](const motion::event::Ended& ended) { end(id, ended); }},
         event);
   }
+  follow_start(id);
 }
 
 void Moves::end(MotorId id, const motion::event::Ended& ended) {
   const motion::Motor& motor = installation_[id];
   const bool begun = unbegun_.erase(id) == 0;
+  begun ? hear_of_start(id) : starts_.leaves(id);
   Mcu& mcu = installation_.mcu_of(id);
   if (begun) mcu.bus().drop(mcu.on_bus(), motor.output().value);
   if (ended.was_armed) {

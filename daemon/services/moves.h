@@ -13,6 +13,7 @@
 #include "daemon/model/interlocks.h"
 #include "daemon/model/outputs.h"
 #include "daemon/model/service.h"
+#include "daemon/services/common_starts.h"
 #include "daemon/services/dry_run.h"
 #include "daemon/services/journal.h"
 #include "daemon/services/open_moves.h"
@@ -32,7 +33,8 @@ class Moves final : public Service {
         journal_(journal),
         open_(open_moves),
         dry_runs_(dry_runs),
-        outputs_(outputs) {}
+        outputs_(outputs),
+        starts_(installation.motors().size()) {}
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Move& move);
 
@@ -76,6 +78,9 @@ class Moves final : public Service {
   void plan_again(std::int64_t now_us, const std::vector<MotorId>& motors);
   // Does what follows from a report of a motor.
   void take(std::int64_t now_us, MotorId motor, const std::vector<motion::Event>& events);
+  // Its MCU had not got the first ticks in time, so it has not moved. If no motor that was to begin
+  // with it has, all of them begin anew; else it ends.
+  void misses_start(MotorId motor);
   void end(MotorId motor, const motion::event::Ended& ended);
 
   // Whether motors of an accepted move are still to begin. Until then requests should wait, but
@@ -120,9 +125,23 @@ class Moves final : public Service {
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
   Result<Part> part_of(MotorId motor, const api::Amount& amount, const api::Move& move) const;
   void start_leg(std::int64_t now_us, MotorId motor);
+  // The tick of each bus at which these motors, at rest there, can begin their first legs together.
+  struct FirstLeg {
+    MotorId motor;
+    motion::Leg leg;
+  };
+  std::map<BusId, motion::Tick> starts_of(std::int64_t now_us,
+                                          const std::vector<FirstLeg>& legs) const;
+  motion::Tick start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs) const;
+  // Whether its MCU is given the run as a whole.
+  bool by_table(MotorId motor, std::int64_t steps, bushd_delay shortest_delay) const;
+  // Whether a motor has begun, as its MCU reports.
+  void follow_start(MotorId motor);
+  // It has, or was stopped before.
+  void hear_of_start(MotorId motor);
+  void start_anew(std::int64_t now_us);
   // From rest; the motor is part of an open move.
-  void start_run(MotorId motor, std::int64_t target, motion::Tick start,
-                 bushd_delay shortest_delay);
+  void start_run(std::int64_t now_us, MotorId motor, const motion::Leg& leg);
   // Its plan is made: it is logged, and its MCU gets it. One that may not begin now ends.
   void begin(MotorId motor);
   bool may_begin(const std::vector<MotorId>& motors);
@@ -140,8 +159,9 @@ class Moves final : public Service {
   DryRuns& dry_runs_;
   Outputs& outputs_;
   std::set<MotorId> to_retarget_;  // waiting for the line
-  std::set<MotorId> unbegun_;      // planned, and nobody has been told yet
-  std::deque<MotorId> to_begin_;   // these, in their order, and some that were cancelled
+  CommonStarts starts_;
+  std::set<MotorId> unbegun_;     // planned or late, and nobody has been told yet
+  std::deque<MotorId> to_begin_;  // these, in their order, and some that were cancelled
   std::uint64_t units_ = 0;
 };
 

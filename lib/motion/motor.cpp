@@ -228,6 +228,7 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
   // It has not told of the emergency stop yet, with which its plan was given up.
   if (report.emergency_stop_open) return;
   Moving& now = moving_now();
+  if (now.late) return;
   if (now.faults != 0) {
     // Another master has cleared them as soon as the motor stood.
     bushd_report before = report.of_mcu;
@@ -249,7 +250,7 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
   if (!now.position_mismatch && position_ != planned) {
     if (!moving && position_ == axis_.from_steps()) {
       // A motor at rest looks the same whether its start came and is over or never came.
-      events.emplace_back(ended(Outcome::kLink, did_not_start()));
+      events.emplace_back(event::MissedStart{});
       return;
     }
     now.position_mismatch = true;

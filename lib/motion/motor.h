@@ -52,6 +52,7 @@ struct Moving {
   int limit = 0;                   // +1, -1: its limit switch at this end stops it
   std::uint8_t faults = 0;         // with which its MCU runs it down
   bool by_others = false;  // is stopped since others on its way have ended: nobody has asked for it
+  bool late = false;       // has missed its start: it stands until it is started again, or ends
 };
 struct Homing {};  // by its MCU, or it waits for its turn
 // Moves on a line with others. Whoever leads the line begins its runs, all at the same ticks.
@@ -101,10 +102,11 @@ struct Drop {};    // its MCU takes no more ticks for this motion
 struct Mismatch {
   bool stopped = true;  // by its plan; else it is left to another master
 };
-struct Turn {};        // it stands on the way to a target that takes a second run
-struct NextLeg {};     // it stands where a leg has led, and another one follows
-struct Paused {};      // it stands where it was to pause
-struct StandsOnLine {  // and its motion goes on when all motors of the line stand
+struct MissedStart {};  // its MCU had not got its first ticks in time; it did not move
+struct Turn {};         // it stands on the way to a target that takes a second run
+struct NextLeg {};      // it stands where a leg has led, and another one follows
+struct Paused {};       // it stands where it was to pause
+struct StandsOnLine {   // and its motion goes on when all motors of the line stand
   bool at_target;
 };
 struct Ended {
@@ -116,8 +118,8 @@ struct Ended {
 };
 }  // namespace event
 using Event = std::variant<event::Waits, event::Started, event::Executed, event::Replan,
-                           event::Drop, event::Mismatch, event::Turn, event::NextLeg, event::Paused,
-                           event::StandsOnLine, event::Ended>;
+                           event::Drop, event::Mismatch, event::MissedStart, event::Turn,
+                           event::NextLeg, event::Paused, event::StandsOnLine, event::Ended>;
 
 class Motor {
  public:
@@ -168,7 +170,9 @@ class Motor {
   std::int64_t target_steps() const;
   // Where it was told to go last, while it is there or bound for it.
   const std::optional<units::Steps>& asked_for() const { return asked_for_; }
-  double velocity_steps_per_s() const { return moves() ? axis_.velocity_steps_per_s() : 0.0; }
+  double velocity_steps_per_s() const {
+    return moves() && !is_late() ? axis_.velocity_steps_per_s() : 0.0;
+  }
 
   // The plan; only while has_plan().
   Axis& axis() { return axis_; }
@@ -193,7 +197,7 @@ class Motor {
   // Replaces what comes after the present run.
   void go_on(std::vector<Leg> legs) { further_ = std::move(legs); }
   // Removes and returns the leg that is to be made from where it stands: the rest of the one that
-  // it makes, or the next one.
+  // it makes, also if it has missed its start, or the next one.
   Leg take_leg();
   // Ramps down a moving motor; its motion stays open.
   void pause();
@@ -202,7 +206,7 @@ class Motor {
   bool is_paused() const { return pause_ == Pause::kRamps || stands_paused(); }
   bool stands_paused() const { return pause_ == Pause::kStands; }
   // start() is for it, not aim().
-  bool stands() const { return !has_plan() || rests_in_pause(); }
+  bool stands() const { return !has_plan() || rests_in_pause() || is_late(); }
   // Its motion goes on until somebody ends it: where its runs lead nobody has asked for.
   void jogs(bool now) {
     jogs_ = now;
@@ -237,8 +241,13 @@ class Motor {
   // `heard_utime_us`: when its MCU reported last. To be told while its motion has not been ended.
   void goes_offline(std::int64_t heard_utime_us);
   std::vector<Event> report(const Report& report);
-  // The MCU did not get the first ticks in time.
-  std::optional<event::Ended> starts_late(const bushd_report& report);
+  // Its MCU did not get the first ticks in time. Whether it has missed its start by that: else the
+  // next report says what has become of it.
+  bool misses_start(const bushd_report& report) const;
+  // It has missed its start. Whether it may have a new one: then it is late from now on.
+  bool awaits_new_start();
+  bool is_late() const { return moves() && moving()->late; }
+  std::string did_not_start() const;
   // Its motion is over, if there is one.
   std::optional<event::Ended> end(Outcome outcome, std::string reason);
 
@@ -265,7 +274,6 @@ class Motor {
   void follow_count(std::int64_t before);
   void follow_autonomous(const bushd_report& report, bool moved_without_plan);
   void rest();
-  std::string did_not_start() const;
   void follow_asked_for();
 
   MotorSetup setup_;

@@ -82,14 +82,19 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   return ended(Outcome::kLink, mcu + " ran it down by itself because " + stop_cause(report));
 }
 
-std::optional<event::Ended> Motor::starts_late(const bushd_report& report) {
-  const bool ran_down = report.faults != 0;  // says the next report
+bool Motor::misses_start(const bushd_report& report) const {
+  const bool ran_down = report.faults != 0;
   // No tick is missed of a move that was cancelled before its start.
   const bool cancelled = axis_.end_tick() <= axis_.start_tick();
-  take_limits(report);
-  const bool limited = forbidden_up_ || forbidden_down_;  // says the next report
-  if (ran_down || cancelled || limited) return std::nullopt;
-  return end(Outcome::kLink, did_not_start());
+  const bool limited =
+      has_bit(report.forbidden_positive | report.forbidden_negative, output().value);
+  return has_plan() && !ran_down && !cancelled && !limited;
+}
+
+bool Motor::awaits_new_start() {
+  if (!is<Moving>() || follows()) return false;
+  moving_now().late = true;
+  return true;
 }
 
 std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {

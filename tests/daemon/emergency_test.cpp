@@ -80,7 +80,7 @@ TEST_P(Emergency, AllMotorsStopAndStayUntilCleared) {
 TEST_P(Emergency, BeforeTheStartNoStepIsMade) {
   lab.connect();
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {500});
-  lab.run_for(0.02);
+  lab.run_for(0.002);
   EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
   EXPECT_EQ(lab.wait(move).result, "stopped");
   lab.run_for(1);

@@ -31,7 +31,9 @@ bool Witness::End::agrees(const api::MotorResult& result) const {
       paused && (result.outcome == api::Outcome::kLink || result.outcome == api::Outcome::kFault);
   // It may be stopped where it stands on its way, on a line or before another leg.
   const bool on_way = (word == "turned" || legs_follow) && result.outcome == api::Outcome::kStopped;
-  return (of_mcu || on_way || word == api::word(result.outcome)) &&
+  // It has missed its start, and may end before another one.
+  const bool not_begun = word == "late" && result.outcome != api::Outcome::kReached;
+  return (of_mcu || on_way || not_begun || word == api::word(result.outcome)) &&
          (moves_on || position_steps == result.position_steps);
 }
 
@@ -358,6 +360,7 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
     violated(now_ns, motor.name + " has come to rest beyond its limits");
   }
   const bool exact = asked.request.ask != Ask::kArm;
+  const bool late = end.word == "late";
   const bool planned =
       end.word == "reached" || end.word == "turned" || (end.word == "stopped" && exact);
   const auto& from = asked.from[index];
@@ -366,11 +369,11 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
   if (planned && !asked.told[index] && from && end.stands != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
   }
-  asked.told[index] = true;
+  if (!late) asked.told[index] = true;
   if (end.word == "reached") check_speed(now_ns, motor, asked, index);
   const bool last = leg + 1 >= legs.size();
   const bool unknown = legs.empty() && units_.backlash_steps(index_of(motor)) != 0;
-  motor.goes_on = end.word == "turned" || (end.word == "reached" && (!last || unknown));
+  motor.goes_on = end.word == "turned" || late || (end.word == "reached" && (!last || unknown));
   end.legs_follow = end.word == "reached" && motor.goes_on;
   if (end.word == "reached" && last && !unknown) {
     check_approach(now_ns, motor, asked, index);
@@ -396,8 +399,8 @@ void Witness::check_end(TimeNs now_ns, const Motor& motor, const Asked& asked, c
                         std::optional<std::int64_t> target) {
   const std::int64_t stands = end.stands;
   const bool limited = end.word == "limit";
-  const bool planned =
-      end.word == "reached" || end.word == "stopped" || end.word == "turned" || limited;
+  const bool planned = end.word == "reached" || end.word == "stopped" || end.word == "turned" ||
+                       end.word == "late" || limited;
   if (limited && (!motor.pressed_ns || now_ns - *motor.pressed_ns > kBarredNs)) {
     violated(now_ns, motor.name + " ended at its limit, and nobody has pressed its switch");
   } else if (end.word == "fault" && second_ns_ < asked.since_ns) {

@@ -39,7 +39,7 @@ from check_trace.problems import InputError
 Step = namedtuple("Step", "move number time_ns emitted_ns early_ns tick nth direction place bound_ns")
 INTERIOR, FIRST_TICK, LAST_TICK = range(3)
 
-ENDINGS = "reached", "stopped", "turned"  # results of which the plan tells where they leave the motor
+ENDINGS = "reached", "stopped", "turned", "late"  # results of which the plan tells where they leave the motor
 
 # A ramp-down waits no longer for a step (docs/tables.md).
 MOST_WAIT_NS = 500_000_000

@@ -207,6 +207,8 @@ class MoveLog:
             motor = self.motors[event["motor"]]
             self._problems.add(motor, "result", f"move {move.id} has more than one result")
         move.result = event["result"]
+        if move.result == "late":
+            move.change(move.start_tick)  # its first ticks never came: it makes no step
         move.result_steps = event["position_steps"]
         self._at_steps[event["motor"]] = event["position_steps"]
 

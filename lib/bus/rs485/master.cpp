@@ -112,6 +112,7 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   synchroniser_.lines_run(streams_.runs_line());
   transactions_.expire(now_us);
   streams_.fail_late_replacements(now_us);
+  streams_.fail_late_starts(now_us);
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
   if (transactions_.open() && now_us >= transactions_.quiet_us()) emergency_.send_due(now_us);
   while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
@@ -170,6 +171,10 @@ std::int64_t Rs485Master::wake_us(McuIndex mcu) const {
 }
 
 std::vector<Event> Rs485Master::take_events() {
+  if (std::ranges::any_of(
+          events_, [](const Event& event) { return std::holds_alternative<StartMissed>(event); })) {
+    start_margin_.missed(stepped_us_);
+  }
   return std::exchange(events_, {});
 }
 
@@ -197,6 +202,20 @@ bool Rs485Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const 
 
 void Rs485Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
+}
+
+Tick Rs485Master::earliest_table_runs(std::int64_t now_us, McuIndex mcu,
+                                      std::uint16_t motors) const {
+  Tick earliest = 0;
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((motors >> m & 1) != 0) earliest = std::max(earliest, streams_.next_tick(mcu, m));
+  }
+  // Until that is confirmed no start goes out.
+  if (streams_.replacement_open(mcu)) return std::max(earliest, horizon_.earliest_start(now_us));
+  const std::int64_t free_us = transactions_.open() ? transactions_.quiet_us() : now_us;
+  return std::max(earliest,
+                  horizon_.earliest_table_run(streams_.carried_us(now_us, free_us, motors),
+                                              start_margin_.at(now_us)));
 }
 
 void Rs485Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {

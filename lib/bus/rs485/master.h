@@ -32,6 +32,7 @@
 #include "bus/rs485/mcu_record.h"
 #include "bus/rs485/poller.h"
 #include "bus/rs485/rehearsal.h"
+#include "bus/rs485/start_margin.h"
 #include "bus/rs485/stream_scheduler.h"
 #include "bus/rs485/synchroniser.h"
 #include "bus/rs485/table_run.h"
@@ -116,6 +117,7 @@ class Rs485Master final : public BusMaster,
   void home(McuIndex mcu, const bushd_home& message) override {
     connector_.queue(mcu).home(message);
   }
+  Tick earliest_table_runs(std::int64_t now_us, McuIndex mcu, std::uint16_t motors) const override;
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
   bool can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                     bool alone) const override;
@@ -180,6 +182,7 @@ class Rs485Master final : public BusMaster,
   Poller poller_;
   EmergencyStop emergency_;
   Horizon horizon_;
+  StartMargin start_margin_;
 };
 
 }  // namespace bushd::link

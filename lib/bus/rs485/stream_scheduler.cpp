@@ -35,6 +35,7 @@ void StreamScheduler::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   Stream& stream = mcus_[mcu].stream[motor];
   stream = {};
   stream.active = true;
+  mcus_[mcu].starting |= bit(motor);
   stream.start = stream.from = stream.from_before = stream.next = stream.sent = start;
 }
 
@@ -155,6 +156,14 @@ std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, const Mcu& mcu,
   return std::max(now_us, writer_.free_us()) + frame_us(mask, ticks_of_replacement(mcu, mask));
 }
 
+std::int64_t StreamScheduler::carried_us(std::int64_t now_us, std::int64_t free_us,
+                                         std::uint16_t motors) const {
+  const auto entries = static_cast<std::size_t>(std::popcount(motors));
+  const std::size_t payload = BUSHD_TABLE_RUN_HEADER + entries * BUSHD_TABLE_RUN_MAX_ENTRY;
+  return std::max({now_us, free_us, writer_.free_us()}) +
+         writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
+}
+
 std::int64_t StreamScheduler::round_us() const {
   std::int64_t us = 0;
   for (const Mcu& mcu : mcus_) {
@@ -219,6 +228,20 @@ void StreamScheduler::fail_late_replacements(std::int64_t now_us) {
   }
 }
 
+void StreamScheduler::fail_late_starts(std::int64_t now_us) {
+  if (!clock_.valid()) return;
+  const Tick arrival = clock_.tick_at(std::max(now_us, writer_.free_us()) + frame_us(bit(0), 1));
+  for (const McuIndex i : mcus_.indices()) {
+    Mcu& mcu = mcus_[i];
+    for (std::uint8_t m = 0; mcu.starting >> m != 0; ++m) {
+      if ((mcu.starting >> m & 1) == 0) continue;
+      const Stream& stream = mcu.stream[m];
+      if (!stream.active || !stream.starts()) mcu.starting &= static_cast<std::uint16_t>(~bit(m));
+      if (mcu.sendable(m) && stream.starts() && too_late(stream.start, arrival)) miss_start(i, m);
+    }
+  }
+}
+
 void StreamScheduler::follow_report(McuIndex mcu) {
   follow_replacements(mcu);
   follow_streams(mcu);
@@ -243,6 +266,7 @@ void StreamScheduler::follow_replacements(McuIndex index) {
     Stream& stream = mcu.stream[m];
     stream.from = stream.from_before;
     stream.next = stream.sent = std::max(view.known_until[m], stream.from);
+    mcu.starting |= bit(m);
     stream.unsure = stream.begun();
     stream.beyond_gap.reset();
     stream.finished = false;
@@ -275,12 +299,19 @@ void StreamScheduler::follow_streams(McuIndex index) {
     // past its start.
     if (stream.begun() ? known >= needed : moving || known <= stream.start) continue;
     if (!moving && known > stream.start) {
-      stream.active = false;
-      events_.push_back(StartMissed{.mcu = index, .motor = m});
+      miss_start(index, m);
       continue;
     }
     go_back(index, m);
   }
+}
+
+// One that was cancelled before it misses none.
+void StreamScheduler::miss_start(McuIndex index, std::uint8_t motor) {
+  Stream& stream = mcus_[index].stream[motor];
+  stream.active = false;
+  if (source_.end_tick(index, motor) <= stream.start) return;
+  events_.push_back(StartMissed{.mcu = index, .motor = motor});
 }
 
 // To the first tick that the MCU does not have.
@@ -289,6 +320,7 @@ void StreamScheduler::go_back(McuIndex index, std::uint8_t motor) {
   const McuView& view = records_[index].view;
   const bushd_report& report = view.report;
   stream.next = std::max(view.known_until[motor], stream.from);
+  mcus_[index].starting |= bit(motor);
   stream.beyond_gap.reset();
   stream.finished = false;
   Tick missing = stream.run ? 0 : stream.sent - stream.next;

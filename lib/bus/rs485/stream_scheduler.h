@@ -66,7 +66,12 @@ class StreamScheduler {
   // it does between two steps, a motor whose replacement failed has no ticks that could be sent:
   // none of it are, in this step.
   void fail_late_replacements(std::int64_t now_us);
+  // To be called as that. A start that would come too late, sent now, is not sent.
+  void fail_late_starts(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
+  // When the line will have carried the frame that begins table runs of these motors of an MCU, if
+  // it is free from `free_us` on.
+  std::int64_t carried_us(std::int64_t now_us, std::int64_t free_us, std::uint16_t motors) const;
   // When the line will have carried these replacements, one for each MCU, if they are asked for
   // now.
   struct LineUse {
@@ -141,6 +146,7 @@ class StreamScheduler {
     Tick replace_at = 0;
     std::uint16_t replaced = 0;    // motors of a replacement sent and not yet confirmed
     std::uint16_t unplanned = 0;   // motors whose replacement has failed in this step
+    std::uint16_t starting = 0;    // motors whose start may be still to be sent
     std::int64_t replaced_us = 0;  // when that was
     unsigned failures = 0;         // of replacements, in a row
 
@@ -173,6 +179,7 @@ class StreamScheduler {
   void follow_replacements(McuIndex mcu);
   void follow_streams(McuIndex mcu);
   void go_back(McuIndex mcu, std::uint8_t motor);
+  void miss_start(McuIndex mcu, std::uint8_t motor);
 
   // stream_frames.cpp
   void finish_ended(McuIndex mcu);
