@@ -65,24 +65,26 @@ std::map<BusId, motion::Tick> Moves::starts_of(std::int64_t now_us,
   return start;
 }
 
-// What one frame tells is begun by all of its motors or by none. Of several MCUs some may get
-// theirs, so there is time to repair that.
+// Of several MCUs some may get their first frames and others not: there is time to repair that.
 motion::Tick Moves::start_of(std::int64_t now_us, BusId bus,
                              const std::vector<FirstLeg>& legs) const {
   const Mcu& first = installation_.mcu_of(legs.front().motor);
   std::uint16_t outputs = 0;
-  bool one_frame = true;
+  bool one_mcu = true;
+  bool all_by_table = true;
   motion::Tick common = 0;
   for (const auto& [id, leg] : legs) {
     const Mcu& mcu = installation_.mcu_of(id);
     const motion::Motor& motor = installation_[id];
+    const std::int64_t steps = leg.target - motor.position_steps();
     outputs |= static_cast<std::uint16_t>(1u << motor.output().value);
-    one_frame = one_frame && &mcu == &first &&
-                by_table(id, leg.target - motor.position_steps(), leg.shortest_delay);
+    one_mcu = one_mcu && &mcu == &first;
+    all_by_table = all_by_table && by_table(id, steps, leg.shortest_delay);
     common = std::max(common, mcu.earliest_start(now_us, motor.output()));
   }
-  if (!one_frame) return common;
-  return installation_[bus].offers.table_runs->earliest_table_runs(now_us, first.on_bus(), outputs);
+  if (!one_mcu) return common;
+  return installation_[bus].master.earliest_common_start(now_us, first.on_bus(), outputs,
+                                                         all_by_table);
 }
 
 // A jog will change, and of what is streamed only ticks that have not been run can be taken back.

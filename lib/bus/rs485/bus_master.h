@@ -66,6 +66,17 @@ class BusMaster {
 
   // Earliest tick at which a move of this motor can start.
   virtual Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const = 0;
+  // The same for motors (a mask) of one MCU that begin together. Where one frame is enough to begin
+  // all of them, it is sooner: that frame comes just in time, and if it is late or lost, none of
+  // them begins, and StartMissed says so. `by_table`: all by TableRuns::begin_table_run.
+  virtual Tick earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
+                                     bool /*by_table*/) const {
+    Tick earliest = 0;
+    for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      if ((motors >> m & 1) != 0) earliest = std::max(earliest, earliest_start(now_us, mcu, m));
+    }
+    return earliest;
+  }
   // Earliest tick from which replacements can take effect that are asked for together, one for each
   // MCU, in the order of MCUs: a stop of many motors takes the line longer than that of one.
   virtual Tick earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const = 0;
@@ -74,7 +85,7 @@ class BusMaster {
   virtual Tick earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
                                  Tick start) const = 0;
   // From `start` on, until dropped, the source has ticks for this motor. Preconditions: the MCU is
-  // online, the motor has a table, start >= earliest_start.
+  // online, the motor has a table, start >= earliest_start, or earliest_common_start.
   virtual void begin(McuIndex mcu, std::uint8_t motor, Tick start) = 0;
   // The source's answer for these motors has changed from `first` on.
   virtual void replace(McuIndex mcu, std::uint16_t motors, Tick first) = 0;

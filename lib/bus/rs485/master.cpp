@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdlib>
 #include <utility>
 
@@ -182,6 +183,25 @@ Tick Rs485Master::earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t
   return std::max(horizon_.earliest_start(now_us), streams_.next_tick(mcu, motor));
 }
 
+// One frame tells all of table runs, and of one stream as much as the MCU can hold, if it takes
+// states of runs. Until a replacement is confirmed no start goes out.
+Tick Rs485Master::earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
+                                        bool by_table) const {
+  const bool alone = std::has_single_bit(motors);
+  const bool tells_runs = setup_.table_ticks && can(mcu, BUSHD_CAN_TABLE_TICKS);
+  const bool in_one_frame = by_table || (alone && tells_runs);
+  if (!in_one_frame || streams_.replacement_open(mcu)) {
+    return BusMaster::earliest_common_start(now_us, mcu, motors, by_table);
+  }
+  const std::int64_t free_us = transactions_.open() ? transactions_.quiet_us() : now_us;
+  Tick earliest = horizon_.earliest_at_once(
+      streams_.first_carried_us(now_us, free_us, motors, by_table), start_margin_.at(now_us));
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((motors >> m & 1) != 0) earliest = std::max(earliest, streams_.next_tick(mcu, m));
+  }
+  return earliest;
+}
+
 Tick Rs485Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {
   const StreamScheduler::LineUse use = {
       .free_us = transactions_.open() ? transactions_.quiet_us() : now_us,
@@ -202,20 +222,6 @@ bool Rs485Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const 
 
 void Rs485Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
-}
-
-Tick Rs485Master::earliest_table_runs(std::int64_t now_us, McuIndex mcu,
-                                      std::uint16_t motors) const {
-  Tick earliest = 0;
-  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((motors >> m & 1) != 0) earliest = std::max(earliest, streams_.next_tick(mcu, m));
-  }
-  // Until that is confirmed no start goes out.
-  if (streams_.replacement_open(mcu)) return std::max(earliest, horizon_.earliest_start(now_us));
-  const std::int64_t free_us = transactions_.open() ? transactions_.quiet_us() : now_us;
-  return std::max(earliest,
-                  horizon_.earliest_table_run(streams_.carried_us(now_us, free_us, motors),
-                                              start_margin_.at(now_us)));
 }
 
 void Rs485Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {

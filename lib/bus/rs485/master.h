@@ -93,6 +93,8 @@ class Rs485Master final : public BusMaster,
 
   // All first frames of the move still arrive well before.
   Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const override;
+  Tick earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
+                             bool by_table) const override;
   Tick earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const override;
   Tick earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
                          Tick start) const override;
@@ -117,7 +119,6 @@ class Rs485Master final : public BusMaster,
   void home(McuIndex mcu, const bushd_home& message) override {
     connector_.queue(mcu).home(message);
   }
-  Tick earliest_table_runs(std::int64_t now_us, McuIndex mcu, std::uint16_t motors) const override;
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
   bool can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                     bool alone) const override;

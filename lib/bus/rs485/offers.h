@@ -58,11 +58,6 @@ class Homing {
 class TableRuns {
  public:
   virtual ~TableRuns() = default;
-  // The earliest tick at which table runs of these motors (a mask) of an MCU can begin together.
-  // All that they need goes out at once and comes just in time; where it does not, none of them
-  // begins, and StartMissed says so. BusMaster::earliest_start leaves time to repair it.
-  virtual Tick earliest_table_runs(std::int64_t now_us, McuIndex mcu,
-                                   std::uint16_t motors) const = 0;
   // Instead of begin() the MCU gets the whole move at once and runs it by the motor's table. `run`
   // is the source's from `start` on.
   virtual void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) = 0;

@@ -1,6 +1,6 @@
-// How much time the frame that begins table runs gets beyond what the line takes for it: what this
-// program and the port's driver may take. It follows what is seen. Each start that was missed asks
-// for four times as much; half of that is forgotten every ten seconds.
+// How much time a frame that is enough to begin motions gets beyond what the line takes for it:
+// what this program and the port's driver may take. It follows what is seen. Each start that was
+// missed asks for four times as much; half of that is forgotten every ten seconds.
 #pragma once
 
 #include <algorithm>

@@ -156,10 +156,12 @@ std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, const Mcu& mcu,
   return std::max(now_us, writer_.free_us()) + frame_us(mask, ticks_of_replacement(mcu, mask));
 }
 
-std::int64_t StreamScheduler::carried_us(std::int64_t now_us, std::int64_t free_us,
-                                         std::uint16_t motors) const {
+std::int64_t StreamScheduler::first_carried_us(std::int64_t now_us, std::int64_t free_us,
+                                               std::uint16_t motors, bool by_table) const {
   const auto entries = static_cast<std::size_t>(std::popcount(motors));
-  const std::size_t payload = BUSHD_TABLE_RUN_HEADER + entries * BUSHD_TABLE_RUN_MAX_ENTRY;
+  const std::size_t payload =
+      by_table ? BUSHD_TABLE_RUN_HEADER + entries * BUSHD_TABLE_RUN_MAX_ENTRY
+               : BUSHD_TABLE_TICKS_HEADER + entries * BUSHD_TABLE_TICKS_MAX_ENTRY;
   return std::max({now_us, free_us, writer_.free_us()}) +
          writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
 }
@@ -306,10 +308,11 @@ void StreamScheduler::follow_streams(McuIndex index) {
   }
 }
 
-// One that was cancelled before it misses none.
+// One that was cancelled before it misses none. The MCU has refused what was sent behind it.
 void StreamScheduler::miss_start(McuIndex index, std::uint8_t motor) {
   Stream& stream = mcus_[index].stream[motor];
   stream.active = false;
+  stream.next = records_[index].view.known_until[motor];
   if (source_.end_tick(index, motor) <= stream.start) return;
   events_.push_back(StartMissed{.mcu = index, .motor = motor});
 }

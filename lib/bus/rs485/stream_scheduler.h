@@ -69,9 +69,10 @@ class StreamScheduler {
   // To be called as that. A start that would come too late, sent now, is not sent.
   void fail_late_starts(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
-  // When the line will have carried the frame that begins table runs of these motors of an MCU, if
-  // it is free from `free_us` on.
-  std::int64_t carried_us(std::int64_t now_us, std::int64_t free_us, std::uint16_t motors) const;
+  // When the line will have carried the one frame that begins these motors of an MCU, table runs or
+  // streams told as states of runs, if it is free from `free_us` on.
+  std::int64_t first_carried_us(std::int64_t now_us, std::int64_t free_us, std::uint16_t motors,
+                                bool by_table) const;
   // When the line will have carried these replacements, one for each MCU, if they are asked for
   // now.
   struct LineUse {

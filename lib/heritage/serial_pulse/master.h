@@ -92,10 +92,6 @@ class SerialPulseMaster final : public link::BusMaster,
   void begin(link::McuIndex, std::uint8_t, link::Tick start) override;
   void begin_in_pace(link::McuIndex, std::uint8_t, link::Tick start,
                      link::LinePace::Place place) override;
-  link::Tick earliest_table_runs(std::int64_t now_us, link::McuIndex mcu,
-                                 std::uint16_t) const override {
-    return earliest_start(now_us, mcu, 0);
-  }
   void begin_table_run(link::McuIndex mcu, std::uint8_t motor, link::Tick start,
                        link::TableRun) override {
     begin(mcu, motor, start);

@@ -1,5 +1,6 @@
 // Motors that run by their tables: their ticks told as states, or the whole move at once.
 #include "bus/rs485/slave.h"
+#include "bus/rs485/start_margin.h"
 
 namespace bushd::test {
 namespace {
@@ -171,6 +172,68 @@ TEST_P(Tables, TheEndOfAMoveIsHeardOfAtOnce) {
     EXPECT_LE(bus.now_us - ended_us, std::int64_t{FakeBus::kTickNs} / 1000 + 5'000) << steps;
     bus.master->drop(McuIndex{0}, 1);
   }
+}
+
+// The line is busy with a poll for 5 ms at most (see above), carries the frame of some 40 bytes in
+// 0.8 ms, and the program has 2 ms; then the MCU needs two ticks, by one of which the clock may
+// lag, and the start is the next one.
+TEST_P(Tables, WhatOneFrameTellsBeginsAsSoonAsThatCanCome) {
+  const Tick most = bus.master->earliest_start(bus.now_us, McuIndex{0}, 1);
+  const Tick lead = 4 + (5'000 + 800 + 2'000) * 1000 / FakeBus::kTickNs;
+  ASSERT_LT(lead, most - bus.master->tick_at(bus.now_us)) << "no bound otherwise";
+  for (std::uint32_t phase = 0; phase < 60; ++phase) {
+    bus.run_for(50'000 + phase * 873);
+    const bool whole = phase % 2 == 0;
+    const Tick now = bus.master->tick_at(bus.now_us);
+    const std::uint16_t motors = whole ? 0b1010 : 0b0010;
+    const Tick start = bus.master->earliest_common_start(bus.now_us, McuIndex{0}, motors, whole);
+    EXPECT_LE(start - now, lead) << phase;
+    for (std::uint8_t m = 0; m < 4; ++m) {
+      if ((motors >> m & 1) == 0) continue;
+      plan_run(m, start, 200);
+      if (whole) {
+        bus.master->begin_table_run(McuIndex{0}, m, start, {200});
+      } else {
+        bus.master->begin(McuIndex{0}, m, start);
+      }
+    }
+    ASSERT_TRUE(bus.run_until([&] { return bus.master->view(McuIndex{0}).tick >= end(1); }));
+    bus.master->drop(McuIndex{0}, 1);
+    bus.master->drop(McuIndex{0}, 3);
+  }
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_RUN).size(), 30u);
+  EXPECT_EQ(bus.count<link::StartMissed>(), 0);
+}
+
+TEST_P(Tables, AStartThatWouldComeTooLateIsNotSent) {
+  const Tick start = bus.master->tick_at(bus.now_us) + 1;
+  plan_run(1, start, 40);
+  bus.master->begin_table_run(McuIndex{0}, 1, start, {40});
+  bus.run_for(1'000);
+  EXPECT_EQ(bus.count<link::StartMissed>(), 1);
+  bus.run_for(500'000);
+  EXPECT_EQ(bus.count<link::StartMissed>(), 1);
+  EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_RUN).size(), 0u);
+}
+
+TEST_P(Tables, AMissedStartLeavesMoreTimeForTheNext) {
+  const auto lead = [this] {
+    return bus.master->earliest_common_start(bus.now_us, McuIndex{0}, 1, true) -
+           bus.master->tick_at(bus.now_us);
+  };
+  bus.run_for(500'000);
+  const Tick before = lead();
+  for (int missed = 0; missed < 5; ++missed) {
+    const Tick start = bus.master->tick_at(bus.now_us) + 1;
+    plan_run(1, start, 40);
+    bus.master->begin_table_run(McuIndex{0}, 1, start, {40});
+    bus.run_for(1'000);
+  }
+  EXPECT_GE(
+      lead() - before,
+      (link::StartMargin::kMostUs - link::StartMargin::kLeastUs) * 1000 / FakeBus::kTickNs - 1);
+  bus.run_for(60'000'000);
+  EXPECT_LE(lead(), before + 1) << "forgotten";
 }
 
 TEST_P(Tables, WholeMoveThatIsTooLateIsTold) {
