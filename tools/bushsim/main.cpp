@@ -8,6 +8,7 @@
 #include <ctime>
 #include <exception>
 #include <limits>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -108,6 +109,19 @@ int run(int argc, char** argv) {
                  "does so as its watchdog (of a virtual MCU only); f, r, s, x are keys of a keypad "
                  "at a line of its own, and what that would show is printed")
       ->check(CLI::Range(1, 255));
+  int latency_ms = 0;
+  app.add_option("--latency-ms", latency_ms,
+                 "Let the serial adapter have a latency timer, as an FT232 has: answers go to the "
+                 "host whenever it has run, or when 62 bytes are held. Without: byte by byte")
+      ->check(CLI::Range(1, 255));
+  auto* const bit_errors =
+      app.add_option("--bit-errors", options.adapter.bit_error_rate,
+                     "Flip bits between adapter and line, in both directions, each with this "
+                     "probability; how many is told at the end")
+          ->check(CLI::Range(1e-9, 0.5));
+  auto* const seed = app.add_option("--seed", options.adapter.seed,
+                                    "Of the bits that are flipped (default: new; it is printed)")
+                         ->needs(bit_errors);
   bool keypad = false;
   app.add_flag("--keypad", keypad,
                "A keypad instead of a bus: what is typed are its keys (f, r, s, x), and what it "
@@ -143,6 +157,9 @@ int run(int argc, char** argv) {
     return refuse(
         {"this bus has no MCUs, where somebody could press something: leave out --console"});
   }
+  if ((latency_ms != 0 || *bit_errors) && (setup->pulses || setup->board_start_hz != 0)) {
+    return refuse({"this bus has no MCUs: leave out --latency-ms and --bit-errors"});
+  }
   if (setup->board_start_hz != 0) {
     if (!mcus.empty() || !doubled.empty()) {
       return refuse({"a commutator board has no MCUs: leave out --mcu and --doubled"});
@@ -152,6 +169,11 @@ int run(int argc, char** argv) {
   }
   options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
   if (setup->pulses) return simulate<bushsim::PulseSimulator>(options);
+  options.adapter.latency_ns = std::int64_t{latency_ms} * 1'000'000;
+  if (*bit_errors) {
+    if (!*seed) options.adapter.seed = std::random_device()();
+    fmt::print("bushsim: bits are flipped by --seed {}\n", options.adapter.seed);
+  }
   return simulate<bushsim::Simulator>(options);
 }
 

@@ -83,9 +83,13 @@ Simulator::Simulator(const Options& options, Waiter waiter, Pty pty,
       pty_(std::move(pty)),
       trace_(std::move(trace)),
       bus_(options.setup.baud, trace_.get()),
-      has_images_(!options.images.empty()) {
+      has_images_(!options.images.empty()),
+      adapter_(options.adapter),
+      has_bit_errors_(options.adapter.bit_error_rate > 0) {
   add_mcus(options);
-  bus_.on_master_byte = [this](std::uint8_t byte, TimeNs) { replies_.push_back(byte); };
+  bus_.on_master_byte = [this](std::uint8_t byte, TimeNs end_ns) {
+    adapter_.take_from_line(byte, end_ns);
+  };
   bus_.on_collision = [this](TimeNs time_ns, std::uint8_t first, std::uint8_t second) {
     report_collision(time_ns, first, second);
   };
@@ -134,6 +138,8 @@ void Simulator::report_collision(TimeNs time_ns, std::uint8_t first, std::uint8_
 Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
   auto pty = Pty::open(options.links.front());
   if (!pty) return fail(pty.error());
+  const TimeNs start_ns =
+      monotonic_ns() - (options.images.empty() ? kHeadStartNs : kRealHeadStartNs);
   std::unique_ptr<bushd::sim::VcdWriter> trace;
   if (!options.trace.empty()) {
     std::set<std::uint8_t> measured;  // their windings
@@ -142,8 +148,11 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
     }
     std::set<std::uint8_t> supplied = options.setup.measuring;
     if (options.console) supplied.insert(*options.console);
+    // By it edges are compared with what other programs did. With images time may slip.
+    const std::string comment =
+        options.images.empty() ? fmt::format("time 0 is {} ns of CLOCK_MONOTONIC", start_ns) : "";
     auto created = bushd::sim::VcdWriter::create(options.trace, options.setup.addresses, measured,
-                                                 "", supplied);
+                                                 comment, supplied);
     if (!created) return fail(created.error());
     trace = std::move(*created);
   }
@@ -156,7 +165,7 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
   }
   std::unique_ptr<Simulator> simulator(
       new Simulator(options, std::move(*waiter), std::move(*pty), std::move(trace)));
-  simulator->start();
+  simulator->start(start_ns);
   if (options.console) {
     simulator->console_ = static_cast<std::size_t>(at - options.setup.addresses.begin());
     simulator->typed_.emplace();
@@ -164,12 +173,12 @@ Result<std::unique_ptr<Simulator>> Simulator::create(const Options& options) {
   return simulator;
 }
 
-void Simulator::start() {
+void Simulator::start(TimeNs start_ns) {
   closed_.resize(bus_.mcu_count());
   drive_inputs();
-  const TimeNs head_start_ns = has_images_ ? kRealHeadStartNs : kHeadStartNs;
-  bus_.advance_to(head_start_ns);
-  start_ns_ = monotonic_ns() - head_start_ns;
+  start_ns_ = start_ns;
+  bus_.advance_to(has_images_ ? kRealHeadStartNs : kHeadStartNs);
+  if (has_images_) slip();
 }
 
 Result<void> Simulator::plug_in() {
@@ -184,6 +193,7 @@ Result<void> Simulator::plug_in() {
 // The adapter loses its power: what it was sending breaks off, what it holds is lost.
 void Simulator::unplug() {
   pty_.reset();
+  adapter_.drop();
   bus_.break_off_master();
 }
 
@@ -296,18 +306,19 @@ Result<void> Simulator::take_bytes(TimeNs now_ns) {
   std::array<std::uint8_t, kReadBytes> space;
   const auto size = pty_->read(space);
   if (!size) return fail(size.error());
+  adapter_.pass_to_line({space.data(), *size});
   bus_.master_send({space.data(), *size}, now_ns);
   if (*size == 0) pty_->lift_exclusive_use();
   return {};
 }
 
-Result<void> Simulator::hand_out_replies() {
-  if (replies_.empty()) return {};
-  const auto taken = pty_ ? pty_->write(replies_) : 0;
+Result<void> Simulator::hand_out_replies(TimeNs now_ns) {
+  const auto replies = adapter_.take_packets(now_ns);
+  if (replies.empty()) return {};
+  const auto taken = pty_ ? pty_->write(replies) : 0;
   if (!taken) return fail(taken.error());
   // Nobody reads, as with an adapter whose buffer is full: what does not fit is lost.
-  dropped_bytes_ += replies_.size() - *taken;
-  replies_.clear();
+  dropped_bytes_ += replies.size() - *taken;
   return {};
 }
 
@@ -319,9 +330,10 @@ bool Simulator::line_takes_more(TimeNs now_ns) const {
 
 TimeNs Simulator::sleep_ns(TimeNs now_ns) const {
   const TimeNs busy_ns = bus_.wire_busy_until_ns() - now_ns;
-  if (busy_ns > 0) return std::clamp(busy_ns, kShortestSleepNs, kBusySleepNs);
+  const TimeNs packet_ns = adapter_.next_packet_ns() - now_ns;
+  if (busy_ns > 0) return std::min(packet_ns, std::clamp(busy_ns, kShortestSleepNs, kBusySleepNs));
   // When an image answers is not known before it does.
-  return has_images_ ? kBusySleepNs : kIdleSleepNs;
+  return std::min(packet_ns, has_images_ ? kBusySleepNs : kIdleSleepNs);
 }
 
 // An image may take longer than the chip would: then simulated time falls behind, rather than that
@@ -350,7 +362,7 @@ Result<void> Simulator::loop() {
     if (pty_ && listens) {
       if (const auto taken = take_bytes(now_ns); !taken) return taken;
     }
-    if (const auto handed = hand_out_replies(); !handed) return handed;
+    if (const auto handed = hand_out_replies(now_ns); !handed) return handed;
     if (trace_ && trace_->error()) return fail(*trace_->error());
   }
   return {};
@@ -389,6 +401,7 @@ std::string Simulator::summary() const {
   fmt::format_to(out, "bushsim: {:.3f} s; collisions {}, corrupted bytes {}, dropped bytes {}\n",
                  static_cast<double>(bus_.now_ns()) / 1e9, bus_.collisions(),
                  bus_.corrupted_bytes(), dropped_bytes_);
+  if (has_bit_errors_) fmt::format_to(out, "bushsim: {} bits flipped\n", adapter_.flipped_bits());
   return text;
 }
 

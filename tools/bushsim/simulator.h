@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "adapter.h"
 #include "base/result.h"
 #include "descriptor.h"
 #include "pty.h"
@@ -26,6 +27,7 @@ struct Options {
   std::string trace;               // empty: none
   std::uint16_t boot_number = 1;
   std::optional<std::uint8_t> console;  // what is typed is pressed at this MCU (press)
+  AdapterOptions adapter;
 };
 
 class Simulator {
@@ -45,7 +47,7 @@ class Simulator {
   Simulator(const Options& options, Waiter waiter, Pty pty,
             std::unique_ptr<bushd::sim::VcdWriter> trace);
   void add_mcus(const Options& options);
-  void start();
+  void start(bushd::sim::TimeNs start_ns);
   bushd::Result<void> plug_in();
   void unplug();
   bushd::Result<void> take_signals();
@@ -57,7 +59,7 @@ class Simulator {
   void drive_inputs();
   bushd::sim::TimeNs wall_time_ns() const;
   bushd::Result<void> take_bytes(bushd::sim::TimeNs now_ns);
-  bushd::Result<void> hand_out_replies();
+  bushd::Result<void> hand_out_replies(bushd::sim::TimeNs now_ns);
   bool line_takes_more(bushd::sim::TimeNs now_ns) const;
   bushd::sim::TimeNs sleep_ns(bushd::sim::TimeNs now_ns) const;
   void report_collision(bushd::sim::TimeNs time_ns, std::uint8_t first, std::uint8_t second);
@@ -74,7 +76,8 @@ class Simulator {
   std::vector<bool> is_virtual_;  // by MCU
   bool has_images_;
   std::int64_t start_ns_ = 0;  // CLOCK_MONOTONIC at simulated time 0
-  std::vector<std::uint8_t> replies_;
+  Adapter adapter_;
+  bool has_bit_errors_;
   std::uint64_t dropped_bytes_ = 0;
   bool ended_ = false;      // by a signal
   bool triggered_ = false;  // the trigger inputs are active

@@ -12,19 +12,24 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <regex>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/frame.h"
 #include "engine/message.h"
 #include "sim/vcd_reader.h"
+#include "source_path.h"
 
 namespace {
 
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -336,6 +341,60 @@ TEST_F(Bushsim, RepliesThatNobodyReadsAreDroppedAndCounted) {
   EXPECT_THAT(read_file(err), HasSubstr("further collisions are only counted"));
 }
 
+TEST_F(Bushsim, ItsTraceSaysWhenItBegan) {
+  timespec before{};
+  ::clock_gettime(CLOCK_MONOTONIC, &before);
+  start_ready();
+  timespec after{};
+  ::clock_gettime(CLOCK_MONOTONIC, &after);
+  EXPECT_EQ(stop(), 0);
+  const std::string text = read_file(trace);
+  std::smatch said;
+  ASSERT_TRUE(std::regex_search(
+      text, said, std::regex("\\$comment time 0 is ([0-9]+) ns of CLOCK_MONOTONIC \\$end")));
+  // The MCUs have booted before anybody is told: 20 ms of simulated time (kHeadStartNs).
+  constexpr std::int64_t kHeadStartNs = 20'000'000;
+  const std::int64_t begin_ns = std::stoll(said[1]) + kHeadStartNs;
+  EXPECT_GE(begin_ns, before.tv_sec * 1'000'000'000 + before.tv_nsec);
+  EXPECT_LE(begin_ns, after.tv_sec * 1'000'000'000 + after.tv_nsec);
+}
+
+TEST_F(Bushsim, BitErrorsSpoilFramesAndAreCounted) {
+  // One of sixty bits, so most requests are spoilt. Which ones is up to the seed, and with this one
+  // the first is.
+  start({"--config", config, "--link", link, "--bit-errors", "0.0167", "--seed", "7"});
+  ASSERT_TRUE(eventually([&] { return there(link); }));
+  {
+    const Port port(link);
+    EXPECT_TRUE(eventually([&] {
+      port.ask_who(1);
+      pollfd ready{port.fd(), POLLIN, 0};
+      return ::poll(&ready, 1, 1) == 1;
+    })) << "no request came through";
+  }
+  EXPECT_EQ(stop(), 0);
+  const std::string text = read_file(out);
+  EXPECT_THAT(text, HasSubstr("bushsim: bits are flipped by --seed 7\n"));
+  EXPECT_THAT(text, ContainsRegex("[1-9][0-9]* bits flipped"));
+}
+
+TEST_F(Bushsim, OfABusWithoutMcusTheAdapterIsNotSimulated) {
+  const std::string pulses = bushd::test::source_path("tools/examples/serial-pulse.toml");
+  for (const auto& [option, value] :
+       {std::pair{"--latency-ms", "1"}, std::pair{"--bit-errors", "1e-3"}}) {
+    EXPECT_THAT(refusal({"--config", pulses, "--link", link, option, value}),
+                HasSubstr("leave out --latency-ms and --bit-errors"));
+  }
+}
+
+TEST_F(Bushsim, AnswersPassAnAdapterWithALatencyTimer) {
+  start_ready({"--latency-ms", "5"});
+  const Port port(link);
+  EXPECT_TRUE(port.identify(1));
+  EXPECT_TRUE(port.identify(2));
+  EXPECT_EQ(stop(), 0);
+}
+
 TEST_F(Bushsim, BootNumberDiffersFromStartToStart) {
   std::vector<std::uint16_t> numbers;
   for (int i = 0; i < 2; ++i) {
@@ -387,6 +446,8 @@ TEST_F(Bushsim, BadArgumentsAreRefusedWithTheirReason) {
               HasSubstr("none/trace.vcd"));
   EXPECT_THAT(refusal({"--config", config, "--link", link, "--boot-number", "65536"}, 2),
               HasSubstr("--boot-number"));
+  EXPECT_THAT(refusal({"--config", config, "--link", link, "--seed", "7"}, 2),
+              HasSubstr("--bit-errors"));
   EXPECT_FALSE(there(link)) << "what failed must not leave a link behind";
 }
 
