@@ -65,7 +65,8 @@ std::map<BusId, motion::Tick> Moves::starts_of(std::int64_t now_us,
   return start;
 }
 
-// Of several MCUs some may get their first frames and others not: there is time to repair that.
+// Where there are several MCUs, some may get their first frames and others not: there is time to
+// repair that.
 motion::Tick Moves::start_of(std::int64_t now_us, BusId bus,
                              const std::vector<FirstLeg>& legs) const {
   const Mcu& first = installation_.mcu_of(legs.front().motor);

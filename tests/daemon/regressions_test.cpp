@@ -48,15 +48,16 @@ INSTANTIATE_TEST_SUITE_P(Formats, Regressions, testing::Values("fine", "coarse")
                          [](const auto& format) { return std::string(format.param); });
 
 // A stop that takes effect at the very tick of the start: the start was with the MCU already, and
-// nobody told it that there was nothing to do any more.
+// nobody told it that there was nothing to do any more. Two streams of an MCU start 100 ms after
+// the request.
 TEST_P(Regressions, StopAtTheTickOfTheStart) {
-  Lab lab(hall(1, 1, GetParam()));
+  Lab lab(hall(1, 2, GetParam()));
   lab.connect();
   std::int64_t stands = 0;
   for (double after_s = 0.060; after_s < 0.080; after_s += 0.001) {
-    const auto move = lab.send(Ask::kMoveBy, {"m01"}, {500});
+    const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {500, 500});
     lab.run_for(after_s);
-    lab.wait(lab.send(Ask::kStop, {"m01"}));
+    lab.wait(lab.send(Ask::kStop, {"m01", "m02"}));
     const Answer result = lab.wait(move);
     EXPECT_EQ(result.result, "stopped") << "after " << after_s << " s: " << result.reason;
     lab.run_for(1);
@@ -69,13 +70,13 @@ TEST_P(Regressions, StopAtTheTickOfTheStart) {
 // A stop before the start that is lost on the way: the move has begun by the time that a second one
 // is planned, so there is something to run down from.
 TEST_P(Regressions, LostStopBeforeTheStart) {
-  Lab lab(hall(1, 1, GetParam()));
+  Lab lab(hall(1, 2, GetParam()));
   lab.connect();
-  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {5000});
+  const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {5000, 5000});
   lab.run_for(0.060);
   int lost = 0;
   lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++lost > 2; };
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01", "m02"})).result, "done");
   const Answer result = lab.wait(move);
   EXPECT_EQ(result.result, "stopped") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));

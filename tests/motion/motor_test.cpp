@@ -162,9 +162,21 @@ TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
   mcu.motor[3].position_steps = 0;
   const auto events = motor.report(
       {.of_mcu = mcu, .tick = kStart + 30, .requests_open = false, .emergency_stop_open = false});
-  ASSERT_NE(find<event::Ended>(events), nullptr);
-  EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLink);
+  EXPECT_NE(find<event::MissedStart>(events), nullptr);
   EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
+  EXPECT_TRUE(motor.awaits_new_start());
+  EXPECT_TRUE(motor.stands());
+  EXPECT_EQ(motor.target_steps(), kSteps);
+  EXPECT_TRUE(motor
+                  .report({.of_mcu = mcu,
+                           .tick = kStart + 60,
+                           .requests_open = false,
+                           .emergency_stop_open = false})
+                  .empty());
+  const Leg leg = motor.take_leg();
+  EXPECT_EQ(leg.target, kSteps);
+  motor.start(leg.target, kStart + 100);
+  EXPECT_FALSE(motor.is_late());
 }
 
 TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {

@@ -222,14 +222,17 @@ bool Rs485Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const 
 
 void Rs485Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
+  ask_at_end(stepped_us_, mcu);
 }
 
 void Rs485Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
   streams_.begin_run(mcu, motor, start, run);
+  ask_at_end(stepped_us_, mcu);
 }
 
 void Rs485Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) {
   streams_.begin_run(mcu, motor, start, run);
+  ask_at_end(stepped_us_, mcu);
   synchroniser_.lines_run(true);
 }
 

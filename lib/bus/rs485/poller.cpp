@@ -17,7 +17,7 @@ using fieldbus::kWindowGuardUs;
 constexpr std::int64_t kMaxCycleUs = 60'000;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
-constexpr std::int64_t kExtraShare = 4;  // extra polls take one part of so many
+constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
 constexpr int kMaxMissedReplies = 10;    // about half a second
 
 }  // namespace

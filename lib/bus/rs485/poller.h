@@ -25,7 +25,7 @@ class Poller {
   // How long the line is taken by a poll of all MCUs that are not offline, its answers included.
   std::int64_t cycle_us() const;
   // At this time the MCU's report will have something new: it is asked then, unless its turn comes
-  // before. INT64_MAX: nothing is expected. Such extra polls take at most a quarter of the time, so
+  // before. INT64_MAX: nothing is expected. Such extra polls take at most half of the time, so
   // they may come later; no routine poll does.
   void expect_news(McuIndex mcu, std::int64_t at_us) { polled_[mcu].news_us = at_us; }
   // When the MCU's turn comes. Precondition: it is not offline.
