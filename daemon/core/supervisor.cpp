@@ -142,7 +142,7 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
 
 void Supervisor::misses_start(const Mcu& mcu, Output output) {
   const auto id = mcu.motor_at(output);
-  if (id && installation_[*id].misses_start(mcu.report())) moves_.misses_start(*id);
+  if (id && installation_[*id].has_missed_start(mcu.report())) moves_.misses_start(*id);
 }
 
 void Supervisor::is_uncertain(const Mcu& mcu, Output output) {

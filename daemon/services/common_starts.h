@@ -14,7 +14,7 @@ namespace bushd::daemon {
 
 class CommonStarts {
  public:
-  // The same runs are begun so often at most.
+  // A start is tried so often at most.
   static constexpr unsigned kMostTries = 5;
 
   explicit CommonStarts(std::size_t motors);

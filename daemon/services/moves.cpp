@@ -174,8 +174,10 @@ void Moves::pause(std::int64_t now_us, const std::vector<MotorId>& motors) {
   while (begins()) begin_next();
   std::vector<MotorId> changed;
   for (const MotorId id : motors) {
-    // It is begun, as those above, and stopped before it moves.
-    if (installation_[id].is_late()) start_leg(now_us, id);
+    if (installation_[id].is_late()) {
+      pause_late(id);
+      continue;
+    }
     installation_[id].pause();
     if (installation_[id].needs_change()) changed.push_back(id);
   }
@@ -203,7 +205,7 @@ void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
   std::vector<MotorId> changed;
   std::vector<MotorId> armed;
   for (const MotorId id : installation_.with_lines(motors)) {
-    if (unbegun_.contains(id)) {
+    if (unbegun_.contains(id) || installation_[id].is_late()) {
       cancel(id, "stopped before it began");
       continue;
     }
@@ -269,6 +271,7 @@ bool Moves::has_time_to_retarget(std::int64_t now_us, MotorId motor) const {
 void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Event>& events) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
+  follow_start(id);
   for (const motion::Event& event : events) {
     if (!std::holds_alternative<motion::event::Executed>(event)) installation_.changed = true;
     std::visit(
@@ -287,6 +290,7 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             },
             [&](const motion::event::Drop&) { mcu.bus().drop(mcu.on_bus(), motor.output().value); },
             [&](const motion::event::Mismatch& mismatch) {
+              starts_.leaves(id);
               outputs_.log(LogLevel::kError, id,
                            motor.name() + ": " + *motor.trust().uncertain_reason() +
                                (mismatch.stopped ? "; it is stopped"
@@ -311,13 +315,13 @@ void Moves::take(std::int64_t now_us, MotorId id, const std::vector<motion::Even
             [&](const motion::event::Ended& ended) { end(id, ended); }},
         event);
   }
-  follow_start(id);
 }
 
 void Moves::end(MotorId id, const motion::event::Ended& ended) {
   const motion::Motor& motor = installation_[id];
   const bool begun = unbegun_.erase(id) == 0;
-  begun ? hear_of_start(id) : starts_.leaves(id);
+  if (starts_.waits(id) && begun && has_moved(id)) starts_.begins(id);
+  starts_.leaves(id);
   Mcu& mcu = installation_.mcu_of(id);
   if (begun) mcu.bus().drop(mcu.on_bus(), motor.output().value);
   if (ended.was_armed) {

@@ -125,20 +125,22 @@ class Moves final : public Service {
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
   Result<Part> part_of(MotorId motor, const api::Amount& amount, const api::Move& move) const;
   void start_leg(std::int64_t now_us, MotorId motor);
-  // The tick of each bus at which these motors, at rest there, can begin their first legs together.
+  // The tick of each bus at which these motors, at rest there, can begin their first legs together;
+  // `at_once`: sooner, where one frame is enough.
   struct FirstLeg {
     MotorId motor;
     motion::Leg leg;
   };
-  std::map<BusId, motion::Tick> starts_of(std::int64_t now_us,
-                                          const std::vector<FirstLeg>& legs) const;
-  motion::Tick start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs) const;
+  std::map<BusId, motion::Tick> starts_of(std::int64_t now_us, const std::vector<FirstLeg>& legs,
+                                          bool at_once) const;
+  motion::Tick start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs,
+                        bool at_once) const;
   // Whether its MCU is given the run as a whole.
   bool by_table(MotorId motor, std::int64_t steps, bushd_delay shortest_delay) const;
   // Whether a motor has begun, as its MCU reports.
   void follow_start(MotorId motor);
-  // It has, or was stopped before.
-  void hear_of_start(MotorId motor);
+  bool has_moved(MotorId motor) const;
+  void pause_late(MotorId motor);
   void start_anew(std::int64_t now_us);
   // From rest; the motor is part of an open move.
   void start_run(std::int64_t now_us, MotorId motor, const motion::Leg& leg);
@@ -160,7 +162,7 @@ class Moves final : public Service {
   Outputs& outputs_;
   std::set<MotorId> to_retarget_;  // waiting for the line
   CommonStarts starts_;
-  std::set<MotorId> unbegun_;     // planned or late, and nobody has been told yet
+  std::set<MotorId> unbegun_;     // planned and not yet begun, or late
   std::deque<MotorId> to_begin_;  // these, in their order, and some that were cancelled
   std::uint64_t units_ = 0;
 };

@@ -25,7 +25,9 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
     starting.push_back({part.motor, part.legs.front()});
     together[installation_.mcu_of(part.motor).config.bus].push_back(part.motor);
   }
-  const std::map<BusId, motion::Tick> start = starts_of(now_us, starting);
+  // The new targets of those that move have the line first.
+  const bool at_once = moving.empty() && starting.size() <= kBeginsPerSlice;
+  const std::map<BusId, motion::Tick> start = starts_of(now_us, starting, at_once);
   asker.answer(api::Accepted{});
   take_over(moving, asker);
   open_.open(asker, motors, OpenMoves::Purpose::kMove);
@@ -46,18 +48,19 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
     open_.planned(part.motor, static_cast<int>(part.legs.size()),
                   motor.axis().most_steps_per_s(fastest->shortest_delay));
   }
-  if (unbegun_.size() <= kBeginsPerSlice) work();
+  if (to_begin_.size() <= kBeginsPerSlice) work();
   retarget(now_us, moving);
 }
 
 std::map<BusId, motion::Tick> Moves::starts_of(std::int64_t now_us,
-                                               const std::vector<FirstLeg>& legs) const {
+                                               const std::vector<FirstLeg>& legs,
+                                               bool at_once) const {
   std::map<BusId, std::vector<FirstLeg>> of_buses;
   for (const FirstLeg& leg : legs) {
     of_buses[installation_.mcu_of(leg.motor).config.bus].push_back(leg);
   }
   std::map<BusId, motion::Tick> start;
-  for (const auto& [bus, of_bus] : of_buses) start[bus] = start_of(now_us, bus, of_bus);
+  for (const auto& [bus, of_bus] : of_buses) start[bus] = start_of(now_us, bus, of_bus, at_once);
   const std::size_t slices = legs.size() / kBeginsPerSlice;
   for (auto& [bus, tick] : start) {
     tick += static_cast<motion::Tick>(slices) * kSliceUs / installation_[bus].config.tick_us;
@@ -66,24 +69,24 @@ std::map<BusId, motion::Tick> Moves::starts_of(std::int64_t now_us,
 }
 
 // Where there are several MCUs, some may get their first frames and others not: there is time to
-// repair that.
-motion::Tick Moves::start_of(std::int64_t now_us, BusId bus,
-                             const std::vector<FirstLeg>& legs) const {
+// repair that. No state tells of a run with delays that are no codes.
+motion::Tick Moves::start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs,
+                             bool at_once) const {
   const Mcu& first = installation_.mcu_of(legs.front().motor);
   std::uint16_t outputs = 0;
-  bool one_mcu = true;
   bool all_by_table = true;
   motion::Tick common = 0;
   for (const auto& [id, leg] : legs) {
     const Mcu& mcu = installation_.mcu_of(id);
     const motion::Motor& motor = installation_[id];
     const std::int64_t steps = leg.target - motor.position_steps();
+    const bool whole = by_table(id, steps, leg.shortest_delay);
     outputs |= static_cast<std::uint16_t>(1u << motor.output().value);
-    one_mcu = one_mcu && &mcu == &first;
-    all_by_table = all_by_table && by_table(id, steps, leg.shortest_delay);
+    all_by_table = all_by_table && whole;
+    at_once = at_once && &mcu == &first && (whole || bushd_delay_is_code(leg.shortest_delay));
     common = std::max(common, mcu.earliest_start(now_us, motor.output()));
   }
-  if (!one_mcu) return common;
+  if (!at_once) return common;
   return installation_[bus].master.earliest_common_start(now_us, first.on_bus(), outputs,
                                                          all_by_table);
 }
@@ -97,55 +100,63 @@ bool Moves::by_table(MotorId id, std::int64_t steps, bushd_delay shortest_delay)
 
 void Moves::misses_start(MotorId id) {
   motion::Motor& motor = installation_[id];
+  Mcu& mcu = installation_.mcu_of(id);
   if (motor.is_late()) return;
-  if (!starts_.waits(id) || !motor.awaits_new_start()) {
+  mcu.bus().start_missed();
+  // Buses without streams miss a start for another reason than time.
+  if (!mcu.offers.streams || !starts_.waits(id) || !motor.awaits_new_start()) {
     return end(id, *motor.end(api::Outcome::kLink, motor.did_not_start()));
   }
-  Mcu& mcu = installation_.mcu_of(id);
   mcu.bus().drop(mcu.on_bus(), motor.output().value);
   journal_.ended(id, "late");
+  if (motor.is_paused()) return pause_late(id);
   unbegun_.insert(id);
-  if (motor.axis().stopping() && !motor.is_paused()) return cancel(id, "stopped before it began");
+  if (motor.axis().stopping()) return cancel(id, "stopped before it began");
   starts_.misses(id);
+}
+
+// It stands, and resuming it begins it.
+void Moves::pause_late(MotorId id) {
+  unbegun_.erase(id);
+  starts_.leaves(id);
+  installation_[id].pause();
+}
+
+bool Moves::has_moved(MotorId id) const {
+  const motion::Motor& motor = installation_[id];
+  const Mcu& mcu = installation_.mcu_of(id);
+  const bool moves = (mcu.report().moving >> motor.output().value & 1) != 0;
+  return moves || motor.position_steps() != motor.axis().from_steps();
 }
 
 void Moves::follow_start(MotorId id) {
   if (!starts_.waits(id) || unbegun_.contains(id)) return;
-  const motion::Motor& motor = installation_[id];
-  const Mcu& mcu = installation_.mcu_of(id);
-  if (mcu.view().tick <= motor.axis().start_tick()) return;
-  const bool moves = (mcu.report().moving >> motor.output().value & 1) != 0;
-  const bool cancelled = motor.axis().end_tick() <= motor.axis().start_tick();
-  if (moves || cancelled || motor.position_steps() != motor.axis().from_steps()) hear_of_start(id);
-}
-
-void Moves::hear_of_start(MotorId id) {
-  if (!starts_.waits(id)) return;
   const motion::Axis& axis = installation_[id].axis();
+  if (installation_.mcu_of(id).view().tick <= axis.start_tick()) return;
+  if (has_moved(id)) return starts_.begins(id);
   const bool cancelled = axis.end_tick() <= axis.start_tick();
-  cancelled ? starts_.leaves(id) : starts_.begins(id);
+  if (cancelled) starts_.leaves(id);
 }
 
 void Moves::start_anew(std::int64_t now_us) {
   const CommonStarts::Decision decision = starts_.decide();
+  if (decision.end.empty() && decision.again.empty()) return;
   for (const MotorId id : decision.end) {
     motion::Motor& motor = installation_[id];
     end(id, *motor.end(api::Outcome::kLink, motor.did_not_start()));
   }
   std::vector<FirstLeg> legs;
   for (const MotorId id : decision.again) legs.push_back({id, installation_[id].take_leg()});
-  const std::map<BusId, motion::Tick> start = starts_of(now_us, legs);
-  std::vector<MotorId> paused;
+  const bool at_once = legs.size() <= kBeginsPerSlice;
+  const std::map<BusId, motion::Tick> start = starts_of(now_us, legs, at_once);
   for (const auto& [id, leg] : legs) {
     motion::Motor& motor = installation_[id];
-    if (motor.is_paused()) paused.push_back(id);
     outputs_.log(LogLevel::kInfo, id,
                  motor.name() + ": " + motor.did_not_start() + ", and begins anew");
     motor.start(leg.target, start.at(installation_.mcu_of(id).config.bus), leg.shortest_delay);
     to_begin_.push_back(id);
   }
-  if (unbegun_.size() <= kBeginsPerSlice) work();
-  if (!paused.empty()) pause(now_us, paused);
+  if (to_begin_.size() <= kBeginsPerSlice) work();
 }
 
 void Moves::work() {
@@ -170,9 +181,13 @@ void Moves::end_overtaken(std::int64_t) {
 }
 
 // Nobody has been told of it, nor does the log of moves know of it.
-void Moves::cancel(MotorId motor, const std::string& reason) {
-  unbegun_.insert(motor);
-  end(motor, *installation_[motor].end(api::Outcome::kStopped, reason));
+void Moves::cancel(MotorId id, const std::string& reason) {
+  motion::Motor& motor = installation_[id];
+  const bool late = motor.is_late();
+  unbegun_.insert(id);
+  motion::event::Ended ended = *motor.end(api::Outcome::kStopped, reason);
+  ended.by_plan = late;  // as one that is stopped in motion
+  end(id, ended);
 }
 
 // Whether runs may begin whose plans are made.
@@ -190,7 +205,7 @@ void Moves::start_run(std::int64_t now_us, MotorId id, const motion::Leg& leg) {
   const BusId bus = installation_.mcu_of(id).config.bus;
   unbegun_.erase(id);  // if it was late
   starts_.begin({id});
-  installation_[id].start(leg.target, start_of(now_us, bus, {{id, leg}}), leg.shortest_delay);
+  installation_[id].start(leg.target, start_of(now_us, bus, {{id, leg}}, true), leg.shortest_delay);
   begin(id);
 }
 

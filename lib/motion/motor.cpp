@@ -75,7 +75,12 @@ Leg Motor::take_leg() {
 
 void Motor::pause() {
   if (auto* on_line = std::get_if<OnLine>(&activity_)) on_line->resumes = false;
-  if (!moves() || axis_.stopping()) return;
+  if (!moves()) return;
+  if (is_late()) {
+    pause_ = Pause::kStands;
+    return;
+  }
+  if (axis_.stopping()) return;
   pause_ = Pause::kRamps;
   axis_.stop();
 }
@@ -228,7 +233,8 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
   // It has not told of the emergency stop yet, with which its plan was given up.
   if (report.emergency_stop_open) return;
   Moving& now = moving_now();
-  if (now.late) return;
+  if (now.late && !moving && position_ == axis_.from_steps()) return;
+  now.late = false;  // it moves all the same
   if (now.faults != 0) {
     // Another master has cleared them as soon as the motor stood.
     bushd_report before = report.of_mcu;

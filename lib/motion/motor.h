@@ -243,8 +243,9 @@ class Motor {
   std::vector<Event> report(const Report& report);
   // Its MCU did not get the first ticks in time. Whether it has missed its start by that: else the
   // next report says what has become of it.
-  bool misses_start(const bushd_report& report) const;
-  // It has missed its start. Whether it may have a new one: then it is late from now on.
+  bool has_missed_start(const bushd_report& report) const;
+  // It has missed its start. Whether it may have a new one: then it is late from now on, until it
+  // is started, also while it is paused.
   bool awaits_new_start();
   bool is_late() const { return moves() && moving()->late; }
   std::string did_not_start() const;

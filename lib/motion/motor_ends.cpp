@@ -82,13 +82,15 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   return ended(Outcome::kLink, mcu + " ran it down by itself because " + stop_cause(report));
 }
 
-bool Motor::misses_start(const bushd_report& report) const {
+bool Motor::has_missed_start(const bushd_report& report) const {
   const bool ran_down = report.faults != 0;
   // No tick is missed of a move that was cancelled before its start.
   const bool cancelled = axis_.end_tick() <= axis_.start_tick();
   const bool limited =
       has_bit(report.forbidden_positive | report.forbidden_negative, output().value);
-  return has_plan() && !ran_down && !cancelled && !limited;
+  // Another master may have ended it since.
+  const bool moved = report.motor[output().value].position_steps != axis_.from_steps();
+  return has_plan() && !ran_down && !cancelled && !limited && !moved;
 }
 
 bool Motor::awaits_new_start() {

@@ -179,6 +179,14 @@ TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
   EXPECT_FALSE(motor.is_late());
 }
 
+TEST_F(MotorTest, OneThatHasMovedHasNotMissedItsStart) {
+  motor.start(kSteps, kStart);
+  mcu.motor[3].position_steps = 0;
+  EXPECT_TRUE(motor.has_missed_start(mcu));
+  mcu.motor[3].position_steps = 46;
+  EXPECT_FALSE(motor.has_missed_start(mcu)) << "says the next report";
+}
+
 TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {
   motor.arm(9, kSteps);
   EXPECT_TRUE(motor.is<Armed>());

@@ -77,6 +77,8 @@ class BusMaster {
     }
     return earliest;
   }
+  // A motion has missed its start: what begins at once next gets more time.
+  virtual void start_missed() {}
   // Earliest tick from which replacements can take effect that are asked for together, one for each
   // MCU, in the order of MCUs: a stop of many motors takes the line longer than that of one.
   virtual Tick earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const = 0;

@@ -109,6 +109,7 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   writer_.clear();
   notice_standing_still(now_us);
   stepped_us_ = now_us;
+  begun_ = false;
   if (!port_open_) return {};
   synchroniser_.lines_run(streams_.runs_line());
   transactions_.expire(now_us);
@@ -157,7 +158,7 @@ std::int64_t Rs485Master::next_wake_us() const {
     if (!emergency_.active()) return timeout_us;
     return std::min(timeout_us, std::max(emergency_.due_us(), transactions_.quiet_us()));
   }
-  std::int64_t wake = synchroniser_.due_us();
+  std::int64_t wake = begun_ ? stepped_us_ : synchroniser_.due_us();
   if (emergency_.active()) wake = std::min(wake, emergency_.due_us());
   for (const McuIndex i : mcus_.indices()) wake = std::min(wake, wake_us(i));
   return std::max(wake, writer_.room_from_us());
@@ -172,10 +173,6 @@ std::int64_t Rs485Master::wake_us(McuIndex mcu) const {
 }
 
 std::vector<Event> Rs485Master::take_events() {
-  if (std::ranges::any_of(
-          events_, [](const Event& event) { return std::holds_alternative<StartMissed>(event); })) {
-    start_margin_.missed(stepped_us_);
-  }
   return std::exchange(events_, {});
 }
 
@@ -190,12 +187,13 @@ Tick Rs485Master::earliest_common_start(std::int64_t now_us, McuIndex mcu, std::
   const bool alone = std::has_single_bit(motors);
   const bool tells_runs = setup_.table_ticks && can(mcu, BUSHD_CAN_TABLE_TICKS);
   const bool in_one_frame = by_table || (alone && tells_runs);
-  if (!in_one_frame || streams_.replacement_open(mcu)) {
+  if (!in_one_frame || streams_.replacement_open(mcu) || streams_.has_replacement_to_send(mcu)) {
     return BusMaster::earliest_common_start(now_us, mcu, motors, by_table);
   }
   const std::int64_t free_us = transactions_.open() ? transactions_.quiet_us() : now_us;
-  Tick earliest = horizon_.earliest_at_once(
-      streams_.first_carried_us(now_us, free_us, motors, by_table), start_margin_.at(now_us));
+  Tick earliest =
+      horizon_.earliest_at_once(streams_.first_carried_us(now_us, free_us, motors, by_table),
+                                start_margin_.margin_us(now_us));
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if ((motors >> m & 1) != 0) earliest = std::max(earliest, streams_.next_tick(mcu, m));
   }
@@ -220,19 +218,25 @@ bool Rs485Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const 
          !streams_.behind(now_us, horizon_.queue_urgent_us(silence_us()));
 }
 
+// What begins is to be sent, and its end to be asked for.
+void Rs485Master::note_begun(McuIndex mcu) {
+  begun_ = true;
+  ask_at_end(stepped_us_, mcu);
+}
+
 void Rs485Master::begin(McuIndex mcu, std::uint8_t motor, Tick start) {
   streams_.begin(mcu, motor, start);
-  ask_at_end(stepped_us_, mcu);
+  note_begun(mcu);
 }
 
 void Rs485Master::begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) {
   streams_.begin_run(mcu, motor, start, run);
-  ask_at_end(stepped_us_, mcu);
+  note_begun(mcu);
 }
 
 void Rs485Master::begin_line_run(McuIndex mcu, std::uint8_t motor, Tick start, const LineRun& run) {
   streams_.begin_run(mcu, motor, start, run);
-  ask_at_end(stepped_us_, mcu);
+  note_begun(mcu);
   synchroniser_.lines_run(true);
 }
 

@@ -95,6 +95,7 @@ class Rs485Master final : public BusMaster,
   Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const override;
   Tick earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
                              bool by_table) const override;
+  void start_missed() override { start_margin_.missed(stepped_us_); }
   Tick earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const override;
   Tick earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
                          Tick start) const override;
@@ -164,6 +165,7 @@ class Rs485Master final : public BusMaster,
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,
                      const bushd_report& report);
   void ask_at_end(std::int64_t now_us, McuIndex mcu);
+  void note_begun(McuIndex mcu);
   bool send_next(std::int64_t now_us);
   std::int64_t silence_us() const;
   std::int64_t wake_us(McuIndex mcu) const;
@@ -184,6 +186,7 @@ class Rs485Master final : public BusMaster,
   EmergencyStop emergency_;
   Horizon horizon_;
   StartMargin start_margin_;
+  bool begun_ = false;  // something, since the last step
 };
 
 }  // namespace bushd::link

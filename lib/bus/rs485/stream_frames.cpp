@@ -281,6 +281,7 @@ void StreamScheduler::send_ticks(std::int64_t now_us, McuIndex index, std::uint1
 
 void StreamScheduler::note_sent(McuIndex index, std::uint8_t motor, Tick first, Tick until) {
   Stream& stream = mcus_[index].stream[motor];
+  stream.told = true;
   if (first < stream.sent) ++records_[index].health.repeats;
   stream.next = until;
   if (stream.beyond_gap && until >= stream.beyond_gap->from) {

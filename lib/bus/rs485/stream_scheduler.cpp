@@ -238,8 +238,8 @@ void StreamScheduler::fail_late_starts(std::int64_t now_us) {
     for (std::uint8_t m = 0; mcu.starting >> m != 0; ++m) {
       if ((mcu.starting >> m & 1) == 0) continue;
       const Stream& stream = mcu.stream[m];
-      if (!stream.active || !stream.starts()) mcu.starting &= static_cast<std::uint16_t>(~bit(m));
-      if (mcu.sendable(m) && stream.starts() && too_late(stream.start, arrival)) miss_start(i, m);
+      if (!stream.active || stream.told) mcu.starting &= static_cast<std::uint16_t>(~bit(m));
+      if (mcu.sendable(m) && !stream.told && too_late(stream.start, arrival)) miss_start(i, m);
     }
   }
 }
@@ -268,7 +268,6 @@ void StreamScheduler::follow_replacements(McuIndex index) {
     Stream& stream = mcu.stream[m];
     stream.from = stream.from_before;
     stream.next = stream.sent = std::max(view.known_until[m], stream.from);
-    mcu.starting |= bit(m);
     stream.unsure = stream.begun();
     stream.beyond_gap.reset();
     stream.finished = false;
@@ -308,7 +307,8 @@ void StreamScheduler::follow_streams(McuIndex index) {
   }
 }
 
-// One that was cancelled before it misses none. The MCU has refused what was sent behind it.
+// A motion that was cancelled before its start misses nothing. The MCU has refused what was sent
+// behind the start.
 void StreamScheduler::miss_start(McuIndex index, std::uint8_t motor) {
   Stream& stream = mcus_[index].stream[motor];
   stream.active = false;
@@ -323,7 +323,6 @@ void StreamScheduler::go_back(McuIndex index, std::uint8_t motor) {
   const McuView& view = records_[index].view;
   const bushd_report& report = view.report;
   stream.next = std::max(view.known_until[motor], stream.from);
-  mcus_[index].starting |= bit(motor);
   stream.beyond_gap.reset();
   stream.finished = false;
   Tick missing = stream.run ? 0 : stream.sent - stream.next;

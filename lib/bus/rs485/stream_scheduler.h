@@ -66,7 +66,8 @@ class StreamScheduler {
   // it does between two steps, a motor whose replacement failed has no ticks that could be sent:
   // none of it are, in this step.
   void fail_late_replacements(std::int64_t now_us);
-  // To be called as that. A start that would come too late, sent now, is not sent.
+  // Called once in a step, before anything is sent. A start that has not been sent and would arrive
+  // too late is not sent: StartMissed says so.
   void fail_late_starts(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
   // When the line will have carried the one frame that begins these motors of an MCU, table runs or
@@ -122,6 +123,7 @@ class StreamScheduler {
   struct Stream {
     bool active = false;
     bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
+    bool told = false;      // something of it has been sent
     Tick start = 0;
     // First tick that the MCU gets of it: the start, or that of a replacement before it, which
     // leads up to the start. What follows one is no start, wherever it ends.
