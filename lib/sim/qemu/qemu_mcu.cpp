@@ -88,7 +88,9 @@ QemuMcu::QemuMcu(const QemuOptions& options, std::size_t index, Driver& driver, 
     flash_[at] = record_of(kind, static_cast<std::uint16_t>(options.unique_id >> 16 * kind));
   }
   flash_[at] = record_of(kKindAddress, options.address);
-  flash_[at + 4] = record_of(kKindBootNumber, options.boots);
+  for (int boot = options.boots - options.recorded_boots + 1; boot <= options.boots; ++boot) {
+    flash_[at += 4] = record_of(kKindBootNumber, static_cast<std::uint16_t>(boot));
+  }
   if (!options.memory_owners.empty()) map_ = map_of(options);
   start(kPowerOn);
 }

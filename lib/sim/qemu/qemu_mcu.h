@@ -27,6 +27,8 @@ struct QemuOptions {
   std::uint8_t address = 1;  // in its flash
   std::uint64_t unique_id = 1;
   std::uint16_t boots = 0;  // boot number of the boot before
+  // Its journal has a record of each of the last so many boots.
+  std::uint16_t recorded_boots = 1;
   // The port's file of owners (memory_map.h): then every access to memory is watched, and `advance`
   // throws at the first that must not be. Empty: none is.
   std::string memory_owners{};

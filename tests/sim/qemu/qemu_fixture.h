@@ -14,12 +14,14 @@ class QemuAlone : public McuAlone {
   static constexpr TimeNs kBootNs = 100'000'000;
 
   explicit QemuAlone(std::uint32_t baud = kBaud) : QemuAlone(baud, image_path(baud)) {}
-  QemuAlone(std::uint32_t baud, const std::string& image) : McuAlone(baud, kBootNs) {
+  QemuAlone(std::uint32_t baud, const std::string& image, std::uint16_t recorded_boots = 1)
+      : McuAlone(baud, kBootNs) {
     QemuOptions options;
     options.image = image;
     options.memory_owners = LM3S_MEMORY_OWNERS;
     options.address = kAddress;
     options.boots = kBoots;
+    options.recorded_boots = recorded_boots;
     qemu_ = add<QemuMcu>(options);
   }
 
