@@ -18,7 +18,9 @@ class InMotion:
         moving = max(motors, key=lambda m: abs(aims[m.name] - m.steps))
         most_s = abs(aims[moving.name] - moving.steps) * self.fastest * self.time_unit_ns * 1e-9
         self.state = self.driver.do("run", s=self.rng.uniform(0, 0.8 * most_s))
-        if aims[moving.name] == moving.steps:
+        # What is left of it has to last until a change takes effect: 10 ms for the program, 12 ms of an exchange
+        # under way, 3 ms of frames, 4 ticks of 2.56 ms, and another exchange where a frame of before is not confirmed.
+        if aims[moving.name] == moving.steps or 0.2 * most_s < 0.05:
             return self.finish(motors, targets, number)
         acts = [self.retarget] * 3 + [self.pause] * 3 + [self.stop, self.ask_for_rest]
         if self.kept:
