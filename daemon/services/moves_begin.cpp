@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/services/moves.h"
+#include "motion/report_words.h"
 
 namespace bushd::daemon {
 namespace {
@@ -125,7 +126,7 @@ void Moves::pause_late(MotorId id) {
 bool Moves::has_moved(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
-  const bool moves = (mcu.report().moving >> motor.output().value & 1) != 0;
+  const bool moves = motion::has_bit(mcu.report().moving, motor.output().value);
   return moves || motor.position_steps() != motor.axis().from_steps();
 }
 

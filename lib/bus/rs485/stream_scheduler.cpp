@@ -50,7 +50,7 @@ void StreamScheduler::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, c
   const auto* on_line = std::get_if<LineRun>(&run);
   stream.next = stream.sent =
       on_line != nullptr ? start + on_line->ticks : source_.end_tick(mcu, motor);
-  stream.finished = true;
+  stream.finished = stream.told = true;  // the MCU has it
 }
 
 void StreamScheduler::drop(McuIndex mcu, std::uint8_t motor) {

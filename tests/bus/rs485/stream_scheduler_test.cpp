@@ -146,6 +146,17 @@ TEST_F(Scheduling, StartThatCameTooLateIsToldAndDropped) {
   EXPECT_FALSE(streams.has_ticks_to_send(kFirst));
 }
 
+// The trigger has begun it, so nothing was sent, and no start can be missed any more.
+TEST_F(Scheduling, ARunThatTheMcuHasBegunMissesNoStart) {
+  source.end = [](std::uint8_t) { return Tick{1200}; };
+  streams.follow_run(kFirst, 0, 990, link::TableRun{.steps = 1000});
+  known_until(0, 1010);  // not running any more, as far as it knows
+  streams.follow_report(kFirst);
+  streams.fail_late_starts(kNowUs);
+  EXPECT_TRUE(events.empty());
+  EXPECT_TRUE(streams.has_ticks_to_send(kFirst));
+}
+
 class Replacing : public Scheduling {
  protected:
   Replacing() {

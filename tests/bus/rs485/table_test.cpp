@@ -228,6 +228,7 @@ TEST_P(Tables, AMissedStartLeavesMoreTimeForTheNext) {
     bus.master->start_missed();
     bus.master->start_missed();  // another motor, at the same time
   }
+  // The clock's part of a tick is cut off at both times.
   EXPECT_GE(
       lead() - before,
       (link::StartMargin::kMostUs - link::StartMargin::kLeastUs) * 1000 / FakeBus::kTickNs - 1);
