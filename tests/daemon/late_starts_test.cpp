@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -60,6 +60,18 @@ class LateStarts : public Traced<const char*> {
 
   void loses(double seconds, std::uint8_t address = kAllMcus) {
     lose_motion(lab, seconds, address);
+  }
+  // A move at two MCUs that is lost for a while, and what comes at any time of it: before the first
+  // start, while the motors are late, after they have begun anew.
+  void at_any_time(Ask ask, std::int64_t steps,
+                   const std::function<void(std::int64_t move, int ms)>& then) {
+    for (int ms = 60; ms < 400; ms += 20) {
+      SCOPED_TRACE(ms);
+      loses(0.15);
+      const auto move = lab.send(ask, {"m01", "m03"}, {steps, steps});
+      lab.run_for(ms * 1e-3);
+      then(move, ms);
+    }
   }
   void expect_late_then_reached() const {
     auto results = logged<std::string>("result", "result");
@@ -173,15 +185,9 @@ TEST_P(LateStarts, AfterTheDaemonStoodStill) {
   expect_each_edge_is_explained();
 }
 
-// Whenever a stop comes, before the first start, while the motor is late, or after it has begun
-// anew, it ends the move.
 TEST_P(LateStarts, AStopEndsIt) {
-  for (int ms = 60; ms < 400; ms += 20) {
-    SCOPED_TRACE(ms);
-    loses(0.15);
-    const std::int64_t from = lab.shaft_steps("m01");
-    const auto move = lab.send(Ask::kMoveBy, {"m01", "m03"}, {6000, 6000});
-    lab.run_for(ms * 1e-3);
+  std::int64_t from = 0;
+  at_any_time(Ask::kMoveBy, 6000, [&](std::int64_t move, int) {
     EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01", "m03"})).result, "done");
     ASSERT_TRUE(lab.has_result(move));
     const Answer result = lab.last_reply(move);
@@ -189,19 +195,15 @@ TEST_P(LateStarts, AStopEndsIt) {
     lab.run_for(1);
     EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps[0]);
     EXPECT_LT(lab.shaft_steps("m01") - from, 6000);
-  }
+    from = lab.shaft_steps("m01");
+  });
   expect_each_edge_is_explained(true);
 }
 
-// The same of a pause, after which the move is resumed; of another target; and of a stop of one of
-// two.
 TEST_P(LateStarts, APauseKeepsItsTarget) {
-  for (int ms = 60; ms < 400; ms += 20) {
-    SCOPED_TRACE(ms);
-    const std::int64_t from = lab.shaft_steps("m01");
-    loses(0.15);
-    const auto move = lab.send(Ask::kMoveBy, {"m01", "m03"}, {2500, 2500});
-    lab.run_for(ms * 1e-3);
+  std::int64_t target = 0;
+  at_any_time(Ask::kMoveBy, 2500, [&](std::int64_t move, int) {
+    target += 2500;
     EXPECT_EQ(lab.wait(lab.send(api::Pause{})).result, "done");
     const std::int64_t stands = lab.shaft_steps("m01");
     lab.run_for(1);
@@ -209,51 +211,39 @@ TEST_P(LateStarts, APauseKeepsItsTarget) {
     EXPECT_FALSE(lab.has_result(move));
     EXPECT_EQ(lab.wait(lab.send(api::Resume{})).result, "done");
     EXPECT_EQ(lab.wait(move).result, "reached") << lab.last_reply(move).reason;
-    EXPECT_EQ(lab.shaft_steps("m01"), from + 2500);
-  }
+    EXPECT_EQ(lab.shaft_steps("m01"), target);
+  });
   expect_each_edge_is_explained(true);
 }
 
 TEST_P(LateStarts, AnotherTargetIsTheNewest) {
-  for (int ms = 60; ms < 400; ms += 20) {
-    SCOPED_TRACE(ms);
-    loses(0.15);
-    lab.send(Ask::kMoveTo, {"m01", "m03"}, {2500, 2500});
-    lab.run_for(ms * 1e-3);
+  at_any_time(Ask::kMoveTo, 2500, [&](std::int64_t, int ms) {
     EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {-ms})).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), -ms);
     EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01", "m03"}, {0, 0})).result, "reached");
-  }
+  });
   expect_each_edge_is_explained(true);
 }
 
 TEST_P(LateStarts, AStopOfOneLeavesTheOther) {
-  for (int ms = 60; ms < 400; ms += 20) {
-    SCOPED_TRACE(ms);
-    loses(0.15);
-    const auto move = lab.send(Ask::kMoveTo, {"m01", "m03"}, {2500, 2500});
-    lab.run_for(ms * 1e-3);
+  at_any_time(Ask::kMoveTo, 2500, [&](std::int64_t move, int) {
     EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m03"})).result, "done");
     EXPECT_THAT(lab.wait(move).motor_results, ElementsAre("reached", "stopped"));
     EXPECT_EQ(lab.shaft_steps("m01"), 2500);
     EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01", "m03"}, {0, 0})).result, "reached");
-  }
+  });
   expect_each_edge_is_explained(true);
 }
 
 TEST_P(LateStarts, AnEmergencyStopEndsIt) {
-  for (int ms = 60; ms < 400; ms += 20) {
-    SCOPED_TRACE(ms);
-    loses(0.15);
-    const auto move = lab.send(Ask::kMoveBy, {"m01", "m03"}, {6000, 6000});
-    lab.run_for(ms * 1e-3);
+  at_any_time(Ask::kMoveBy, 6000, [&](std::int64_t move, int) {
     EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
     EXPECT_EQ(lab.wait(move).result, "stopped") << lab.last_reply(move).reason;
     const std::int64_t stands = lab.shaft_steps("m01");
     lab.run_for(1);
     EXPECT_EQ(lab.shaft_steps("m01"), stands);
     EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
-  }
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Manners, LateStarts,
