@@ -1,6 +1,7 @@
 #include "sim/pace.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace bushd::sim {
 namespace {
@@ -114,6 +115,12 @@ void Pace::start(TimeNs t_ns, bool positive) {
 }
 
 Jump Pace::step(TimeNs t_ns, bool positive) {
+  const Jump jump = judged(t_ns, positive);
+  if (std::exchange(begins_, false)) first_ns_ = t_ns;
+  return jump;
+}
+
+Jump Pace::judged(TimeNs t_ns, bool positive) {
   end_line_if_over(t_ns);
   if (count_ == 0) {
     start(t_ns, positive);

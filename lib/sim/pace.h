@@ -148,7 +148,10 @@ class Pace {
     return rules_->ramp_down_ns(k) + (told_ ? rules_->longest_told_ns() : 0);
   }
   TimeNs last_ns() const { return time_ns_[newest_]; }
-  // The first step since the last rest.
+  // A motion begins with the next step, though that may come sooner after the one before than a
+  // motor surely rests.
+  void begin() { begins_ = true; }
+  // The first step since the last rest, or of the motion that began since.
   TimeNs first_ns() const { return first_ns_; }
   // For a message, after a jump: how much too early (kTooFast, kTurned).
   TimeNs too_early_ns() const { return too_early_ns_; }
@@ -169,6 +172,7 @@ class Pace {
     if (on_line_ && now_ns > line_until_ns_) leave_line(true);
   }
 
+  Jump judged(TimeNs t_ns, bool positive);
   void start(TimeNs t_ns, bool positive);
   void remember(TimeNs t_ns);
   Jump come_to_rest();
@@ -185,6 +189,7 @@ class Pace {
   bool excused_ = false;    // from ramping down by its table, until it starts again
   std::size_t k_ = 0;       // the last exact delay was at least A(k)
   std::size_t cursor_ = 0;  // where the tolerance was found last
+  bool begins_ = false;     // with the next step
   TimeNs first_ns_ = 0;
   TimeNs exact_ns_ = 0;  // the last step's exact time is not before this
   TimeNs too_early_ns_ = 0;

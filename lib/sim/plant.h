@@ -23,6 +23,8 @@ class Plant final : public EdgeSink {
   // The motor at an output; `rules` outlive the plant. Steps at outputs without one are violations.
   void attach(std::size_t mcu, std::size_t output, const PaceRules& rules);
 
+  // A motion of the motor begins with its next step (sim/pace.h).
+  void begin(std::size_t mcu, std::size_t output) { motor_of_[mcu].at(output)->pace.begin(); }
   // The motor's next motion, from rest, is one of a line; and it rests after that (sim/pace.h).
   void begin_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output) {
     motor_of_[mcu].at(output)->pace.begin_on_line(now_ns);
@@ -67,7 +69,7 @@ class Plant final : public EdgeSink {
   const Rotor& rotor(std::size_t mcu, std::size_t output) const {
     return *motor_of_[mcu].at(output)->rotor;
   }
-  // The first pulse of its present or last movement.
+  // The first pulse of its present or last motion.
   TimeNs first_step_ns(std::size_t mcu, std::size_t output) const {
     return motor_of_[mcu].at(output)->pace.first_ns();
   }

@@ -234,9 +234,11 @@ void Crates::start(TimeNs now_ns) {
   if (!idle && (start_->moves || (start_->sure && !start_->stopped))) return;
   ++starts_;
   const bool unseen = flag_.value_or(true);  // whether it ends at once nobody can see
+  // Nor whether the module had heard that its motor was taken from it.
+  const bool unheard = start_ && start_->taken_ns == now_ns;
   if (idle || start_->sure) start_ = Start{};
   start_->since_ns = now_ns;
-  start_->sure = idle && !unseen;
+  start_->sure = idle && !unseen && !unheard;
   start_->stopped = false;
   start_->candidates.push_back(program());
   if (!unseen) flag_.reset();
@@ -263,6 +265,11 @@ void Crates::motion_ended(bool reached) {
   start_->reached = reached;
   // Nobody can see that L is raised again.
   if (flag_.value_or(false)) start_.reset();
+}
+
+void Crates::motor_taken(TimeNs now_ns) {
+  if (start_) start_->taken_ns = now_ns;
+  motion_ended(false);
 }
 
 void Crates::wait_since(TimeNs now_ns) {

@@ -55,6 +55,8 @@ class Crates {
   Accepted accepted(const std::string& motor);
   // It has ended.
   void motion_ended(bool reached);
+  // Its motor moves for somebody else.
+  void motor_taken(TimeNs now_ns);
   // It is paused, and may take longer.
   void wait_since(TimeNs now_ns);
 
@@ -76,6 +78,7 @@ class Crates {
     bool over = false;     // its motion has ended
     bool reached = false;  // by all of its steps
     bool cleared = false;  // statuses of it
+    TimeNs taken_ns = -1;  // when its motor was taken from it
     std::vector<ProgramMotion> candidates{};
   };
 

@@ -64,8 +64,13 @@ class Witness {
   void description(TimeNs now_ns, const bushd::api::Description& said);
   void log(const std::string& text);
   void lam(TimeNs now_ns, const bushd::api::CamacLam& lam);
-  // A run of this motor begins, one of a line or of its own, or has ended as this word says.
-  std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, bool on_line)> on_run;
+  // A run of this motor begins, one of a line or of its own, or has ended as this word says. One
+  // that has waited for the trigger may be under way already.
+  struct Run {
+    bool on_line;
+    bool waited;
+  };
+  std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, Run run)> on_run;
   std::function<void(TimeNs now_ns, std::size_t mcu, std::size_t output, const std::string& word)>
       on_run_end;
   // From time to time; the plant has come to now_ns.
@@ -256,8 +261,9 @@ class Witness {
   std::vector<std::int64_t> legs_to(const Motor& motor, const Request& request,
                                     std::int64_t target) const;
   void accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::size_t i);
+  bool waits_for_trigger(const Motor& motor) const;
   void forget_unbegun(Motor& motor);
-  void take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target);
+  void take_over(TimeNs now_ns, Motor& motor, const Key& by, std::optional<std::int64_t> target);
   void keep_within(TimeNs now_ns, Motor& motor);
   // Motors on one way, along a line or a path.
   void begin_way(Asked& asked);

@@ -93,9 +93,11 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   asked.stops.push_back(false);
   // The trigger begins it before anybody tells; what came before is over.
   if (request.ask == Ask::kArm && on_run && on_run_end) {
-    on_run(now_ns, motor.mcu, motor.output, request.line);
+    on_run(now_ns, motor.mcu, motor.output, {.on_line = request.line, .waited = false});
     if (request.line) on_run_end(now_ns, motor.mcu, motor.output, "stopped");
-    if (request.line) on_run(now_ns, motor.mcu, motor.output, true);
+    if (request.line) {
+      on_run(now_ns, motor.mcu, motor.output, {.on_line = true, .waited = false});
+    }
   }
   if (is_shutter(motor) && request.client != ShutterModel::kClient) shutter_.disturbed();
   if (request.ask == Ask::kHome) {
@@ -104,14 +106,15 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
     return positions_.may_be_homed(index_of(motor));
   }
   if (!motor.moves()) motor.range.reset();
-  take_over(motor, key, target);
+  take_over(now_ns, motor, key, target);
   keep_within(now_ns, motor);
   if (target) steps_commanded_ += static_cast<std::uint64_t>(std::abs(*target - stands));
 }
 
 // What a relative move counts from, as the plant counts.
 std::optional<std::int64_t> Witness::base_of(const Motor& motor) const {
-  if (!motor.move || (motor.over && !motor.pauses)) return plant_steps(motor);
+  const bool rests = motor.over && !motor.pauses && !motor.goes_on;
+  if (!motor.move || rests) return plant_steps(motor);
   // Nobody has told of several motors whether one that was to wait for the trigger still does. One
   // that rests may be paused, or have come to its end while others move.
   const Asked& asked = asked_.at(*motor.move);
@@ -135,19 +138,24 @@ std::vector<std::int64_t> Witness::legs_to(const Motor& motor, const Request& re
   return {target - backlash, target};
 }
 
+// Precondition: it has a move. As far as anybody has told.
+bool Witness::waits_for_trigger(const Motor& motor) const {
+  const Asked& asked = asked_.at(*motor.move);
+  return !asked.began[asked.index_of(motor.name)];
+}
+
 // One that has waited for the trigger in vain is at rest again before the others that waited with
 // it have ended, and with them the move.
 void Witness::forget_unbegun(Motor& motor) {
-  if (!motor.move) return;
-  const Asked& asked = asked_.at(*motor.move);
-  if (!asked.began[asked.index_of(motor.name)]) motor.move.reset();
+  if (motor.move && waits_for_trigger(motor)) motor.move.reset();
 }
 
 // A motor that moves belongs to the newest move; its part of the one before has ended.
-void Witness::take_over(Motor& motor, const Key& by, std::optional<std::int64_t> target) {
+void Witness::take_over(TimeNs now_ns, Motor& motor, const Key& by,
+                        std::optional<std::int64_t> target) {
   // What its module asks for itself replaces only what a daemon that is gone was asked for.
   const bool by_module = std::get<1>(by) == Crates::kBushd2Client;
-  if (is_of_module(motor) && !by_module) crates_.motion_ended(false);
+  if (is_of_module(motor) && !by_module) crates_.motor_taken(now_ns);
   if (motor.moves() || motor.stands_paused()) {
     Asked& before = asked_.at(*motor.move);
     before.end[before.index_of(motor.name)] = End{
@@ -307,7 +315,8 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
   if (begins && on_run) {
     const bool on_line =
         line.contains("line") || line.contains("path") || line.contains("trajectory");
-    on_run(now_ns, motor.mcu, motor.output, on_line);
+    const bool waited = motor.move && waits_for_trigger(motor);
+    on_run(now_ns, motor.mcu, motor.output, {.on_line = on_line, .waited = waited});
   }
   if (begins && motor.move) return run_begins(now_ns, motor);
   if (begins) return;
@@ -320,7 +329,7 @@ void Witness::move_log(TimeNs now_ns, const std::string& json_line) {
 void Witness::run_begins(TimeNs now_ns, Motor& motor) {
   Asked& asked = asked_.at(*motor.move);
   const std::size_t index = asked.index_of(motor.name);
-  const bool waited = !asked.began[index];
+  const bool waited = waits_for_trigger(motor);
   asked.began[index] = true;
   if (motor.over && !motor.goes_on) violated(now_ns, motor.name + " moves on after its end");
   motor.over = motor.goes_on = false;

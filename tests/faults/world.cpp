@@ -93,9 +93,10 @@ void World::add_motors() {
   for (const bushd::config::Motor& motor : config_.motors) {
     plant_.attach(motor.mcu.value, motor.output.value, *rules_[motor.group.value]);
   }
-  witness_.on_run = [this](TimeNs now_ns, std::size_t mcu, std::size_t output, bool on_line) {
+  witness_.on_run = [this](TimeNs now_ns, std::size_t mcu, std::size_t output, Witness::Run run) {
     plant_.forget_line(mcu, output);  // a daemon that was killed has not told
-    if (on_line) plant_.begin_on_line(now_ns, mcu, output);
+    if (!run.waited) plant_.begin(mcu, output);
+    if (run.on_line) plant_.begin_on_line(now_ns, mcu, output);
   };
   witness_.on_run_end = [this](TimeNs at_ns, std::size_t mcu, std::size_t output,
                                const std::string& word) {

@@ -176,6 +176,23 @@ TEST_P(PaceTest, TurnOnAPathTakesTheWholeRampDown) {
   EXPECT_EQ(ramps(false, kSteps), Jump::kStoppedDead);
 }
 
+// A short rest is as long as the first delay of a motion that goes on.
+TEST_P(PaceTest, AMotionThatIsSaidToBeginHasItsOwnFirstStep) {
+  EXPECT_EQ(pace.step(now, true), Jump::kNone);
+  const TimeNs before_ns = now;
+  for (const bool said : {false, true}) {
+    now += rules.delay_ns(0);
+    if (said) pace.begin();
+    EXPECT_EQ(pace.step(now, true), Jump::kNone);
+    EXPECT_EQ(pace.first_ns(), said ? now : before_ns);
+  }
+  pace.begin_on_line(now);
+  pace.begin();
+  now += rules.delay_ns(0);
+  EXPECT_EQ(pace.step(now, false), Jump::kNone);
+  EXPECT_EQ(pace.first_ns(), now) << "on a line, in the other direction";
+}
+
 // A master that was killed has not told that its line is over; another one starts from rest.
 TEST_P(PaceTest, AMotionBeginsWhereTheLineBeforeWasForgotten) {
   for (const bool positive : {true, false}) {
