@@ -374,8 +374,9 @@ void Witness::run_ended(TimeNs now_ns, Motor& motor, End end) {
       end.word == "reached" || end.word == "turned" || (end.word == "stopped" && exact);
   const auto& from = asked.from[index];
   // One that waited for the trigger and was stopped before its first step makes it in a streamed
-  // tick, up to one late.
-  if (planned && !asked.told[index] && from && end.stands != *from) {
+  // tick, up to one late. Another daemon may have moved it since.
+  const bool alone = second_ns_ < asked.since_ns;
+  if (planned && alone && !asked.told[index] && from && end.stands != *from) {
     asked.first_step_ns[index] = plant_.first_step_ns(motor.mcu, motor.output);
   }
   if (!late) asked.told[index] = true;
