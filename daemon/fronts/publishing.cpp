@@ -47,6 +47,8 @@ void Publishing::send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> pac
     if (log_) log_(std::string("not published, ") + word(topic) + ": " + packet.error().text());
     return;
   }
+  if (slot.packet) newest_bytes_ -= slot.packet->payload.size();
+  newest_bytes_ += packet->payload.size();
   slot.packet = std::move(*packet);
   for (Listener* listener : listeners_) listener->hear(topic, *slot.packet);
 }

@@ -57,6 +57,8 @@ class Publishing : public api::Publisher {
 
   // Description, state and health of everything, the state as it is now.
   std::vector<const lcm::Packet*> newest();
+  // Of these, as they are.
+  std::size_t newest_bytes() const { return newest_bytes_; }
   // The same to all listeners: now, or as soon as what was published for the last who asked has had
   // its time, kNewestUsPerMessage for each message and at most kNewestPeriodUs. All who ask
   // meanwhile are answered by one.
@@ -88,6 +90,7 @@ class Publishing : public api::Publisher {
   std::vector<Slot<api::StateSnapshot>> states_;  // by MCU
   std::vector<Slot<api::Description>> descriptions_;
   std::vector<Slot<api::HealthSnapshot>> healths_;  // by bus
+  std::size_t newest_bytes_ = 0;
   std::int64_t sequence_ = 0;
   std::int64_t dropped_ = 0;
   std::string trouble_;

@@ -38,7 +38,7 @@ api::McuHealth health_of(const Mcu& mcu) {
 
 }  // namespace
 
-api::HealthSnapshot HealthPublisher::health_of(const Bus& bus) const {
+api::HealthSnapshot HealthPublisher::health_of(std::int64_t now_us, const Bus& bus) const {
   const link::BusHealth& health = bus.master.bus_health();
   api::HealthSnapshot out;
   out.bus = bus.config.name;
@@ -47,6 +47,7 @@ api::HealthSnapshot HealthPublisher::health_of(const Bus& bus) const {
   out.crc_errors = health.crc_errors;
   out.stray_frames = health.stray_frames;
   out.recent_latency_us = health.latency.recent_us;
+  out.start_margin_us = bus.master.start_margin_us(now_us);
   for (std::size_t i = 0; i < health.latency.count.size(); ++i) {
     const bool last = i == link::Latency::kBoundsUs.size();
     out.latency.push_back({.below_us = last ? INT64_MAX : link::Latency::kBoundsUs[i],
@@ -61,7 +62,7 @@ api::HealthSnapshot HealthPublisher::health_of(const Bus& bus) const {
 void HealthPublisher::step(std::int64_t now_us) {
   if (now_us < due_us_) return;
   for (const BusId id : installation_.buses()) {
-    outputs_.publish(id, health_of(installation_[id]));
+    outputs_.publish(id, health_of(now_us, installation_[id]));
     link::SharedLine* line = installation_[id].offers.shared_line;
     if (line != nullptr) line->reset_low_water();
   }

@@ -20,7 +20,7 @@ class HealthPublisher {
   std::int64_t next_wake_us() const { return due_us_; }
 
  private:
-  api::HealthSnapshot health_of(const Bus& bus) const;
+  api::HealthSnapshot health_of(std::int64_t now_us, const Bus& bus) const;
 
   Installation& installation_;
   Outputs& outputs_;

@@ -249,6 +249,7 @@ struct HealthSnapshot {
   std::uint64_t crc_errors = 0;
   std::uint64_t stray_frames = 0;
   std::int64_t recent_latency_us = 0;
+  std::int64_t start_margin_us = 0;  // left to the program at a start; 0: the bus has none
   std::vector<Latency> latency{};
   std::vector<McuHealth> mcus{};
   static void fields(auto& self, auto& visit) {
@@ -258,6 +259,7 @@ struct HealthSnapshot {
     visit("crc_errors", self.crc_errors);
     visit("stray_frames", self.stray_frames);
     visit("recent_latency_us", self.recent_latency_us);
+    visit("start_margin_us", self.start_margin_us);
     visit.list("latency_count", "latency", self.latency);
     visit.list("mcu_count", "mcus", self.mcus);
   }

@@ -408,14 +408,15 @@ Result<Status> Client::status(std::chrono::milliseconds timeout) {
     if (Clock::now() >= deadline) return incomplete_status();
     if (Clock::now() >= next_send) {
       if (auto sent = link_->send(*packet); !sent) return fail(sent.error());
-      next_send = Clock::now() + options_.resend_every;
+      next_send = link_->loses() ? Clock::now() + options_.resend_every : deadline;
     }
     if (auto waited = wait(std::min(next_send, deadline)); !waited) return fail(waited.error());
   }
   // What is told here is not told again by next_state() and next_health().
   state_heard_ = false;
   health_heard_ = false;
-  collector_.expect_no_gaps();
+  // Where nothing is lost, what is published before this client subscribes is not for it.
+  if (link_->loses()) collector_.expect_no_gaps();
   return collector_.status();
 }
 

@@ -13,7 +13,6 @@
 
 #include "client/link.h"
 #include "control/packet.h"
-#include "control/server.h"
 
 namespace bushd::client {
 namespace {
@@ -22,8 +21,6 @@ constexpr int kSendWithinMs = 3000;
 constexpr int kEndsWithinMs = 200;
 constexpr timeval kConnectWithin{.tv_sec = 3, .tv_usec = 0};
 constexpr int kPacketsAtOnce = 256;
-// More than any answer but a state.
-constexpr std::size_t kMuch = 128 * 1024;
 
 // Precondition: it fits.
 sockaddr_un address_of(const std::string& path) {
@@ -82,18 +79,8 @@ bool is_served(const std::string& path) {
   return served;
 }
 
-// What the kernel keeps of what was sent is read to its end. `bytes`: so many have come since this
-// client has asked for something.
-std::string why_closed(const std::string& path, std::size_t bytes) {
+std::string why_closed(const std::string& path) {
   if (!is_served(path)) return fmt::format("the daemon has ended; it was at {}", path);
-  if (bytes >= kMuch) {
-    return fmt::format(
-        "bushd has closed this connection at {} behind {} KB of its answer: the rest was more than "
-        "the "
-        "{} KB that it keeps for a client, as the state of some thousands of motors is. "
-        "'bushctl --lcm status' has no such bound",
-        path, bytes >> 10, control::Limits{}.unread_bytes >> 10);
-  }
   return fmt::format(
       "bushd has closed this connection at {}: too many clients are connected, this one did not "
       "read what it was sent, or the daemon has restarted; its log tells why",
@@ -109,7 +96,6 @@ class SocketLink : public Link {
   int fd() const override { return fd_; }
 
   Result<void> send(const lcm::Packet& packet) override {
-    bytes_since_sent_ = 0;
     const auto bytes = control::packet_of(packet);
     // A daemon that is busy takes it a moment later.
     pollfd polled{.fd = fd_, .events = POLLOUT, .revents = 0};
@@ -129,8 +115,7 @@ class SocketLink : public Link {
       header.msg_iovlen = 1;
       const ssize_t n = ::recvmsg(fd_, &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
       if (n < 0 && (errno == EAGAIN || errno == EINTR)) return {};
-      if (n <= 0) return fail(why_closed(path_, bytes_since_sent_));
-      bytes_since_sent_ += static_cast<std::size_t>(n);
+      if (n <= 0) return fail(why_closed(path_));
       if ((header.msg_flags & MSG_TRUNC) != 0) continue;
       const auto view = control::view_of({buffer_.data(), static_cast<std::size_t>(n)});
       if (!view) continue;
@@ -149,7 +134,6 @@ class SocketLink : public Link {
  private:
   int fd_;
   std::string path_;
-  std::size_t bytes_since_sent_ = 0;
   std::vector<std::uint8_t> buffer_;
 };
 

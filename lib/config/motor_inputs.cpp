@@ -219,13 +219,15 @@ Result<void> check_level(const Loading& loading, std::size_t index, std::size_t 
 
 Result<void> check_motor_inputs(const Loading& loading) {
   const std::vector<Motor>& motors = loading.config.motors;
+  std::vector<std::vector<std::size_t>> of_mcu(loading.config.mcus.size());
   for (std::size_t i = 0; i < motors.size(); ++i) {
-    for (std::size_t before = 0; before < i; ++before) {
-      if (motors[before].mcu != motors[i].mcu) continue;
+    std::vector<std::size_t>& others = of_mcu[motors[i].mcu.value];
+    for (const std::size_t before : others) {
       if (auto checked = check_pair(loading, i, before); !checked) return checked;
       if (auto checked = check_level(loading, i, before); !checked) return checked;
       if (auto checked = check_level(loading, before, i); !checked) return checked;
     }
+    others.push_back(i);
   }
   return {};
 }

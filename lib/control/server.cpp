@@ -306,6 +306,11 @@ void Server::send(Connection connection, std::shared_ptr<const std::vector<std::
   while (unread_bytes_ > limits_.unread_bytes_in_all) relieve();
 }
 
+void Server::set_unread_limits(std::size_t bytes, std::size_t bytes_in_all) {
+  limits_.unread_bytes = bytes;
+  limits_.unread_bytes_in_all = bytes_in_all;
+}
+
 void Server::close_deaf(Connection connection, Peer& peer) {
   note(text_of(peer.who) + " does not read: " + std::to_string(peer.unread_bytes) +
        " bytes wait for it; its connection is closed");

@@ -78,6 +78,9 @@ class Server {
   // Packets arrive whole and in order, or the connection is closed. Of one that has gone it does
   // nothing. Cheap: a packet made once may be sent to many.
   void send(Connection connection, std::shared_ptr<const std::vector<std::uint8_t>> packet);
+  // What a client may leave unread, and all of them, instead of what the limits say: where one
+  // answer is larger, it has to have time to read it.
+  void set_unread_limits(std::size_t bytes, std::size_t bytes_in_all);
   // Counts a packet that meant nothing.
   void reject(Connection connection);
 

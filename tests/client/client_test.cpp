@@ -497,6 +497,23 @@ TEST_F(ClientTest, StatusIsAskedForAgainUntilItIsComplete) {
   EXPECT_GE(status_asked_, 2);
 }
 
+// What a daemon of many MCUs publishes before this client subscribes was not for it.
+TEST_F(ClientTest, NothingIsLostOnALinkThatLosesNothing) {
+  for (const bool loses : {true, false}) {
+    open(loses, std::chrono::minutes(5));
+    on_status_ = [this] {
+      state(1);
+      description(2);
+      health(3);
+    };
+    ASSERT_TRUE(client_->status(milliseconds(60'000)));
+    state(20);
+    const auto status = client_->next_state(milliseconds(60'000));
+    ASSERT_TRUE(status) << status.error().text();
+    EXPECT_EQ(status->lost, loses ? 16u : 0u);
+  }
+}
+
 TEST_F(ClientTest, StatusThatNeverCompletesIsAnError) {
   state(1, 0, 2);
   EXPECT_FALSE(client_->status(milliseconds(1)));

@@ -80,29 +80,6 @@ TEST_F(OpenTest, ASocketThatIsLeftIsNoDaemon) {
                     HasSubstr("bushd has ended"), HasSubstr("systemctl start bushd")));
 }
 
-TEST_F(OpenTest, AnAnswerThatIsTooLongForAClientIsToldAsThat) {
-  const int listener = bound_socket();
-  ASSERT_EQ(::listen(listener, 8), 0);
-  auto link = open_socket(path_.string());
-  ASSERT_TRUE(link) << link.error().text();
-  const int daemon = ::accept(listener, nullptr, nullptr);
-  const auto ended = [&](std::size_t bytes) {
-    const std::vector<std::uint8_t> packet(8 * 1024, 'x');
-    Result<void> handled;
-    for (std::size_t sent = 0; sent < bytes && handled; sent += packet.size()) {
-      EXPECT_EQ(::send(daemon, packet.data(), packet.size(), 0), 8 * 1024);
-      handled = (*link)->handle([](const lcm::DaemonMessage&) {});
-    }
-    ::close(daemon);
-    handled = (*link)->handle([](const lcm::DaemonMessage&) {});
-    return handled ? "it goes on" : handled.error().text();
-  };
-  EXPECT_THAT(ended(1 << 20),
-              AllOf(HasSubstr("behind 1024 KB of its answer"), HasSubstr("1024 KB that it keeps"),
-                    HasSubstr("'bushctl --lcm status'"), Not(HasSubstr("has ended"))));
-  ::close(listener);
-}
-
 TEST_F(OpenTest, ADaemonThatHangsIsNotWaitedForForEver) {
   const int listener = bound_socket();
   ASSERT_EQ(::listen(listener, 0), 0);

@@ -281,9 +281,13 @@ class SocketFrontTest : public FrontsTest {
  protected:
   SocketFrontTest() {
     server_ = std::move(*control::Server::open(path_, ""));
-    front_ = std::make_unique<SocketFront>(*server_, kRunOfFronts, reception_, publishing_,
+    serve(publishing_);
+  }
+  void serve(Publishing& publishing) {
+    front_.reset();
+    front_ = std::make_unique<SocketFront>(*server_, kRunOfFronts, reception_, publishing,
                                            [] { return std::int64_t{1}; });
-    publishing_.add(*front_);
+    publishing.add(*front_);
   }
   void settle() {
     while (readable(server_->fd()) || !reception_.idle()) {
@@ -306,6 +310,17 @@ class SocketFrontTest : public FrontsTest {
     client.heard.clear();
     client.ended =
         !client.link->handle([&client](const auto& message) { client.heard.push_back(message); });
+  }
+
+  // How many messages, until there are no more.
+  std::size_t hear_all(Client& client) {
+    std::size_t messages = 0;
+    do {
+      listen(client);
+      messages += client.heard.size();
+      settle();
+    } while (!client.heard.empty());
+    return messages;
   }
 
   test::TempDirectory directory_;
@@ -345,6 +360,47 @@ TEST_F(SocketFrontTest, AStatusGoesToWhoAsks) {
   EXPECT_EQ(asks.heard.size(), 4u);
   listen(quiet);
   EXPECT_TRUE(quiet.heard.empty());
+}
+
+// 16384 motors: all is told at once, who asked reads it afterwards, and who hears what is published
+// too. Who does not read is closed, as where there are few.
+TEST_F(SocketFrontTest, AStatusOfThousandsOfMotorsIsWhole) {
+  constexpr std::size_t kMcus = 1024;
+  Publishing many(
+      kRunOfFronts, kMcus, 1,
+      {.now_us = [this] { return now_us_; }, .unix_us = [] { return std::int64_t{1}; }});
+  serve(many);
+  Client asks = connect();
+  Client watches = connect();
+  const Client deaf = connect();
+  say(watches, lcm::encode(lcm::Subscription{.state = true, .description = true}));
+  EXPECT_TRUE(deaf.link->send(*lcm::encode(lcm::Subscription{.state = true})));
+  settle();
+  const std::string name(31, 'm');
+  const api::StateSnapshot state{
+      .bus = "hall", .mcu = "hall:1", .motors = std::vector<api::MotorState>(16, {.name = name})};
+  const api::Description description{
+      .bus = "hall",
+      .mcu = "hall:1",
+      .motors = std::vector<api::MotorDescription>(16, {.name = name, .group = name})};
+  for (std::size_t mcu = 0; mcu < kMcus; ++mcu) {
+    many.publish(McuId{mcu}, state);
+    many.publish(McuId{mcu}, description);
+  }
+  EXPECT_GT(many.newest_bytes(), 2 * control::Limits().unread_bytes);
+  EXPECT_TRUE(
+      asks.link->send(*lcm::encode(0, {.client_id = "scan", .number = 4}, lcm::GetStatus{})));
+  settle();
+  EXPECT_EQ(hear_all(watches), 2 * kMcus);
+  EXPECT_EQ(hear_all(asks), 2 * kMcus + 1);
+  EXPECT_EQ(server_->connections(), 3u);
+  for (int i = 0; i < 10; ++i) {
+    now_us_ += Publishing::kRestingPeriodUs;
+    for (std::size_t mcu = 0; mcu < kMcus; ++mcu) many.publish(McuId{mcu}, state);
+    EXPECT_EQ(hear_all(watches), kMcus);
+  }
+  EXPECT_EQ(server_->connections(), 2u);
+  front_.reset();
 }
 
 TEST_F(SocketFrontTest, AConnectionKeepsItsName) {

@@ -474,6 +474,7 @@ TEST(FieldNames, Health) {
                                         .crc_errors = 6,
                                         .stray_frames = 7,
                                         .recent_latency_us = 8,
+                                        .start_margin_us = 15,
                                         .latency = {{.below_us = 9, .answers = 10}},
                                         .mcus = {{.mcu = "m",
                                                   .address = 1,
@@ -500,6 +501,7 @@ TEST(FieldNames, Health) {
   EXPECT_EQ(health.crc_errors, 6);
   EXPECT_EQ(health.stray_frames, 7);
   EXPECT_EQ(health.recent_latency_us, 8);
+  EXPECT_EQ(health.start_margin_us, 15);
   EXPECT_EQ(health.latency.at(0).below_us, 9);
   EXPECT_EQ(health.latency.at(0).answers, 10);
   const mcu_health_t& mcu = health.mcus.at(0);

@@ -32,12 +32,15 @@ std::string bound(std::int64_t below_us) {
 
 std::vector<std::string> bus_lines(const Healths& health) {
   using enum Align;
-  Grid grid({kLeft, kRight, kRight, kRight, kLeft});
-  grid.row({"BUS", "CRC ERRORS", "STRAY", "LATENCY MS", "PORT"});
+  const auto ms = [](std::int64_t us) {
+    return fmt::format("{:.1f}", static_cast<double>(us) / 1000);
+  };
+  Grid grid({kLeft, kRight, kRight, kRight, kRight, kLeft});
+  grid.row({"BUS", "CRC ERRORS", "STRAY", "LATENCY MS", "START MARGIN MS", "PORT"});
   for (const api::HealthSnapshot& bus : health) {
     grid.row({bushd::printable(bus.bus), fmt::to_string(bus.crc_errors),
-              fmt::to_string(bus.stray_frames),
-              fmt::format("{:.1f}", static_cast<double>(bus.recent_latency_us) / 1000),
+              fmt::to_string(bus.stray_frames), ms(bus.recent_latency_us),
+              bus.start_margin_us == 0 ? "-" : ms(bus.start_margin_us),
               bushd::printable(bus.port_state) +
                   (bus.two_masters ? "; another master talks on the bus" : "")});
   }

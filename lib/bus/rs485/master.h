@@ -96,6 +96,9 @@ class Rs485Master final : public BusMaster,
   Tick earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
                              bool by_table) const override;
   void start_missed() override { start_margin_.missed(stepped_us_); }
+  std::int64_t start_margin_us(std::int64_t now_us) const override {
+    return start_margin_.margin_us(now_us);
+  }
   Tick earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const override;
   Tick earliest_retarget(std::int64_t now_us, std::span<const ToReplace> together,
                          Tick start) const override;

@@ -22,7 +22,6 @@ PACKETS_AT_ONCE = 256
 CONNECT_WITHIN_S = 3
 ENDS_WITHIN_MS = 200
 IP_MULTICAST_ALL = 49  # of Linux; the module socket does not name it
-MUCH = 128 * 1024  # bytes; more than any answer but a state
 
 
 class LinkEnded(Exception):
@@ -50,7 +49,6 @@ class SocketLink:
 
     def __init__(self, path: str) -> None:
         self._path = path
-        self._received = 0  # bytes, since something was asked for
         self.remedy = f"bushd does not answer at {path}; its log may tell why"
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # connect() waits for room among those that a daemon has not taken yet.
@@ -68,7 +66,6 @@ class SocketLink:
         return self._socket.fileno()
 
     def send(self, channel: str, payload: bytes) -> None:
-        self._received = 0
         try:
             self._socket.send(channel.encode("ascii") + b"\0" + payload)
         except (BlockingIOError, InterruptedError):
@@ -85,8 +82,7 @@ class SocketLink:
             except OSError:
                 packet, flags = b"", 0
             if not packet:
-                raise LinkEnded(why_closed(self._path, self._received))
-            self._received += len(packet)
+                raise LinkEnded(why_closed(self._path))
             name, nul, payload = packet.partition(b"\0")
             if nul and 0 < len(name) <= MAX_CHANNEL and name.isascii() and not flags & socket.MSG_TRUNC:
                 yield name.decode("ascii"), payload
@@ -95,10 +91,8 @@ class SocketLink:
         self._socket.close()
 
 
-def why_closed(path: str, received: int = 0) -> str:
+def why_closed(path: str) -> str:
     """The connection is over; whether somebody listens there still, and goes on, tells why.
-
-    `received`: so many bytes have come since something was asked for.
 
     A process that ends closes its descriptors one after the other, and what waits at the socket with it.
     """
@@ -111,11 +105,6 @@ def why_closed(path: str, received: int = 0) -> str:
             ended = any(event & select.POLLHUP for _, event in poll.poll(ENDS_WITHIN_MS))
         if ended:
             return f"the daemon has ended; it was at {path}"
-    if received >= MUCH:
-        return (
-            f"bushd has closed this connection at {path} behind {received >> 10} KB of its answer: the rest was more than it "
-            "keeps for a client, as the state of some thousands of motors is. LCM has no such bound"
-        )
     return (
         f"bushd has closed this connection at {path}: too many clients are connected, this one did not read what it "
         "was sent, or the daemon has restarted; its log tells why"

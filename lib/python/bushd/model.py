@@ -256,6 +256,7 @@ class BusHealth:
     crc_errors: int
     stray_frames: int
     recent_latency_us: int
+    start_margin_us: int
     latency: tuple[tuple[int | None, int], ...]  # (below so many us, answers); None: above all bounds
     mcus: tuple[McuHealth, ...]
 

@@ -228,12 +228,14 @@ TEST_P(Tables, AMissedStartLeavesMoreTimeForTheNext) {
     bus.master->start_missed();
     bus.master->start_missed();  // another motor, at the same time
   }
+  EXPECT_EQ(bus.master->start_margin_us(bus.now_us), link::StartMargin::kMostUs);
   // The clock's part of a tick is cut off at both times.
   EXPECT_GE(
       lead() - before,
       (link::StartMargin::kMostUs - link::StartMargin::kLeastUs) * 1000 / FakeBus::kTickNs - 1);
   bus.run_for(60'000'000);
   EXPECT_LE(lead(), before + 1) << "forgotten";
+  EXPECT_EQ(bus.master->start_margin_us(bus.now_us), link::StartMargin::kLeastUs);
 }
 
 TEST_P(Tables, WholeMoveThatIsTooLateIsTold) {
