@@ -57,7 +57,7 @@ class Publishing : public api::Publisher {
 
   // Description, state and health of everything, the state as it is now.
   std::vector<const lcm::Packet*> newest();
-  // Of these, as they are.
+  // Payload bytes of all packets that newest() would give, without a refresh.
   std::size_t newest_bytes() const { return newest_bytes_; }
   // The same to all listeners: now, or as soon as what was published for the last who asked has had
   // its time, kNewestUsPerMessage for each message and at most kNewestPeriodUs. All who ask

@@ -85,7 +85,7 @@ void SocketFront::on_packet(Connection connection, control::View packet,
     on_hello(connection, *hello);
   } else if (std::holds_alternative<lcm::GetStatus>(message->content)) {
     const std::vector<const lcm::Packet*> all = publishing_.newest();
-    leave_time_to_read();
+    server_.set_largest_answer(publishing_.newest_bytes());
     for (const lcm::Packet* newest : all) send(connection, *newest);
     answer(connection, id.client_id, id.number,
            api::Completed{.outcome = api::Outcome::kDone, .reason = "told", .detail = {}});
@@ -101,17 +101,6 @@ void SocketFront::on_packet(Connection connection, control::View packet,
                             .latest_ns = sent.latest_ns,
                             .stream = -static_cast<std::int64_t>(connection)});
   }
-}
-
-// Whoever asks for everything, or hears it all twice a second, gets as much at once as there is:
-// with thousands of motors megabytes.
-void SocketFront::leave_time_to_read() {
-  constexpr control::Limits kOfFew;
-  constexpr std::size_t kAnswersUnread = 2;
-  constexpr std::size_t kAnswersUnreadInAll = 16;
-  const std::size_t bytes = publishing_.newest_bytes();
-  server_.set_unread_limits(kOfFew.unread_bytes + kAnswersUnread * bytes,
-                            kOfFew.unread_bytes_in_all + kAnswersUnreadInAll * bytes);
 }
 
 void SocketFront::on_closed(Connection connection) {
@@ -160,7 +149,7 @@ void SocketFront::send(Connection connection, const lcm::Packet& packet) {
 }
 
 void SocketFront::hear(Topic topic, const lcm::Packet& packet) {
-  leave_time_to_read();
+  server_.set_largest_answer(publishing_.newest_bytes());
   std::shared_ptr<const std::vector<std::uint8_t>> shared;  // made once for all
   for (const auto& [connection, client] : clients_) {
     const bool wanted = topic == Topic::kState         ? client.subscription.state

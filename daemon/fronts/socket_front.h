@@ -49,7 +49,6 @@ class SocketFront : public Listener {
 
   void on_packet(Connection connection, control::View packet, const control::Server::Sent& sent);
   void on_closed(Connection connection);
-  void leave_time_to_read();
   void seen(bool in_place);
   void on_hello(Connection connection, const lcm::Hello& hello);
   bool known(Connection connection, Client& client, const lcm::RequestId& id);

@@ -249,7 +249,7 @@ struct HealthSnapshot {
   std::uint64_t crc_errors = 0;
   std::uint64_t stray_frames = 0;
   std::int64_t recent_latency_us = 0;
-  std::int64_t start_margin_us = 0;  // left to the program at a start; 0: the bus has none
+  std::int64_t start_margin_us = 0;  // left to the daemon at a start; 0: a bus without MCUs
   std::vector<Latency> latency{};
   std::vector<McuHealth> mcus{};
   static void fields(auto& self, auto& visit) {

@@ -415,7 +415,7 @@ Result<Status> Client::status(std::chrono::milliseconds timeout) {
   // What is told here is not told again by next_state() and next_health().
   state_heard_ = false;
   health_heard_ = false;
-  // Where nothing is lost, what is published before this client subscribes is not for it.
+  // Over a link that loses nothing a gap is what was published before this client had subscribed.
   if (link_->loses()) collector_.expect_no_gaps();
   return collector_.status();
 }

@@ -294,21 +294,17 @@ void Server::send(Connection connection, std::shared_ptr<const std::vector<std::
   if (found == peers_.end() || found->second.doomed) return;
   Peer& peer = found->second;
   const bool waited = !peer.unread.empty();
+  bytes_left_ -= std::min(bytes_left_, packet->size());
   peer.unread_bytes += packet->size();
   unread_bytes_ += packet->size();
   peer.unread.push_back(std::move(packet));
   // It may have read since. If it has left, what it has sent before, a stop perhaps, is still to be
   // read; then it is closed.
-  const bool too_much = peer.unread_bytes > limits_.unread_bytes;
+  const bool too_much = peer.unread_bytes > most_unread();
   if ((!waited || too_much) && !flush(peer)) return forget_unread(peer);
-  if (peer.unread_bytes > limits_.unread_bytes) return close_deaf(connection, peer);
+  if (peer.unread_bytes > most_unread()) return close_deaf(connection, peer);
   if (!waited && !peer.unread.empty()) watch(connection, peer, EPOLL_CTL_MOD);
-  while (unread_bytes_ > limits_.unread_bytes_in_all) relieve();
-}
-
-void Server::set_unread_limits(std::size_t bytes, std::size_t bytes_in_all) {
-  limits_.unread_bytes = bytes;
-  limits_.unread_bytes_in_all = bytes_in_all;
+  while (unread_bytes_ > most_unread_in_all()) relieve();
 }
 
 void Server::close_deaf(Connection connection, Peer& peer) {

@@ -34,8 +34,9 @@ struct Limits {
   std::size_t unread_bytes_in_all = 32 * 1024 * 1024;
   // Packets that were none, before the connection is closed.
   unsigned bad_packets = 16;
-  // Read in one call of handle(), a little more for each packet, so that it takes less than a
-  // millisecond however many connections talk. At least one packet is; connections take turns.
+  // Read in one call of handle(), a little more for each packet, and what is sent meanwhile counts,
+  // so that it takes less than a millisecond however many connections talk. At least one packet is,
+  // however large the answer; connections take turns.
   std::size_t bytes_at_once = 64 * 1024;
 };
 
@@ -78,9 +79,9 @@ class Server {
   // Packets arrive whole and in order, or the connection is closed. Of one that has gone it does
   // nothing. Cheap: a packet made once may be sent to many.
   void send(Connection connection, std::shared_ptr<const std::vector<std::uint8_t>> packet);
-  // What a client may leave unread, and all of them, instead of what the limits say: where one
-  // answer is larger, it has to have time to read it.
-  void set_unread_limits(std::size_t bytes, std::size_t bytes_in_all);
+  // The largest answer that one request gets, in bytes: a client may leave two of them unread
+  // beside what the limits say, and all clients sixteen. Takes effect with the next send().
+  void set_largest_answer(std::size_t bytes) { largest_answer_ = bytes; }
   // Counts a packet that meant nothing.
   void reject(Connection connection);
 
@@ -96,6 +97,9 @@ class Server {
   std::size_t unread_bytes() const { return unread_bytes_; }
 
  private:
+  static constexpr std::size_t kAnswersUnread = 2;
+  static constexpr std::size_t kAnswersUnreadInAll = 16;
+
   struct Peer {
     int fd;
     api::Credentials who;
@@ -127,6 +131,12 @@ class Server {
   void close_deaf(Connection connection, Peer& peer);
   // Less is unread of all: sends to who has most unread, or closes it.
   void relieve();
+  std::size_t most_unread() const {
+    return limits_.unread_bytes + kAnswersUnread * largest_answer_;
+  }
+  std::size_t most_unread_in_all() const {
+    return limits_.unread_bytes_in_all + kAnswersUnreadInAll * largest_answer_;
+  }
   void note(const std::string& text) const;
   void doom(Connection connection, Peer& peer);
   void close(Connection connection);
@@ -142,9 +152,10 @@ class Server {
   std::map<Connection, Peer> peers_;
   std::vector<Connection> doomed_;
   std::size_t unread_bytes_ = 0;
+  std::size_t largest_answer_ = 0;
   std::uint64_t dropped_ = 0;
   std::vector<std::uint8_t> buffer_;
-  std::size_t bytes_left_ = 0;   // of those that this call of handle() reads
+  std::size_t bytes_left_ = 0;   // of those that this call of handle() reads and sends
   Connection turn_ = 0;          // who was served last, but for what is urgent
   std::int64_t nobody_came_ns_;  // until then all who wanted to connect had been accepted
 };

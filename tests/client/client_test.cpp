@@ -497,8 +497,14 @@ TEST_F(ClientTest, StatusIsAskedForAgainUntilItIsComplete) {
   EXPECT_GE(status_asked_, 2);
 }
 
+TEST_F(ClientTest, StatusIsAskedForOnceOverALinkThatLosesNothing) {
+  open(false, std::chrono::minutes(5));
+  EXPECT_FALSE(client_->status(milliseconds(50)));  // some times `resend_every`
+  EXPECT_EQ(status_asked_, 1);
+}
+
 // What a daemon of many MCUs publishes before this client subscribes was not for it.
-TEST_F(ClientTest, NothingIsLostOnALinkThatLosesNothing) {
+TEST_F(ClientTest, AGapBehindAStatusIsALossOnlyWhereTheLinkLoses) {
   for (const bool loses : {true, false}) {
     open(loses, std::chrono::minutes(5));
     on_status_ = [this] {

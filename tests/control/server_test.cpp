@@ -262,6 +262,21 @@ TEST_F(ServerTest, WhoNeverReadsIsDropped) {
   EXPECT_EQ(other.read(), bytes("STATE"));
 }
 
+TEST_F(ServerTest, TwoLargestAnswersMayBeUnreadBesideTheLimit) {
+  open({.unread_bytes = 100'000});
+  const Peer slow(path_);
+  settle();
+  server_->set_largest_answer(200'000);
+  for (int i = 0; i < 120; ++i) send(last_, bytes("STATE", 4000));
+  settle();
+  EXPECT_EQ(server_->connections(), 1u);
+  EXPECT_GT(server_->unread_bytes(), 100'000u);
+  server_->set_largest_answer(0);
+  send(last_, bytes("STATE", 4000));
+  settle();
+  EXPECT_EQ(server_->connections(), 0u);
+}
+
 TEST_F(ServerTest, WhoReadsLateGetsEverything) {
   open();
   const Peer slow(path_);

@@ -283,6 +283,7 @@ class SocketFrontTest : public FrontsTest {
     server_ = std::move(*control::Server::open(path_, ""));
     serve(publishing_);
   }
+  // From now on nothing else may publish: what is served then has a front that is gone.
   void serve(Publishing& publishing) {
     front_.reset();
     front_ = std::make_unique<SocketFront>(*server_, kRunOfFronts, reception_, publishing,
@@ -372,7 +373,7 @@ TEST_F(SocketFrontTest, AStatusOfThousandsOfMotorsIsWhole) {
   serve(many);
   Client asks = connect();
   Client watches = connect();
-  const Client deaf = connect();
+  Client deaf = connect();
   say(watches, lcm::encode(lcm::Subscription{.state = true, .description = true}));
   EXPECT_TRUE(deaf.link->send(*lcm::encode(lcm::Subscription{.state = true})));
   settle();
@@ -400,7 +401,9 @@ TEST_F(SocketFrontTest, AStatusOfThousandsOfMotorsIsWhole) {
     EXPECT_EQ(hear_all(watches), kMcus);
   }
   EXPECT_EQ(server_->connections(), 2u);
-  front_.reset();
+  hear_all(deaf);
+  EXPECT_TRUE(deaf.ended);
+  front_.reset();  // before what it serves
 }
 
 TEST_F(SocketFrontTest, AConnectionKeepsItsName) {

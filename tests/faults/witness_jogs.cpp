@@ -194,7 +194,8 @@ void Witness::jogged(TimeNs now_ns, const Asked& asked, const api::Completed& co
                                         result.motor, word(result.outcome), result.position_steps));
   }
   // One that is late may be ended before it begins anew.
-  const bool planned = end->word == "reached" || end->word == "stopped" || end->word == "late";
+  const bool late = end->word == "late" && result.outcome != bushd::api::Outcome::kReached;
+  const bool planned = end->word == "reached" || end->word == "stopped" || late;
   if (!planned && end->word != word(result.outcome)) {
     violated(now_ns, result.motor + " ended by " + end->word + ": " + completed.reason);
   }

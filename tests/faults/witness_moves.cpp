@@ -117,9 +117,9 @@ std::optional<std::int64_t> Witness::base_of(const Motor& motor) const {
   if (!motor.move || rests) return plant_steps(motor);
   // Nobody has told of several motors whether one that was to wait for the trigger still does. One
   // that rests may be paused, or have come to its end while others move.
-  const Asked& asked = asked_.at(*motor.move);
-  const bool begun = asked.began.empty() || asked.began[asked.index_of(motor.name)];
-  if (asked.request.motors.size() > 1 && (motor.over || !begun)) return std::nullopt;
+  const bool waits = waits_for_trigger(motor);
+  const bool of_several = asked_.at(*motor.move).request.motors.size() > 1;
+  if (of_several && (motor.over || waits)) return std::nullopt;
   return motor.target;
 }
 
@@ -141,7 +141,7 @@ std::vector<std::int64_t> Witness::legs_to(const Motor& motor, const Request& re
 // Precondition: it has a move. As far as anybody has told.
 bool Witness::waits_for_trigger(const Motor& motor) const {
   const Asked& asked = asked_.at(*motor.move);
-  return !asked.began[asked.index_of(motor.name)];
+  return !asked.began.empty() && !asked.began[asked.index_of(motor.name)];
 }
 
 // One that has waited for the trigger in vain is at rest again before the others that waited with

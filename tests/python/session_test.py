@@ -61,7 +61,8 @@ class Daemon:
         self.sent = []  # (channel, message)
 
     def poll(self):
-        kinds = {"MOVE": messages.move_t, "STOP": messages.stop_t, "HELLO": messages.hello_t}
+        kinds = {"MOVE": messages.move_t, "STOP": messages.stop_t, "HELLO": messages.hello_t,
+                 "GET_STATUS": messages.get_status_t}
         packets = self.session.poll(self.now)
         self.sent += [(channel, kinds[channel].decode(payload)) for channel, payload in packets]
         return [channel for channel, _ in packets]
@@ -121,6 +122,13 @@ class OverASocket(unittest.TestCase):
         self.assertEqual((exchange.outcome, exchange.reason), (Outcome.REACHED, "there"))
         self.assertEqual(exchange.detail.motors[0].position, 1.0)
         self.assertIsNone(self.daemon.session.wake_at())
+
+    def test_a_status_is_asked_for_once(self):
+        query = self.daemon.session.begin_status(self.daemon.now, 5.0)
+        self.assertEqual(self.daemon.wait(4.9), ["GET_STATUS"])
+        self.assertFalse(query.over)
+        self.assertEqual(self.daemon.wait(0.2), [])
+        self.assertIsInstance(query.error, NoDaemon)
 
     def test_a_daemon_that_does_not_answer_is_given_up(self):
         exchange = self.daemon.begin()

@@ -79,8 +79,8 @@ class BusMaster {
   }
   // A motion has missed its start: what begins at once next gets more time.
   virtual void start_missed() {}
-  // As long as what begins at once leaves the program now, beside what the line and its adapter
-  // take; 0: nothing begins at once here.
+  // Time that a start by earliest_common_start leaves this program, beyond what the line and its
+  // adapter take; 0: this bus has no such starts.
   virtual std::int64_t start_margin_us(std::int64_t /*now_us*/) const { return 0; }
   // Earliest tick from which replacements can take effect that are asked for together, one for each
   // MCU, in the order of MCUs: a stop of many motors takes the line longer than that of one.

@@ -307,7 +307,7 @@ class Session:
             if now >= query.give_up and not query.over:
                 query.error = self._no_status(query, now)
             elif now >= query.next_send and not query.over:
-                query.next_send = now + self._timing.resend_every_s
+                query.next_send = now + self._timing.resend_every_s if self.loses else query.give_up
                 packets.append(query.packet)
         self._exchanges = self._open()
         self._queries = [query for query in self._queries if not query.over]

@@ -30,6 +30,13 @@ TEST(HealthView, TableHasBusesLatenciesAndMcus) {
   EXPECT_THAT(lines.back(), testing::AllOf(HasSubstr("hall:2"), HasSubstr("117")));
 }
 
+TEST(HealthView, ABusWithoutStartsAtOnceHasNoMargin) {
+  auto status = health();
+  EXPECT_THAT(health_table(status)[1], HasSubstr("  -  open"));
+  status.healths[0].snapshot.start_margin_us = 2'000;
+  EXPECT_THAT(health_table(status)[1], HasSubstr("  2.0  open"));
+}
+
 TEST(HealthView, WhatIsNotThereIsNullInJson) {
   const auto bus = nlohmann::json::parse(health_json(health()))["buses"][0];
   EXPECT_TRUE(bus["mcus"][0]["low_water_ticks"].is_null());
