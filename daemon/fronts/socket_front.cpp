@@ -84,9 +84,7 @@ void SocketFront::on_packet(Connection connection, control::View packet,
   if (const auto* hello = std::get_if<lcm::Hello>(&message->content)) {
     on_hello(connection, *hello);
   } else if (std::holds_alternative<lcm::GetStatus>(message->content)) {
-    const std::vector<const lcm::Packet*> all = publishing_.newest();
-    server_.set_largest_answer(publishing_.newest_bytes());
-    for (const lcm::Packet* newest : all) send(connection, *newest);
+    for (const lcm::Packet* newest : publishing_.newest()) send(connection, *newest);
     answer(connection, id.client_id, id.number,
            api::Completed{.outcome = api::Outcome::kDone, .reason = "told", .detail = {}});
   } else if (const auto& request = std::get<api::Request>(message->content);
