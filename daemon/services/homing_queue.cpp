@@ -216,7 +216,7 @@ void HomingQueue::move_on(std::int64_t now_us, Mcu& mcu) {
 void HomingQueue::follow_moving_on(Mcu& mcu) {
   const Task task = queues_[mcu.id].front();
   const motion::Motor& motor = installation_[task.motor];
-  if (motor.has_plan() && (motor.axis().stopping() || motor.target_steps() == task.then_steps)) {
+  if (motor.has_plan() && (motor.stops() || motor.target_steps() == task.then_steps)) {
     return;
   }
   const bool reached = !motor.has_plan() && motor.position_steps() == task.then_steps;

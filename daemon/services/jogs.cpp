@@ -244,7 +244,7 @@ bool Jogs::is_open(MotorId id, const Jog& jog) const {
 }
 
 bool Jogs::is_stopped_by_others(MotorId id, const Jog& jog) const {
-  return installation_[id].axis().stopping() && !jog.ends;
+  return installation_[id].stops() && !jog.ends;
 }
 
 void Jogs::follow(std::int64_t now_us, MotorId id, Jog& jog) {
@@ -305,7 +305,7 @@ void Jogs::step(std::int64_t now_us) {
 std::int64_t Jogs::next_wake_us() const {
   std::int64_t wake = INT64_MAX;
   for (const auto& [motor, jog] : jogs_) {
-    const bool runs_down = installation_[motor].axis().stopping();
+    const bool runs_down = installation_[motor].stops();
     if (!jog.ends && !runs_down) wake = std::min(wake, jog.until_us);
   }
   return wake;

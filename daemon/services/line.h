@@ -64,6 +64,7 @@ struct Line {
   std::vector<MotorId> motors{};  // in the request's order, as all that is by motor
   std::variant<Straight, AlongPath> course{};
   std::uint32_t target = 0;  // step at which its point, or the end of the path, is
+  unsigned tries = 1;        // of the beginning of its run
 
   Straight* straight() { return std::get_if<Straight>(&course); }
   const Straight* straight() const { return std::get_if<Straight>(&course); }

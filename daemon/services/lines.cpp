@@ -175,7 +175,6 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                       const std::vector<std::size_t>& indices, std::uint32_t to) {
   std::vector<MotorId> motors;
   for (const std::size_t i : indices) motors.push_back(line.motors[i]);
-  const std::map<BusId, motion::Tick> start = starts_of(now_us, motors);
   Straight* straight = line.straight();
   std::shared_ptr<link::LinePace> pace;  // paths are not of ports
   if (straight != nullptr && installation_.mcu_of(motors.front()).offers.paced_lines != nullptr) {
@@ -184,6 +183,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     straight->pace = pace;
   }
   const bool by_mcus = pace || in_mcus(number, line);
+  const std::map<BusId, motion::Tick> start = starts_of(now_us, line, motors, by_mcus);
   for (const std::size_t i : indices) {
     motion::Motor& motor = installation_[line.motors[i]];
     const auto* before = motor.as<motion::OnLine>();
@@ -194,7 +194,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     on_line.target_steps = line.end_of(i);
     on_line.to_point = to == line.target;
     on_line.last_run = line.legs() == 1 && to == line.target;
-    const std::uint32_t from = same_way ? motor.axis().line_planned_end() : 0;
+    const std::uint32_t from = same_way ? place_of(line.motors[i]) : 0;
     motion::LineShare share = line.share(i, from, to);
     share.line = number;
     share.in_mcus = by_mcus;
@@ -205,16 +205,34 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
   moves_.begin_on_line(motors, pace);
 }
 
-// One tick of each bus: there is one, or one a motor.
-std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us,
-                                               const std::vector<MotorId>& motors) const {
-  std::map<BusId, motion::Tick> start;
+std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us, const Line& line,
+                                               const std::vector<MotorId>& motors, bool by_mcus) {
+  std::map<BusId, std::map<McuId, std::uint16_t>> masks;
+  std::map<BusId, motion::Tick> starts;
   for (const MotorId id : motors) {
     const Mcu& mcu = installation_.mcu_of(id);
-    motion::Tick& of_bus = start.try_emplace(mcu.config.bus, INT64_MIN).first->second;
-    of_bus = std::max(of_bus, mcu.earliest_start(now_us, installation_[id].output()));
+    const Output output = installation_[id].output();
+    masks[mcu.config.bus][mcu.id] |= static_cast<std::uint16_t>(1u << output.value);
+    motion::Tick& start = starts.try_emplace(mcu.config.bus, INT64_MIN).first->second;
+    start = std::max(start, mcu.earliest_start(now_us, output));
   }
-  return start;
+  if (!by_mcus || line.path() != nullptr) return starts;
+  for (const auto& [bus, of_bus] : masks) {
+    std::vector<link::ToBegin> together;
+    for (const auto& [mcu, outputs] : of_bus) {
+      together.push_back({installation_[mcu].on_bus(), outputs, link::Told::kLineRun});
+    }
+    link::BusMaster& master = installation_[bus].master;
+    const link::CommonStart start = master.earliest_common_start(now_us, together);
+    if (start.to_confirm) master.confirm_start(start.at);
+    starts[bus] = start.at;
+  }
+  return starts;
+}
+
+std::uint32_t Lines::place_of(MotorId motor) const {
+  const motion::Axis& axis = installation_[motor].axis();
+  return installation_[motor].is_late() ? axis.line()->from : axis.line_planned_end();
 }
 
 const motion::OnLine* Lines::on_line(MotorId motor, std::uint64_t number) const {
@@ -240,20 +258,50 @@ bool Lines::follow(std::int64_t now_us, std::uint64_t number, Line& line) {
   if (line.waits() && !follow_trigger(now_us, number, line, *line.straight()->trigger)) {
     return true;
   }
+  end_split_start(number, line);
   const auto cause = cause_to_end(now_us, number, line);
   if (cause) end(now_us, number, line, *cause);
   bool any = false;
   bool all_stand = !cause;
+  const bool late = begins_anew(number, line);
   for (const MotorId id : line.motors) {
     const motion::OnLine* motor = on_line(id, number);
     if (motor == nullptr) continue;
     any = true;
     const bool paused = installation_[id].is_paused();
-    const bool stops = installation_[id].axis().stopping() && !paused;
-    all_stand = all_stand && motor->stands && !stops && (!paused || motor->resumes);
+    const bool stops = installation_[id].stops() && !paused;
+    // One that makes no step only waits for the others.
+    const motion::Axis& axis = installation_[id].axis();
+    const bool stands = motor->stands || (late && axis.end_tick() <= axis.start_tick());
+    all_stand = all_stand && stands && !stops && (!paused || motor->resumes);
   }
   if (any && all_stand) go_on(now_us, number, line);
   return any;
+}
+
+bool Lines::begins_anew(std::uint64_t number, const Line& line) const {
+  return std::ranges::any_of(line.motors, [&](MotorId id) {
+    return on_line(id, number) != nullptr && installation_[id].is_late();
+  });
+}
+
+void Lines::end_split_start(std::uint64_t number, const Line& line) {
+  std::vector<MotorId> late;
+  bool begun = false;
+  for (const MotorId id : line.motors) {
+    const motion::Motor& motor = installation_[id];
+    if (on_line(id, number) == nullptr) continue;
+    if (motor.is_late()) {
+      late.push_back(id);
+    } else {
+      begun = begun || motor.position_steps() != motor.axis().from_steps();
+    }
+  }
+  if (!begun && line.tries < CommonStarts::kMostTries) return;
+  for (const MotorId id : late) {
+    motion::Motor& motor = installation_[id];
+    moves_.end(id, *motor.end(api::Outcome::kLink, motor.did_not_start()));
+  }
 }
 
 // Why the line ends, if one motor does not go on along it as the others do. At the end of a run
@@ -277,7 +325,7 @@ std::optional<std::string> Lines::cause_to_end(std::int64_t now_us, std::uint64_
     }
     const link::BusMaster& master = installation_.bus_of(installation_.mcu_of(id)).master;
     const bool runs = !emergency && motor.axis().over_tick() > master.tick_at(now_us);
-    const bool stops = motor.axis().stopping() && !motor.is_paused();
+    const bool stops = motor.stops() && !motor.is_paused();
     const bool gone_on_without = now->limit == 0 && now->faults == 0 && !now->position_mismatch;
     any_goes_on = any_goes_on || (gone_on_without && !stops && (runs || now->stands));
   }
@@ -301,15 +349,16 @@ void Lines::end(std::int64_t now_us, std::uint64_t number, const Line& line,
 // All stand where their runs have led. Those that have been stopped earlier than others, since
 // their MCU was the only one to hear of it at once, catch up first.
 void Lines::go_on(std::int64_t now_us, std::uint64_t number, Line& line) {
+  line.tries = begins_anew(number, line) ? line.tries + 1 : 1;
   std::uint32_t farthest = 0;
   for (const MotorId id : line.motors) {
-    farthest = std::max(farthest, installation_[id].axis().line_planned_end());
+    farthest = std::max(farthest, place_of(id));
   }
   std::vector<std::size_t> behind;
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     all.push_back(i);
-    if (installation_[line.motors[i]].axis().line_planned_end() < farthest) behind.push_back(i);
+    if (place_of(line.motors[i]) < farthest) behind.push_back(i);
   }
   if (!behind.empty()) return begin_run(now_us, number, line, behind, farthest);
   if (AlongPath* along = line.path()) {

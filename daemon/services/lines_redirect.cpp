@@ -101,7 +101,7 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   std::vector<bushd_delay> shortest_delays;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     const motion::Motor& motor = installation_[line.motors[i]];
-    if (motor.axis().stopping() || motor.is_paused() || motor.as<motion::OnLine>()->stands) {
+    if (motor.stops() || motor.is_paused() || motor.as<motion::OnLine>()->stands) {
       return refuse(motor.name() + " is being stopped or paused; wait for that, or resume it");
     }
     const auto shortest_delay = moves_.shortest_delay_of(line.motors[i], request.speed);

@@ -174,7 +174,7 @@ bool Lines::follow_trigger(std::int64_t now_us, std::uint64_t number, const Line
     }
     moves_.stop(now_us, waiting);
     const bool all_stop = std::ranges::all_of(begun, [&](MotorId id) {
-      return installation_[id].axis().stopping() && !installation_[id].is_paused();
+      return installation_[id].stops() && !installation_[id].is_paused();
     });
     if (!all_stop) end(now_us, number, line, *cause);
   } else {
@@ -232,8 +232,8 @@ void Lines::keep_together(std::int64_t now_us, const std::vector<MotorId>& begun
   bool resumes = false;
   for (const MotorId id : begun) {
     const motion::Motor& motor = installation_[id];
-    if (!motor.axis().stopping()) go_on.push_back(id);
-    const bool stopped = motor.axis().stopping() && !motor.is_paused();
+    if (!motor.stops()) go_on.push_back(id);
+    const bool stopped = motor.stops() && !motor.is_paused();
     stops = stops || stopped;
     by_others = by_others && (!stopped || motor.moving()->by_others);
     paused = paused || motor.is_paused();

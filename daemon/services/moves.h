@@ -81,6 +81,8 @@ class Moves final : public Service {
   // Its MCU had not got the first ticks in time, so it has not moved. If no motor that was to begin
   // with it has, all of them begin anew; else it ends.
   void misses_start(MotorId motor);
+  // Those that were to begin together at this tick of the bus are given rest instead, and miss it.
+  void doubts_start(std::int64_t now_us, const Bus& bus, motion::Tick at);
   void end(MotorId motor, const motion::event::Ended& ended);
 
   // Whether motors of an accepted move are still to begin. Until then requests should wait, but
@@ -125,16 +127,19 @@ class Moves final : public Service {
   void start(std::int64_t now_us, const api::Asker& asker, const std::vector<Part>& parts);
   Result<Part> part_of(MotorId motor, const api::Amount& amount, const api::Move& move) const;
   void start_leg(std::int64_t now_us, MotorId motor);
-  // The tick of each bus at which these motors, at rest there, can begin their first legs together;
-  // `at_once`: sooner, where one frame is enough.
+  // When these motors, at rest there, can begin their first legs together on each bus; `at_once`:
+  // as soon as what is told of them allows.
   struct FirstLeg {
     MotorId motor;
     motion::Leg leg;
   };
-  std::map<BusId, motion::Tick> starts_of(std::int64_t now_us, const std::vector<FirstLeg>& legs,
-                                          bool at_once) const;
-  motion::Tick start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs,
-                        bool at_once) const;
+  std::map<BusId, link::CommonStart> starts_of(std::int64_t now_us,
+                                               const std::vector<FirstLeg>& legs,
+                                               bool at_once) const;
+  link::CommonStart start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs,
+                             bool at_once) const;
+  // Plans the run of a motor that is to begin then.
+  void plan_start(const FirstLeg& leg, const link::CommonStart& start);
   // Whether its MCU is given the run as a whole.
   bool by_table(MotorId motor, std::int64_t steps, bushd_delay shortest_delay) const;
   // Whether a motor has begun, as its MCU reports.

@@ -28,18 +28,18 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   }
   // The new targets of those that move have the line first.
   const bool at_once = moving.empty() && starting.size() <= kBeginsPerSlice;
-  const std::map<BusId, motion::Tick> start = starts_of(now_us, starting, at_once);
+  const std::map<BusId, link::CommonStart> start = starts_of(now_us, starting, at_once);
   asker.answer(api::Accepted{});
   take_over(moving, asker);
   open_.open(asker, motors, OpenMoves::Purpose::kMove);
   for (const auto& [bus, of_bus] : together) starts_.begin(of_bus);
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
-    const auto& [target, shortest_delay] = part.legs.front();
     if (!motor.stands()) {
-      motor.aim(target, shortest_delay);
+      motor.aim(part.legs.front().target, part.legs.front().shortest_delay);
     } else {
-      motor.start(target, start.at(installation_.mcu_of(part.motor).config.bus), shortest_delay);
+      plan_start({part.motor, part.legs.front()},
+                 start.at(installation_.mcu_of(part.motor).config.bus));
       unbegun_.insert(part.motor);
       to_begin_.push_back(part.motor);
     }
@@ -53,43 +53,50 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   retarget(now_us, moving);
 }
 
-std::map<BusId, motion::Tick> Moves::starts_of(std::int64_t now_us,
-                                               const std::vector<FirstLeg>& legs,
-                                               bool at_once) const {
+std::map<BusId, link::CommonStart> Moves::starts_of(std::int64_t now_us,
+                                                    const std::vector<FirstLeg>& legs,
+                                                    bool at_once) const {
   std::map<BusId, std::vector<FirstLeg>> of_buses;
   for (const FirstLeg& leg : legs) {
     of_buses[installation_.mcu_of(leg.motor).config.bus].push_back(leg);
   }
-  std::map<BusId, motion::Tick> start;
+  std::map<BusId, link::CommonStart> start;
   for (const auto& [bus, of_bus] : of_buses) start[bus] = start_of(now_us, bus, of_bus, at_once);
   const std::size_t slices = legs.size() / kBeginsPerSlice;
-  for (auto& [bus, tick] : start) {
-    tick += static_cast<motion::Tick>(slices) * kSliceUs / installation_[bus].config.tick_us;
+  for (auto& [bus, of_bus] : start) {
+    of_bus.at += static_cast<motion::Tick>(slices) * kSliceUs / installation_[bus].config.tick_us;
   }
   return start;
 }
 
-// Where there are several MCUs, some may get their first frames and others not: there is time to
-// repair that. No state tells of a run with delays that are no codes.
-motion::Tick Moves::start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs,
-                             bool at_once) const {
-  const Mcu& first = installation_.mcu_of(legs.front().motor);
-  std::uint16_t outputs = 0;
-  bool all_by_table = true;
-  motion::Tick common = 0;
+link::CommonStart Moves::start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs,
+                                  bool at_once) const {
+  std::map<std::pair<McuId, link::Told>, std::uint16_t> masks;
+  link::CommonStart later;
   for (const auto& [id, leg] : legs) {
     const Mcu& mcu = installation_.mcu_of(id);
     const motion::Motor& motor = installation_[id];
     const std::int64_t steps = leg.target - motor.position_steps();
-    const bool whole = by_table(id, steps, leg.shortest_delay);
-    outputs |= static_cast<std::uint16_t>(1u << motor.output().value);
-    all_by_table = all_by_table && whole;
-    at_once = at_once && &mcu == &first && (whole || bushd_delay_is_code(leg.shortest_delay));
-    common = std::max(common, mcu.earliest_start(now_us, motor.output()));
+    // No state tells of a run with delays that are no codes.
+    const link::Told told = by_table(id, steps, leg.shortest_delay)   ? link::Told::kTableRun
+                            : bushd_delay_is_code(leg.shortest_delay) ? link::Told::kStates
+                                                                      : link::Told::kTicks;
+    masks[{mcu.id, told}] |= static_cast<std::uint16_t>(1u << motor.output().value);
+    later.at = std::max(later.at, mcu.earliest_start(now_us, motor.output()));
   }
-  if (!at_once) return common;
-  return installation_[bus].master.earliest_common_start(now_us, first.on_bus(), outputs,
-                                                         all_by_table);
+  if (!at_once) return later;
+  std::vector<link::ToBegin> together;
+  for (const auto& [key, motors] : masks) {
+    together.push_back({installation_[key.first].on_bus(), motors, key.second});
+  }
+  return installation_[bus].master.earliest_common_start(now_us, together);
+}
+
+void Moves::plan_start(const FirstLeg& first, const link::CommonStart& start) {
+  const auto& [id, leg] = first;
+  const BusId bus = installation_.mcu_of(id).config.bus;
+  if (start.to_confirm) installation_[bus].master.confirm_start(start.at);
+  installation_[id].start(leg.target, start.at, leg.shortest_delay);
 }
 
 // A jog will change, and of what is streamed only ticks that have not been run can be taken back.
@@ -103,17 +110,32 @@ void Moves::misses_start(MotorId id) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
   if (motor.is_late()) return;
-  mcu.bus().start_missed();
+  if (!motor.is_withdrawn()) mcu.bus().start_missed();
+  const bool on_line = motor.is<motion::OnLine>();
   // Buses without streams miss a start for another reason than time.
-  if (!mcu.offers.streams || !starts_.waits(id) || !motor.awaits_new_start()) {
+  const bool may = mcu.offers.streams && (on_line || starts_.waits(id));
+  if (!may || !motor.awaits_new_start()) {
     return end(id, *motor.end(api::Outcome::kLink, motor.did_not_start()));
   }
   mcu.bus().drop(mcu.on_bus(), motor.output().value);
   journal_.ended(id, "late");
   if (motor.is_paused()) return pause_late(id);
+  if (motor.stops()) return cancel(id, "stopped before it began");
+  if (on_line) return;  // who leads the line begins it anew
   unbegun_.insert(id);
-  if (motor.axis().stopping()) return cancel(id, "stopped before it began");
   starts_.misses(id);
+}
+
+void Moves::doubts_start(std::int64_t now_us, const Bus& bus, motion::Tick at) {
+  std::vector<MotorId> withdrawn;
+  for (const McuId mcu : bus.mcus) {
+    for (const MotorId id : installation_[mcu].motors()) {
+      motion::Motor& motor = installation_[id];
+      const bool begins = motor.moves() && motor.axis().start_tick() == at;
+      if (begins && motor.withdraw()) withdrawn.push_back(id);
+    }
+  }
+  plan(now_us, withdrawn);
 }
 
 // It stands, and resuming it begins it.
@@ -136,7 +158,7 @@ void Moves::follow_start(MotorId id) {
   if (installation_.mcu_of(id).view().tick <= axis.start_tick()) return;
   if (has_moved(id)) return starts_.begins(id);
   const bool cancelled = axis.end_tick() <= axis.start_tick();
-  if (cancelled) starts_.leaves(id);
+  if (cancelled && !installation_[id].is_withdrawn()) starts_.leaves(id);
 }
 
 void Moves::start_anew(std::int64_t now_us) {
@@ -149,13 +171,13 @@ void Moves::start_anew(std::int64_t now_us) {
   std::vector<FirstLeg> legs;
   for (const MotorId id : decision.again) legs.push_back({id, installation_[id].take_leg()});
   const bool at_once = legs.size() <= kBeginsPerSlice;
-  const std::map<BusId, motion::Tick> start = starts_of(now_us, legs, at_once);
-  for (const auto& [id, leg] : legs) {
-    motion::Motor& motor = installation_[id];
-    outputs_.log(LogLevel::kInfo, id,
+  const std::map<BusId, link::CommonStart> start = starts_of(now_us, legs, at_once);
+  for (const FirstLeg& leg : legs) {
+    const motion::Motor& motor = installation_[leg.motor];
+    outputs_.log(LogLevel::kInfo, leg.motor,
                  motor.name() + ": " + motor.did_not_start() + ", and begins anew");
-    motor.start(leg.target, start.at(installation_.mcu_of(id).config.bus), leg.shortest_delay);
-    to_begin_.push_back(id);
+    plan_start(leg, start.at(installation_.mcu_of(leg.motor).config.bus));
+    to_begin_.push_back(leg.motor);
   }
   if (to_begin_.size() <= kBeginsPerSlice) work();
 }
@@ -206,7 +228,7 @@ void Moves::start_run(std::int64_t now_us, MotorId id, const motion::Leg& leg) {
   const BusId bus = installation_.mcu_of(id).config.bus;
   unbegun_.erase(id);  // if it was late
   starts_.begin({id});
-  installation_[id].start(leg.target, start_of(now_us, bus, {{id, leg}}, true), leg.shortest_delay);
+  plan_start({id, leg}, start_of(now_us, bus, {{id, leg}}, true));
   begin(id);
 }
 

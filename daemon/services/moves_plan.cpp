@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "bus/rs485/tick.h"
 #include "daemon/services/moves.h"
 
 namespace bushd::daemon {
@@ -27,7 +28,7 @@ std::vector<MotorId> Moves::with_whole_lines(const std::vector<MotorId>& motors)
     const auto* on_line = motor.as<motion::OnLine>();
     if (on_line == nullptr) continue;
     if (motor.axis().open_change()) wait.insert(on_line->line);
-    if (!motor.axis().stopping() || motor.is_paused()) continue;
+    if (!motor.stops() || motor.is_paused()) continue;
     bool& by_others = stop.try_emplace(on_line->line, true).first->second;
     by_others = by_others && on_line->by_others;
   }
@@ -71,7 +72,10 @@ std::map<McuId, motion::Tick> Moves::ticks_to_change_at(std::int64_t now_us,
     const Mcu& mcu = installation_.mcu_of(id);
     const motion::Axis& axis = installation_[id].axis();
     const std::vector<link::ToReplace>& of_bus = together.at(mcu.config.bus);
-    const motion::Tick first = axis.stopping()
+    const bool begins_not = installation_[id].is_withdrawn() &&
+                            !link::too_late(axis.start_tick(), mcu.bus().tick_at(now_us));
+    const motion::Tick first = begins_not ? axis.start_tick()
+                               : axis.stopping()
                                    ? mcu.bus().earliest_replace(now_us, of_bus)
                                    : mcu.bus().earliest_retarget(now_us, of_bus, axis.start_tick());
     motion::Tick& common = at.try_emplace(mcu.id, first).first->second;
@@ -122,7 +126,7 @@ std::map<MotorId, std::uint32_t> Moves::common_ends(const std::vector<MotorId>& 
   const auto stops_on_line = [this](MotorId id) -> const motion::OnLine* {
     const motion::Motor& motor = installation_[id];
     const auto* on_line = motor.as<motion::OnLine>();
-    const bool stops = on_line != nullptr && motor.axis().stopping() && !motor.axis().line()->track;
+    const bool stops = on_line != nullptr && motor.stops() && !motor.axis().line()->track;
     return stops ? on_line : nullptr;
   };
   for (const MotorId id : motors) {

@@ -72,7 +72,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
     } else if (settles(motor)) {
       pausing.left["at their targets"].push_back(motor);
       continue;
-    } else if (!installation_[motor].axis().stopping() || installation_[motor].is_paused()) {
+    } else if (!installation_[motor].stops() || installation_[motor].is_paused()) {
       to_pause.push_back(motor);
     } else {
       pausing.left["being stopped"].push_back(motor);
@@ -121,7 +121,7 @@ bool Pauses::has_ended(Pausing& pausing, MotorId id, std::int64_t target) const 
     ++pausing.paused;
     return true;
   }
-  if (motor.is_paused() || (motor.moves() && motor.axis().stopping())) return false;
+  if (motor.is_paused() || (motor.moves() && motor.stops())) return false;
   if (pausing.stopping.contains(id)) return true;
   const char* how = motor.moves()                      ? "going on by a later request"
                     : motor.position_steps() == target ? "at their targets"

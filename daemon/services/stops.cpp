@@ -126,7 +126,7 @@ void Stops::follow() {
             " was lost meanwhile, so it is unknown whether its motors stand: " + mcu.view().detail;
         return true;
       }
-      if (!motor.moves() || motor.axis().stopping()) return false;
+      if (!motor.moves() || motor.stops()) return false;
       const api::Asker* by = open_moves_.asker_of(id);
       stopping.done = motor.name() + " was given a new target" +
                       (by != nullptr ? " by " + text_of(*by) : "") + " while it ran down";

@@ -135,7 +135,7 @@ Result<void> Trajectories::may_go_on(const Loaded& loaded, const api::Follow& re
 std::optional<MotorId> Trajectories::no_more(const Loaded& loaded) const {
   if (!loaded.followed) return std::nullopt;
   for (const MotorId id : loaded.motors()) {
-    if (!follows(loaded, id) || installation_[id].axis().stopping()) return id;
+    if (!follows(loaded, id) || installation_[id].stops()) return id;
   }
   return std::nullopt;
 }

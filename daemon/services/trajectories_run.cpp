@@ -94,8 +94,8 @@ bool Trajectories::follow(std::int64_t now_us, Loaded& loaded) {
       continue;
     }
     const motion::Moving& moving = *motor.moving();
-    const bool ends = motor.axis().stopping() || moving.limit != 0 || moving.faults != 0 ||
-                      moving.position_mismatch;
+    const bool ends =
+        motor.stops() || moving.limit != 0 || moving.faults != 0 || moving.position_mismatch;
     if (ends) off = motor.name();
     const motion::Tick now = installation_.bus_of(mcu).master.tick_at(now_us);
     if (!ends && motor.axis().trajectory_goes_on_after(now)) on.push_back(id);

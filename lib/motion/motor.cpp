@@ -39,6 +39,7 @@ void Motor::arm_line(std::uint8_t number, const OnLine& on_line, LineShare share
 
 void Motor::aim(std::int64_t target, bushd_delay shortest_delay) {
   pause_ = Pause::kNo;
+  if (moves()) moving_now().withdrawn = false;
   axis_.aim(target, shortest_delay);
 }
 
@@ -80,7 +81,8 @@ void Motor::pause() {
     pause_ = Pause::kStands;
     return;
   }
-  if (axis_.stopping()) return;
+  if (stops()) return;
+  moving_now().withdrawn = false;
   pause_ = Pause::kRamps;
   axis_.stop();
 }
@@ -96,8 +98,7 @@ void Motor::resume() {
 
 std::int64_t Motor::target_steps() const {
   if (!has_plan()) return position_;
-  if (axis_.stopping() && !is_paused())
-    return jogs_ && !axis_.is_planned() ? position_ : axis_.end_steps();
+  if (stops() && !is_paused()) return jogs_ && !axis_.is_planned() ? position_ : axis_.end_steps();
   if (jogs_) return position_;
   if (const OnLine* on_line = as<OnLine>()) return on_line->target_steps;
   const Armed* armed = as<Armed>();
@@ -109,6 +110,7 @@ void Motor::stop(std::optional<std::string> ended_by) {
   pause_ = rests_in_pause() ? Pause::kOver : Pause::kNo;
   if (moves()) {
     moving_now().by_others = false;
+    moving_now().withdrawn = false;
     axis_.stop();
   }
   if (auto* armed = std::get_if<Armed>(&activity_)) {
@@ -272,10 +274,13 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     events.emplace_back(event::Mismatch{});
     axis_.stop();
   }
+  follow_withdrawn();
   if (report.tick < axis_.over_tick()) {
     if (axis_.needs_change()) events.emplace_back(event::Replan{});
   } else if (now.position_mismatch) {
     if (!moving) events.emplace_back(end_by_fault(report.of_mcu));
+  } else if (now.withdrawn) {
+    if (!moving) events.emplace_back(event::MissedStart{});
   } else if (is<OnLine>()) {
     follow_end_of_line(report, events);
   } else {

@@ -53,6 +53,7 @@ struct Moving {
   std::uint8_t faults = 0;         // with which its MCU runs it down
   bool by_others = false;  // is stopped since others on its way have ended: nobody has asked for it
   bool late = false;       // has missed its start: it stands until it is started again, or ends
+  bool withdrawn = false;  // is not to begin at its start, but later, together with others
 };
 struct Homing {};  // by its MCU, or it waits for its turn
 // Moves on a line with others. Whoever leads the line begins its runs, all at the same ticks.
@@ -221,6 +222,8 @@ class Motor {
   void stop(std::optional<std::string> ended_by = {});
   // It moves and was stopped, and nobody has asked for that. At its target it settles.
   void is_stopped_by_others() { moving_now().by_others = true; }
+  // Somebody has stopped it, or paused it.
+  bool stops() const { return axis_.stopping() && !is_withdrawn(); }
   // The plan is not yet what was requested, and can be changed.
   bool needs_change() const { return moves() && axis_.needs_change(); }
   // Whether the plan is another one now from this tick on.
@@ -245,9 +248,13 @@ class Motor {
   // next report says what has become of it.
   bool has_missed_start(const bushd_report& report) const;
   // It has missed its start. Whether it may have a new one: then it is late from now on, until it
-  // is started, also while it is paused.
+  // is started, also while it is paused. On a line it stands where its run was to begin.
   bool awaits_new_start();
   bool is_late() const { return moves() && moving()->late; }
+  // It should not begin at its start, and miss it: whether it can. If it begins all the same, it
+  // goes on to its target; on a line it is stopped.
+  bool withdraw();
+  bool is_withdrawn() const { return moves() && moving()->withdrawn; }
   std::string did_not_start() const;
   // Its motion is over, if there is one.
   std::optional<event::Ended> end(Outcome outcome, std::string reason);
@@ -258,6 +265,8 @@ class Motor {
   bool rests_in_pause() const { return pause_ == Pause::kStands || pause_ == Pause::kOver; }
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
   Moving& moving_now() { return const_cast<Moving&>(*moving()); }
+  bool may_begin_anew() const;
+  void follow_withdrawn();
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   void follow_end_of_line(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;

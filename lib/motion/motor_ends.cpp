@@ -32,10 +32,10 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
 
 // It stands.
 event::Ended Motor::end_at_limit() {
-  if (!axis_.stopping() && further_.empty() && position_ == axis_.target_steps()) {
+  if (!stops() && further_.empty() && position_ == axis_.target_steps()) {
     return reached();
   }
-  if (axis_.stopping() && !is_paused() && position_ == axis_.executed_steps()) {
+  if (stops() && !is_paused() && position_ == axis_.executed_steps()) {
     return stopped();
   }
   std::string reason =
@@ -93,10 +93,45 @@ bool Motor::has_missed_start(const bushd_report& report) const {
   return has_plan() && !ran_down && !cancelled && !limited && !moved;
 }
 
+bool Motor::may_begin_anew() const {
+  const bool on_path = axis_.line() && axis_.line()->track;
+  return moves() && !follows() && !on_path;
+}
+
 bool Motor::awaits_new_start() {
-  if (!is<Moving>() || follows()) return false;
+  if (!may_begin_anew()) return false;
+  auto* on_line = std::get_if<OnLine>(&activity_);
+  if (on_line != nullptr) on_line->stands = true;
+  if (is_withdrawn()) {
+    // Nobody has stopped it.
+    const Tick start = axis_.start_tick();
+    if (on_line != nullptr) {
+      axis_.start_line(position_, *axis_.line(), start, axis_.shortest_delay());
+    } else {
+      axis_.start(position_, axis_.target_steps() - position_, start, 0, axis_.shortest_delay());
+    }
+  }
   moving_now().late = true;
+  moving_now().withdrawn = false;
   return true;
+}
+
+bool Motor::withdraw() {
+  if (!may_begin_anew() || is_late() || stops() || axis_.open_change()) return false;
+  moving_now().withdrawn = true;
+  axis_.stop();
+  return true;
+}
+
+// Its MCU was told too late.
+void Motor::follow_withdrawn() {
+  if (!is_withdrawn() || position_ == axis_.from_steps()) return;
+  moving_now().withdrawn = false;
+  if (is<OnLine>()) {
+    moving_now().by_others = true;
+  } else {
+    axis_.aim(axis_.target_steps(), axis_.shortest_delay());
+  }
 }
 
 std::optional<event::Ended> Motor::end(Outcome outcome, std::string reason) {

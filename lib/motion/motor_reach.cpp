@@ -111,7 +111,7 @@ Result<std::int64_t> MotorReach::rounded_distance_from() const {
                 ", so a distance could count from there or from where it is; run " +
                 words::remedy("stop", motor_.name()) + " first, or move it to a position");
   }
-  if (motor_.axis_.stopping()) {
+  if (motor_.stops()) {
     if (motor_.axis_.is_planned()) return motor_.axis_.end_steps();
     return fail(
         fmt::format("it is being stopped, and where it will stand is not known yet; {}", kRemedy));

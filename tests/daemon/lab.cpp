@@ -131,6 +131,7 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
       buses_[b].bus->add_mcu(options);
     }
     buses_[b].bus->on_master_byte = [this, b](std::uint8_t byte, sim::TimeNs) {
+      if (on_receive) on_receive(b, byte);
       if (buses_[b].plugged) buses_[b].received.push_back(byte);
     };
   }

@@ -148,6 +148,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   void cut_pc_power();
   // Bytes on the way to MCUs are handed to this before they are sent; returning false drops them.
   std::function<bool(std::size_t bus, std::vector<std::uint8_t>& bytes)> on_send;
+  // Each byte on the way from MCUs, which this may change.
+  std::function<void(std::size_t bus, std::uint8_t& byte)> on_receive;
 
   // A file beside bushd.toml, where tables are looked for first.
   void write_file(const std::string& name, const std::string& text);

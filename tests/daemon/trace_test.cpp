@@ -85,7 +85,7 @@ class Trace : public Traced<Manner> {
     };
     EXPECT_EQ(lab.wait(by({-31, 700, 299})).result, "reached");
     const auto stopped = by({900, -411, 17});
-    lab.run_for(0.45);
+    lab.run_for(0.35);
     lab.send(Ask::kStop, {"m05"});
     EXPECT_EQ(lab.wait(stopped).result, "stopped");
     const auto paused = by({-1000, -3, 998});

@@ -199,7 +199,11 @@ class Bus {
     }
     BUSHD_REQUIRE(receiver_.size == 0);
     for (const link::Event& event : master_.take_events()) {
-      std::visit([](const auto& what) { BUSHD_REQUIRE(what.mcu.value < kMcus); }, event);
+      std::visit(
+          [](const auto& what) {
+            if constexpr (requires { what.mcu; }) BUSHD_REQUIRE(what.mcu.value < kMcus);
+          },
+          event);
       const auto* const missed = std::get_if<link::StartMissed>(&event);
       BUSHD_REQUIRE(missed == nullptr || missed->motor < BUSHD_MOTORS_PER_MCU);
     }
@@ -444,6 +448,7 @@ void begin(Bus& bus, Input& input, bool whole) {
   const link::Tick start = bus.master().earliest_start(bus.now_us(), mcu, motor) + later;
   bus.source().start[mcu.value][motor] = start;
   bus.source().length[mcu.value][motor] = length;
+  if (later % 2 != 0) bus.master().confirm_start(start);
   if (whole) {
     bus.master().begin_table_run(mcu, motor, start, {length - 128 == 0 ? 1 : length - 128});
   } else {

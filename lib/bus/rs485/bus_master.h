@@ -20,6 +20,7 @@
 
 #include "base/result.h"
 #include "bus/rs485/bus_setup.h"
+#include "bus/rs485/common_start.h"
 #include "bus/rs485/event.h"
 #include "bus/rs485/health.h"
 #include "bus/rs485/mcu_index.h"
@@ -66,17 +67,23 @@ class BusMaster {
 
   // Earliest tick at which a move of this motor can start.
   virtual Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const = 0;
-  // The same for motors (a mask) of one MCU that begin together. Where one frame is enough to begin
-  // all of them, it is sooner: that frame comes just in time, and if it is late or lost, none of
-  // them begins, and StartMissed says so. `by_table`: all by TableRuns::begin_table_run.
-  virtual Tick earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
-                                     bool /*by_table*/) const {
+  // The same for motors that begin together. Where one frame is enough to begin all of them, that
+  // frame comes just in time, and if it is late or lost, none of them begins, and StartMissed says
+  // so. Where several are needed, there is time to ask whether they have come (confirm_start).
+  virtual CommonStart earliest_common_start(std::int64_t now_us,
+                                            std::span<const ToBegin> together) const {
     Tick earliest = 0;
-    for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-      if ((motors >> m & 1) != 0) earliest = std::max(earliest, earliest_start(now_us, mcu, m));
+    for (const ToBegin& begin : together) {
+      for (std::uint8_t m = 0; begin.motors >> m != 0; ++m) {
+        if ((begin.motors >> m & 1) == 0) continue;
+        earliest = std::max(earliest, earliest_start(now_us, begin.mcu, m));
+      }
     }
-    return earliest;
+    return {.at = earliest};
   }
+  // What begins at this tick begins together: if it is not known in time that all MCUs have what
+  // they need for it, StartInDoubt says so while none has begun. To be called before begin().
+  virtual void confirm_start(Tick /*at*/) {}
   // A motion has missed its start: what begins at once next gets more time.
   virtual void start_missed() {}
   // Time that a start by earliest_common_start leaves this program, beyond what the line and its

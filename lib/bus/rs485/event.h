@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "bus/rs485/mcu_index.h"
+#include "bus/rs485/tick.h"
 #include "engine/message.h"
 
 namespace bushd::link {
@@ -37,6 +38,11 @@ struct StartMissed {
   McuIndex mcu;
   std::uint8_t motor;
 };
+// The motors that were to begin together at this tick (BusMaster::confirm_start) should not begin:
+// not all of their MCUs are known to have got their first frames. Give them rest from `at` on.
+struct StartInDoubt {
+  Tick at;
+};
 
 // Steps of `motor` may be lost: McuView::uncertain_reason says how many, and why.
 struct PositionUncertain {
@@ -45,6 +51,6 @@ struct PositionUncertain {
 };
 
 using Event = std::variant<McuOnline, McuOffline, McuReported, ReplacementFailed, RequestRefused,
-                           StartMissed, PositionUncertain>;
+                           StartMissed, StartInDoubt, PositionUncertain>;
 
 }  // namespace bushd::link

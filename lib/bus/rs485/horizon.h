@@ -11,15 +11,6 @@
 
 namespace bushd::link {
 
-// An MCU in tick `now` can change its next tick but one; an earlier one has been begun, or is being
-// prepared.
-constexpr Tick first_changeable(Tick now) {
-  return now + 2;
-}
-constexpr bool too_late(Tick at, Tick now) {
-  return at < first_changeable(now);
-}
-
 // What an adapter holds back is late on the bus, and its answer is later still: queues are deeper
 // by that, and changes are planned further ahead.
 class Horizon {
@@ -43,6 +34,9 @@ class Horizon {
     return first_changeable(clock_.tick_at(now_us) + 1) + clock_.ticks_in(lead_us);
   }
 
+  // Of an answer, by the adapter.
+  std::int64_t held_back_us() const { return std::min(latency_.recent_us, kMaxHeldBackUs); }
+
   // Queues are kept this full.
   std::int64_t queue_target_us() const { return kQueueTargetUs + 4 * held_back_us(); }
   // Below this, ticks go before everything routine. `silence_us`: see queue_enough_us.
@@ -65,8 +59,6 @@ class Horizon {
   // More than any adapter holds back. An answer that was read later still waited for this program,
   // which had been stopped: moves and stops must not be put off by seconds for that.
   static constexpr std::int64_t kMaxHeldBackUs = 40'000;
-
-  std::int64_t held_back_us() const { return std::min(latency_.recent_us, kMaxHeldBackUs); }
 
   const BusClock& clock_;
   const Latency& latency_;

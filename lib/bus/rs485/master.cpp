@@ -114,12 +114,22 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   synchroniser_.lines_run(streams_.runs_line());
   transactions_.expire(now_us);
   streams_.fail_late_replacements(now_us);
+  doubt_late_starts(now_us);
   streams_.fail_late_starts(now_us);
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
-  if (transactions_.open() && now_us >= transactions_.quiet_us()) emergency_.send_due(now_us);
+  if (transactions_.open() && now_us >= transactions_.quiet_us()) {
+    emergency_.send_due(now_us);
+    while (streams_.withdraws() && streams_.send_due_replacement(now_us)) {
+    }
+  }
   while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
   }
   return writer_.bytes();
+}
+
+void Rs485Master::doubt_late_starts(std::int64_t now_us) {
+  if (!clock().valid() || (transactions_.open() && now_us < transactions_.quiet_us())) return;
+  streams_.doubt_late_starts(std::max(line_free_us(now_us), writer_.free_us()), doubt_margin_us());
 }
 
 // How long nothing may be sent, and then all others have their turn first: a poll whose last answer
@@ -154,14 +164,21 @@ bool Rs485Master::send_next(std::int64_t now_us) {
 std::int64_t Rs485Master::next_wake_us() const {
   if (!port_open_) return INT64_MAX;
   if (transactions_.open()) {
-    const std::int64_t timeout_us = transactions_.timeout_us();
-    if (!emergency_.active()) return timeout_us;
-    return std::min(timeout_us, std::max(emergency_.due_us(), transactions_.quiet_us()));
+    std::int64_t urgent_us = doubt_us();
+    if (emergency_.active()) urgent_us = std::min(urgent_us, emergency_.due_us());
+    if (streams_.withdraws()) urgent_us = stepped_us_;
+    return std::min(transactions_.timeout_us(), std::max(urgent_us, transactions_.quiet_us()));
   }
-  std::int64_t wake = begun_ ? stepped_us_ : synchroniser_.due_us();
+  std::int64_t wake = begun_ ? stepped_us_ : std::min(synchroniser_.due_us(), doubt_us());
   if (emergency_.active()) wake = std::min(wake, emergency_.due_us());
   for (const McuIndex i : mcus_.indices()) wake = std::min(wake, wake_us(i));
   return std::max(wake, writer_.room_from_us());
+}
+
+std::int64_t Rs485Master::doubt_us() const {
+  if (!clock().valid()) return INT64_MAX;
+  const std::int64_t free_us = std::max(line_free_us(stepped_us_), writer_.free_us());
+  return streams_.doubt_us(free_us, doubt_margin_us());
 }
 
 std::int64_t Rs485Master::wake_us(McuIndex mcu) const {
@@ -181,23 +198,53 @@ Tick Rs485Master::earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t
 }
 
 // One frame tells all of table runs, and of one stream as much as the MCU can hold, if it takes
-// states of runs. Until a replacement is confirmed no start goes out.
-Tick Rs485Master::earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
-                                        bool by_table) const {
-  const bool alone = std::has_single_bit(motors);
-  const bool tells_runs = setup_.table_ticks && can(mcu, BUSHD_CAN_TABLE_TICKS);
-  const bool in_one_frame = by_table || (alone && tells_runs);
-  if (!in_one_frame || streams_.replacement_open(mcu) || streams_.has_replacement_to_send(mcu)) {
-    return BusMaster::earliest_common_start(now_us, mcu, motors, by_table);
+// states of runs. Several are followed by the question whether they have come, and by what keeps
+// motors from beginning where they have not. Until a replacement is confirmed no start goes out.
+CommonStart Rs485Master::earliest_common_start(std::int64_t now_us,
+                                               std::span<const ToBegin> together) const {
+  const CommonStart later = BusMaster::earliest_common_start(now_us, together);
+  const std::int64_t free_us = std::max(line_free_us(now_us), writer_.free_us());
+  Tick after = 0;  // what these motors have been told
+  std::int64_t carried_us = free_us;
+  for (const ToBegin& begin : together) {
+    if (streams_.replacement_open(begin.mcu) || streams_.has_replacement_to_send(begin.mcu) ||
+        !streams_.tells_at_once(begin)) {
+      return later;
+    }
+    for (std::uint8_t m = 0; begin.motors >> m != 0; ++m) {
+      if ((begin.motors >> m & 1) != 0) after = std::max(after, streams_.next_tick(begin.mcu, m));
+    }
+    carried_us += streams_.first_frames_us(begin);
   }
-  const std::int64_t free_us = transactions_.open() ? transactions_.quiet_us() : now_us;
-  Tick earliest =
-      horizon_.earliest_at_once(streams_.first_carried_us(now_us, free_us, motors, by_table),
-                                start_margin_.margin_us(now_us));
-  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((motors >> m & 1) != 0) earliest = std::max(earliest, streams_.next_tick(mcu, m));
+  const std::int64_t margin_us = start_margin_.margin_us(now_us);
+  if (in_one_frame(together)) {
+    return {.at = std::max(horizon_.earliest_at_once(carried_us, margin_us), after)};
   }
-  return earliest;
+  const std::int64_t round_us = carried_us - free_us + poller_.cycle_us();
+  carried_us = free_us + round_us + horizon_.held_back_us() + streams_.withdrawal_us(together) +
+               setup_.tick_ns / 1000;
+  const CommonStart confirmed = {
+      .at = std::max(horizon_.earliest_at_once(carried_us, margin_us), after), .to_confirm = true};
+  if (confirmed.at > later.at) return later;
+  const std::int64_t repair_us = repair_time_.margin_us(now_us) - StartMargin::kLeastUs;
+  const std::int64_t more_us = repair_us > 0 ? std::max(repair_us, round_us) : 0;
+  return {.at = confirmed.at + clock().ticks_in(more_us), .to_confirm = true};
+}
+
+bool Rs485Master::in_one_frame(std::span<const ToBegin> together) const {
+  if (together.size() != 1) return false;
+  const ToBegin& begin = together.front();
+  return begin.told != Told::kStates || std::has_single_bit(begin.motors);
+}
+
+// When what is sent next would begin, if the MCUs that are asked answer in their time or never.
+std::int64_t Rs485Master::line_free_us(std::int64_t now_us) const {
+  return transactions_.open() ? std::max(now_us, transactions_.quiet_us()) : now_us;
+}
+
+// An exchange, the program, and what the adapter may hold back of a frame.
+std::int64_t Rs485Master::doubt_margin_us() const {
+  return poller_.cycle_us() + StartMargin::kLeastUs + 2 * horizon_.held_back_us();
 }
 
 Tick Rs485Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {

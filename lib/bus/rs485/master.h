@@ -93,8 +93,9 @@ class Rs485Master final : public BusMaster,
 
   // All first frames of the move still arrive well before.
   Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const override;
-  Tick earliest_common_start(std::int64_t now_us, McuIndex mcu, std::uint16_t motors,
-                             bool by_table) const override;
+  CommonStart earliest_common_start(std::int64_t now_us,
+                                    std::span<const ToBegin> together) const override;
+  void confirm_start(Tick at) override { streams_.confirm_start(at); }
   void start_missed() override { start_margin_.missed(stepped_us_); }
   std::int64_t start_margin_us(std::int64_t now_us) const override {
     return start_margin_.margin_us(now_us);
@@ -171,6 +172,12 @@ class Rs485Master final : public BusMaster,
   void note_begun(McuIndex mcu);
   bool send_next(std::int64_t now_us);
   std::int64_t silence_us() const;
+  bool in_one_frame(std::span<const ToBegin> together) const;
+  std::int64_t line_free_us(std::int64_t now_us) const;
+  std::int64_t doubt_margin_us() const;
+  void doubt_late_starts(std::int64_t now_us);
+  void ask_again_for_start(std::int64_t now_us, McuIndex mcu);
+  std::int64_t doubt_us() const;
   std::int64_t wake_us(McuIndex mcu) const;
   const BusClock& clock() const { return synchroniser_.clock(); }
 
@@ -189,7 +196,8 @@ class Rs485Master final : public BusMaster,
   EmergencyStop emergency_;
   Horizon horizon_;
   StartMargin start_margin_;
-  bool begun_ = false;  // something, since the last step
+  StartMargin repair_time_;  // for frames that begin motors together: none on a good line
+  bool begun_ = false;       // something, since the last step
 };
 
 }  // namespace bushd::link

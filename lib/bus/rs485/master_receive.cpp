@@ -67,7 +67,15 @@ bool Rs485Master::unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t typ
     return false;
   }
   if (poller_.missed(now_us, mcu, type)) connector_.give_up_unanswering(now_us, mcu);
+  ask_again_for_start(now_us, mcu);
   return true;
+}
+
+// A first frame was lost, or the answer that would have told of it.
+void Rs485Master::ask_again_for_start(std::int64_t now_us, McuIndex mcu) {
+  if (!streams_.start_is_open(mcu)) return;
+  repair_time_.missed(now_us);
+  mcus_[mcu].poll_wanted = true;
 }
 
 void Rs485Master::ended(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
@@ -113,6 +121,7 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
     return;
   }
   streams_.follow_report(index);
+  ask_again_for_start(now_us, index);
   ask_at_end(now_us, index);
   events_.push_back(McuReported{index});
 }

@@ -28,6 +28,7 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
   for (const McuIndex i : mcus_.indices()) {
     Mcu& mcu = mcus_[i];
     if (mcu.replacing == 0 || mcu.replaced != 0) continue;
+    const auto ticks = static_cast<unsigned>(ticks_of_waiting(i));
     const std::uint16_t mask = std::exchange(mcu.replacing, std::uint16_t{0});
     // Another epoch at each try: frames of one that failed may still be on their way.
     if (static_cast<std::uint8_t>(mcu.newest_epoch - mcu.epoch) >= kMaxEpochsAhead) {
@@ -42,8 +43,8 @@ bool StreamScheduler::send_due_replacement(std::int64_t now_us) {
       mcu.stream[m].from_before = mcu.stream[m].from;
       mcu.stream[m].from = std::min(mcu.stream[m].from, mcu.replace_at);
     }
-    send_ticks(now_us, i, mask, mcu.replace_at,
-               static_cast<unsigned>(ticks_of_replacement(mcu, mask)), BUSHD_TICKS_REPLACE);
+    send_ticks(now_us, i, mask, mcu.replace_at, ticks, BUSHD_TICKS_REPLACE);
+    mcu.withdraws = false;
     mcu.replaced = mask;
     mcu.replaced_us = now_us;
     records_[i].poll_wanted = true;
@@ -207,8 +208,7 @@ void StreamScheduler::send_line_run(std::int64_t now_us, McuIndex index, std::ui
 bool StreamScheduler::send_table_ticks(std::int64_t now_us, McuIndex index, std::uint16_t mask,
                                        Tick first, Tick max_ticks, unsigned flags) {
   const McuRecord& record = records_[index];
-  if (!setup_.table_ticks) return false;
-  if ((record.view.identity.capabilities & BUSHD_CAN_TABLE_TICKS) == 0) return false;
+  if (!tells_states(index)) return false;
   auto ticks = static_cast<unsigned>(std::min<Tick>(max_ticks, UINT16_MAX));
   std::array<bushd_run, BUSHD_MOTORS_PER_MCU> run;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
@@ -234,7 +234,12 @@ bool StreamScheduler::send_table_ticks(std::int64_t now_us, McuIndex index, std:
       static_cast<std::uint16_t>(ticks), entries.data(), motors, payload.data());
   const std::size_t width = setup_.format == BUSHD_FORMAT_FINE ? 2 : 1;
   const std::size_t as_ticks = BUSHD_TICKS_HEADER + motors * (2 + width * ticks);
-  if (size > BUSHD_FRAME_MAX_PAYLOAD || size > as_ticks) return false;
+  if (size > BUSHD_FRAME_MAX_PAYLOAD) {
+    std::uint16_t some = mask;
+    while (std::popcount(some) > kMotorsPerStates) some ^= std::bit_floor(some);
+    return some != mask && send_table_ticks(now_us, index, some, first, max_ticks, flags);
+  }
+  if (size > as_ticks) return false;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     if (has(mask, m)) note_sent(index, m, first, first + ticks);
   }
@@ -290,6 +295,7 @@ void StreamScheduler::note_sent(McuIndex index, std::uint8_t motor, Tick first, 
   }
   stream.sent = std::max(stream.sent, stream.next);
   stream.finished = stream.next >= source_.end_tick(index, motor);
+  if (!to_confirm_.empty() && start_is_open(index)) records_[index].poll_wanted = true;
 }
 
 }  // namespace bushd::link

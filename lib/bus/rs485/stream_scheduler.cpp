@@ -15,10 +15,6 @@ constexpr std::int64_t kRetryLeadUs = 10'000;
 constexpr unsigned kMostDoublings = 5;
 constexpr unsigned kMostHalvings = 2;
 
-constexpr std::uint16_t bit(unsigned motor) {
-  return static_cast<std::uint16_t>(1u << motor);
-}
-
 }  // namespace
 
 StreamScheduler::StreamScheduler(const Surroundings& around)
@@ -116,7 +112,7 @@ std::optional<Tick> StreamScheduler::Mcu::next_tick() const {
 
 void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, std::int64_t now_us) {
   Mcu& m = mcus_[mcu];
-  const Tick arrival = clock_.tick_at(arrival_us(now_us, m, motors));
+  const Tick arrival = clock_.tick_at(arrival_us(now_us, motors, ticks_of_replacement(m, motors)));
   std::uint16_t sent = 0;  // motors of which ticks from `first` on have been sent already
   Tick earliest = first;
   for (unsigned i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
@@ -151,19 +147,21 @@ Tick StreamScheduler::ticks_of_replacement(const Mcu& mcu, std::uint16_t mask) c
   return std::max<Tick>(ticks_per_frame(mask) >> std::min(mcu.failures, kMostHalvings), 1);
 }
 
-std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, const Mcu& mcu,
-                                         std::uint16_t mask) const {
-  return std::max(now_us, writer_.free_us()) + frame_us(mask, ticks_of_replacement(mcu, mask));
+bool StreamScheduler::rests(McuIndex index) const {
+  const Mcu& mcu = mcus_[index];
+  for (std::uint8_t m = 0; mcu.replacing >> m != 0; ++m) {
+    if ((mcu.replacing >> m & 1) != 0 && source_.end_tick(index, m) > mcu.replace_at) return false;
+  }
+  return mcu.replacing != 0;
 }
 
-std::int64_t StreamScheduler::first_carried_us(std::int64_t now_us, std::int64_t free_us,
-                                               std::uint16_t motors, bool by_table) const {
-  const auto entries = static_cast<std::size_t>(std::popcount(motors));
-  const std::size_t payload =
-      by_table ? BUSHD_TABLE_RUN_HEADER + entries * BUSHD_TABLE_RUN_MAX_ENTRY
-               : BUSHD_TABLE_TICKS_HEADER + entries * BUSHD_TABLE_TICKS_MAX_ENTRY;
-  return std::max({now_us, free_us, writer_.free_us()}) +
-         writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
+Tick StreamScheduler::ticks_of_waiting(McuIndex mcu) const {
+  return rests(mcu) ? 1 : ticks_of_replacement(mcus_[mcu], mcus_[mcu].replacing);
+}
+
+std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, std::uint16_t mask,
+                                         Tick ticks) const {
+  return std::max(now_us, writer_.free_us()) + frame_us(mask, ticks);
 }
 
 std::int64_t StreamScheduler::round_us() const {
@@ -223,24 +221,11 @@ void StreamScheduler::fail_late_replacements(std::int64_t now_us) {
     Mcu& mcu = mcus_[i];
     mcu.unplanned = 0;
     if (mcu.replacing == 0) continue;
-    if (!too_late(mcu.replace_at, clock_.tick_at(arrival_us(now_us, mcu, mcu.replacing)))) continue;
+    const std::int64_t at_us = arrival_us(now_us, mcu.replacing, ticks_of_waiting(i));
+    if (!too_late(mcu.replace_at, clock_.tick_at(at_us))) continue;
     mcu.unplanned = std::exchange(mcu.replacing, std::uint16_t{0});
     ++mcu.failures;
     events_.push_back(ReplacementFailed{.mcu = i, .motors = mcu.unplanned});
-  }
-}
-
-void StreamScheduler::fail_late_starts(std::int64_t now_us) {
-  if (!clock_.valid()) return;
-  const Tick arrival = clock_.tick_at(std::max(now_us, writer_.free_us()) + frame_us(bit(0), 1));
-  for (const McuIndex i : mcus_.indices()) {
-    Mcu& mcu = mcus_[i];
-    for (std::uint8_t m = 0; mcu.starting >> m != 0; ++m) {
-      if ((mcu.starting >> m & 1) == 0) continue;
-      const Stream& stream = mcu.stream[m];
-      if (!stream.active || stream.told) mcu.starting &= static_cast<std::uint16_t>(~bit(m));
-      if (mcu.sendable(m) && !stream.told && too_late(stream.start, arrival)) miss_start(i, m);
-    }
   }
 }
 
@@ -289,8 +274,10 @@ void StreamScheduler::follow_streams(McuIndex index) {
   for (std::uint8_t m = 0; m < report.motor_count; ++m) {
     Stream& stream = mcus_[index].stream[m];
     if (!stream.active) continue;
-    // It has the whole move.
-    if (stream.run && (report.running >> m & 1) != 0) continue;
+    if (stream.run && (report.running >> m & 1) != 0) {
+      stream.taken = true;  // the whole move
+      continue;
+    }
     const Tick known = view.known_until[m];
     const bool moving = (report.moving >> m & 1) != 0;
     // A frame that it shares with others may have gone on past its end: that is rest, and no MCU
@@ -298,23 +285,16 @@ void StreamScheduler::follow_streams(McuIndex index) {
     const Tick needed = std::min(stream.sent, source_.end_tick(index, m));
     // Nothing can be missing of a stream that has not begun; but a busy bus may keep it waiting
     // past its start.
-    if (stream.begun() ? known >= needed : moving || known <= stream.start) continue;
+    if (stream.begun() ? known >= needed : moving || known <= stream.start) {
+      stream.taken = stream.begun();
+      continue;
+    }
     if (!moving && known > stream.start) {
       miss_start(index, m);
       continue;
     }
     go_back(index, m);
   }
-}
-
-// A motion that was cancelled before its start misses nothing. The MCU has refused what was sent
-// behind the start.
-void StreamScheduler::miss_start(McuIndex index, std::uint8_t motor) {
-  Stream& stream = mcus_[index].stream[motor];
-  stream.active = false;
-  stream.next = records_[index].view.known_until[motor];
-  if (source_.end_tick(index, motor) <= stream.start) return;
-  events_.push_back(StartMissed{.mcu = index, .motor = motor});
 }
 
 // To the first tick that the MCU does not have.

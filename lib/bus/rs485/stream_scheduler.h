@@ -16,6 +16,7 @@
 
 #include "bus/rs485/bus_clock.h"
 #include "bus/rs485/bus_setup.h"
+#include "bus/rs485/common_start.h"
 #include "bus/rs485/event.h"
 #include "bus/rs485/frame_writer.h"
 #include "bus/rs485/mcu_index.h"
@@ -28,6 +29,10 @@ namespace bushd::link {
 
 // While there is something to send, it is looked for this often.
 inline constexpr std::int64_t kStreamWakeUs = 5'000;
+
+// So many states of runs always fit into one frame.
+inline constexpr int kMotorsPerStates =
+    (BUSHD_FRAME_MAX_PAYLOAD - BUSHD_TABLE_TICKS_HEADER) / BUSHD_TABLE_TICKS_MAX_ENTRY;
 
 // Motors of an MCU whose plan is to change, all with one frame.
 struct ToReplace {
@@ -70,10 +75,26 @@ class StreamScheduler {
   // too late is not sent: StartMissed says so.
   void fail_late_starts(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
-  // When the line will have carried the one frame that begins these motors of an MCU, table runs or
-  // streams told as states of runs, if it is free from `free_us` on.
-  std::int64_t first_carried_us(std::int64_t now_us, std::int64_t free_us, std::uint16_t motors,
-                                bool by_table) const;
+  // stream_starts.cpp
+  // Few frames tell of the whole run, or of as much as the MCU can hold.
+  bool tells_at_once(const ToBegin& begin) const;
+  // How long the line takes for the first frames of these motors. Precondition: tells_at_once.
+  std::int64_t first_frames_us(const ToBegin& begin) const;
+  // How long it takes for frames that keep these from beginning.
+  std::int64_t withdrawal_us(std::span<const ToBegin> together) const;
+  bool tells_states(McuIndex mcu) const;  // of runs, in place of ticks
+  // See BusMaster. While it is not confirmed its MCUs are asked as soon as their frames are sent.
+  void confirm_start(Tick at);
+  // An MCU has been sent what a motor of such a start needs, and is to say whether it has it.
+  bool start_is_open(McuIndex mcu) const;
+  // Called once in a step, before anything is sent: StartInDoubt for those that are not confirmed,
+  // if there is no time for `margin_us` before frames that keep them from beginning, on a line that
+  // is free from `free_us` on.
+  void doubt_late_starts(std::int64_t free_us, std::int64_t margin_us);
+  // When that will be; INT64_MAX: no start is to be confirmed.
+  std::int64_t doubt_us(std::int64_t free_us, std::int64_t margin_us) const;
+  // A replacement waits that keeps a motor from beginning.
+  bool withdraws() const;
   // When the line will have carried these replacements, one for each MCU, if they are asked for
   // now.
   struct LineUse {
@@ -115,6 +136,9 @@ class StreamScheduler {
   bool behind(std::int64_t now_us, std::int64_t lead_us) const;
 
  private:
+  static constexpr std::uint16_t bit(unsigned motor) {
+    return static_cast<std::uint16_t>(1u << motor);
+  }
   // Ticks that an MCU has beyond a gap.
   struct OutOfOrderRange {
     Tick from = 0;
@@ -124,6 +148,7 @@ class StreamScheduler {
     bool active = false;
     bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
     bool told = false;      // something of it has been sent
+    bool taken = false;     // its MCU has had all that was sent when it was asked
     Tick start = 0;
     // First tick that the MCU gets of it: the start, or that of a replacement before it, which
     // leads up to the start. What follows one is no start, wherever it ends.
@@ -150,6 +175,7 @@ class StreamScheduler {
     std::uint16_t replaced = 0;    // motors of a replacement sent and not yet confirmed
     std::uint16_t unplanned = 0;   // motors whose replacement has failed in this step
     std::uint16_t starting = 0;    // motors whose start may be still to be sent
+    bool withdraws = false;        // the replacement to be sent keeps motors from beginning
     std::int64_t replaced_us = 0;  // when that was
     unsigned failures = 0;         // of replacements, in a row
 
@@ -174,7 +200,7 @@ class StreamScheduler {
 
   // stream_scheduler.cpp
   // When a replacement for these motors would be at its MCU, sent now.
-  std::int64_t arrival_us(std::int64_t now_us, const Mcu& mcu, std::uint16_t mask) const;
+  std::int64_t arrival_us(std::int64_t now_us, std::uint16_t mask, Tick ticks) const;
   // How long the line takes for a frame of so many ticks of these motors.
   std::int64_t frame_us(std::uint16_t mask, Tick ticks) const;
   // For the replacements that wait, and these.
@@ -183,6 +209,15 @@ class StreamScheduler {
   void follow_streams(McuIndex mcu);
   void go_back(McuIndex mcu, std::uint8_t motor);
   void miss_start(McuIndex mcu, std::uint8_t motor);
+
+  // stream_starts.cpp
+  // The motors of an MCU that are to begin at this tick, and whether it is not known that the MCU
+  // has what all of them need.
+  std::uint16_t to_begin_at(McuIndex mcu, Tick at) const;
+  bool is_open(McuIndex mcu, Tick at) const;
+  // The last tick in which frames that keep motors from beginning at this one may arrive.
+  static Tick last_to_withdraw(Tick at);
+  std::int64_t withdrawal_us(Tick at) const;
 
   // stream_frames.cpp
   void finish_ended(McuIndex mcu);
@@ -199,6 +234,9 @@ class StreamScheduler {
   // Ticks in the frame of a replacement: fewer after failures, as a short frame is sooner there and
   // less often lost.
   Tick ticks_of_replacement(const Mcu& mcu, std::uint16_t mask) const;
+  // The replacement that waits gives all of its motors rest, so one tick is enough.
+  bool rests(McuIndex mcu) const;
+  Tick ticks_of_waiting(McuIndex mcu) const;
 
   const BusSetup& setup_;
   PerMcu<McuRecord>& records_;
@@ -207,6 +245,7 @@ class StreamScheduler {
   FrameWriter& writer_;
   std::vector<Event>& events_;
   PerMcu<Mcu> mcus_;
+  std::vector<Tick> to_confirm_;
 };
 
 }  // namespace bushd::link

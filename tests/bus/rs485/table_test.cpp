@@ -186,7 +186,9 @@ TEST_P(Tables, WhatOneFrameTellsBeginsAsSoonAsThatCanCome) {
     const bool whole = phase % 2 == 0;
     const Tick now = bus.master->tick_at(bus.now_us);
     const std::uint16_t motors = whole ? 0b1010 : 0b0010;
-    const Tick start = bus.master->earliest_common_start(bus.now_us, McuIndex{0}, motors, whole);
+    const link::ToBegin begins[] = {
+        {McuIndex{0}, motors, whole ? link::Told::kTableRun : link::Told::kStates}};
+    const Tick start = bus.master->earliest_common_start(bus.now_us, begins).at;
     EXPECT_LE(start - now, lead) << phase;
     for (std::uint8_t m = 0; m < 4; ++m) {
       if ((motors >> m & 1) == 0) continue;
@@ -218,7 +220,8 @@ TEST_P(Tables, AStartThatWouldComeTooLateIsNotSent) {
 
 TEST_P(Tables, AMissedStartLeavesMoreTimeForTheNext) {
   const auto lead = [this] {
-    return bus.master->earliest_common_start(bus.now_us, McuIndex{0}, 1, true) -
+    const link::ToBegin begins[] = {{McuIndex{0}, 1, link::Told::kTableRun}};
+    return bus.master->earliest_common_start(bus.now_us, begins).at -
            bus.master->tick_at(bus.now_us);
   };
   bus.run_for(500'000);

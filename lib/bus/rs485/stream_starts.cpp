@@ -1,0 +1,151 @@
+// How motions begin: what their first frames take, whether they have come, and what becomes of
+// those that have not.
+#include <algorithm>
+#include <bit>
+
+#include "bus/rs485/horizon.h"
+#include "bus/rs485/stream_scheduler.h"
+
+namespace bushd::link {
+
+bool StreamScheduler::tells_states(McuIndex mcu) const {
+  return setup_.table_ticks &&
+         (records_[mcu].view.identity.capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
+}
+
+bool StreamScheduler::tells_at_once(const ToBegin& begin) const {
+  if (begin.told == Told::kTicks) return false;
+  return begin.told != Told::kStates || tells_states(begin.mcu);
+}
+
+std::int64_t StreamScheduler::first_frames_us(const ToBegin& begin) const {
+  const auto motors = static_cast<std::size_t>(std::popcount(begin.motors));
+  const auto frame = [this](std::size_t payload) {
+    return writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
+  };
+  if (begin.told == Told::kTableRun) {
+    return frame(BUSHD_TABLE_RUN_HEADER + motors * BUSHD_TABLE_RUN_MAX_ENTRY);
+  }
+  if (begin.told == Told::kLineRun) {
+    return frame(BUSHD_LINE_RUN_HEADER + motors * BUSHD_LINE_RUN_ENTRY);
+  }
+  constexpr auto kMost = static_cast<std::size_t>(kMotorsPerStates);
+  const std::size_t frames = (motors + kMost - 1) / kMost;
+  return static_cast<std::int64_t>(frames) * frame(BUSHD_TABLE_TICKS_HEADER) +
+         writer_.line_us(motors * BUSHD_TABLE_TICKS_MAX_ENTRY);
+}
+
+std::int64_t StreamScheduler::withdrawal_us(std::span<const ToBegin> together) const {
+  std::int64_t us = 0;
+  for (const ToBegin& begin : together) us += frame_us(begin.motors, 1);
+  return us;
+}
+
+void StreamScheduler::confirm_start(Tick at) {
+  if (std::ranges::find(to_confirm_, at) == to_confirm_.end()) to_confirm_.push_back(at);
+}
+
+// One that is cancelled before it begins needs nothing, and one that has another target by now is
+// told of that.
+std::uint16_t StreamScheduler::to_begin_at(McuIndex mcu, Tick at) const {
+  std::uint16_t mask = 0;
+  for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    const Stream& stream = mcus_[mcu].stream[m];
+    const bool begins = stream.active && stream.start == at && stream.from == at;
+    if (begins && source_.end_tick(mcu, m) > at) mask |= bit(m);
+  }
+  return mask;
+}
+
+bool StreamScheduler::is_open(McuIndex mcu, Tick at) const {
+  const std::uint16_t mask = to_begin_at(mcu, at);
+  for (std::uint8_t m = 0; mask >> m != 0; ++m) {
+    if ((mask >> m & 1) != 0 && !mcus_[mcu].stream[m].taken) return true;
+  }
+  return false;
+}
+
+bool StreamScheduler::start_is_open(McuIndex mcu) const {
+  return std::ranges::any_of(to_confirm_, [&](Tick at) {
+    const std::uint16_t mask = to_begin_at(mcu, at);
+    for (std::uint8_t m = 0; mask >> m != 0; ++m) {
+      const Stream& stream = mcus_[mcu].stream[m];
+      if ((mask >> m & 1) != 0 && stream.told && !stream.taken) return true;
+    }
+    return false;
+  });
+}
+
+Tick StreamScheduler::last_to_withdraw(Tick at) {
+  return at - first_changeable(1);  // this clock lags by a part of a tick
+}
+
+std::int64_t StreamScheduler::withdrawal_us(Tick at) const {
+  std::int64_t us = 0;
+  for (const McuIndex i : mcus_.indices()) {
+    if (const std::uint16_t mask = to_begin_at(i, at); mask != 0) us += frame_us(mask, 1);
+  }
+  return us;
+}
+
+void StreamScheduler::doubt_late_starts(std::int64_t free_us, std::int64_t margin_us) {
+  for (Mcu& mcu : mcus_) mcu.withdraws = mcu.withdraws && mcu.replacing != 0;
+  std::erase_if(to_confirm_, [&](Tick at) {
+    bool open = false;
+    for (const McuIndex i : mcus_.indices()) open = open || is_open(i, at);
+    if (!open) return true;
+    const std::int64_t arrival_us = free_us + withdrawal_us(at);
+    if (clock_.tick_at(arrival_us + margin_us) < last_to_withdraw(at)) return false;
+    // Where that cannot be told them in time they begin, some perhaps without others.
+    if (too_late(at, clock_.tick_at(arrival_us))) return true;
+    for (const McuIndex i : mcus_.indices()) {
+      if (to_begin_at(i, at) != 0 && (mcus_[i].replacing | mcus_[i].replaced) != 0) return true;
+    }
+    for (const McuIndex i : mcus_.indices()) mcus_[i].withdraws = to_begin_at(i, at) != 0;
+    events_.push_back(StartInDoubt{at});
+    return true;
+  });
+}
+
+std::int64_t StreamScheduler::doubt_us(std::int64_t free_us, std::int64_t margin_us) const {
+  std::int64_t first_us = INT64_MAX;
+  for (const Tick at : to_confirm_) {
+    const Tick tick = clock_.tick_at(free_us + withdrawal_us(at) + margin_us);
+    const Tick left = std::max<Tick>(last_to_withdraw(at) - tick, 0);
+    first_us = std::min(first_us, free_us + left * setup_.tick_ns / 1000);
+  }
+  return first_us;
+}
+
+bool StreamScheduler::withdraws() const {
+  for (const McuIndex i : mcus_.indices()) {
+    if (mcus_[i].withdraws && mcus_[i].replaced == 0 && rests(i)) return true;
+  }
+  return false;
+}
+
+void StreamScheduler::fail_late_starts(std::int64_t now_us) {
+  if (!clock_.valid()) return;
+  const Tick arrival = clock_.tick_at(std::max(now_us, writer_.free_us()) + frame_us(bit(0), 1));
+  for (const McuIndex i : mcus_.indices()) {
+    Mcu& mcu = mcus_[i];
+    for (std::uint8_t m = 0; mcu.starting >> m != 0; ++m) {
+      if ((mcu.starting >> m & 1) == 0) continue;
+      const Stream& stream = mcu.stream[m];
+      if (!stream.active || stream.told) mcu.starting &= static_cast<std::uint16_t>(~bit(m));
+      if (mcu.sendable(m) && !stream.told && too_late(stream.start, arrival)) miss_start(i, m);
+    }
+  }
+}
+
+// A motion that was cancelled before its start misses nothing. The MCU has refused what was sent
+// behind the start.
+void StreamScheduler::miss_start(McuIndex index, std::uint8_t motor) {
+  Stream& stream = mcus_[index].stream[motor];
+  stream.active = false;
+  stream.next = records_[index].view.known_until[motor];
+  if (source_.end_tick(index, motor) <= stream.start) return;
+  events_.push_back(StartMissed{.mcu = index, .motor = motor});
+}
+
+}  // namespace bushd::link
