@@ -7,7 +7,9 @@
 // - in cruise, by quotient and remainder of dt / c, computed once a block
 // The decelerating side is the same walk through its sums, backwards in time from the end.
 #include "engine/run.h"
+#include "engine/run_fine_blocks.h"
 #include "engine/run_parts.h"
+#include "engine/run_slots.h"
 
 #if BUSHD_RAMP_INDEX
 
@@ -119,31 +121,7 @@ static uint32_t advance(bushd_run* run, uint32_t units) {
   return steps;
 }
 
-// A tick in whole units and the rest; `since_ns` collects the rests until they make a unit.
-typedef struct tick_units {
-  uint32_t whole;
-  uint32_t rest_ns;
-  uint32_t unit_ns;
-} tick_units;
-
-static tick_units in_units(const bushd_run* run, uint32_t tick_ns) {
-  const uint32_t unit_ns = run->table->time_unit_ns;
-  const tick_units tick = {tick_ns / unit_ns, tick_ns % unit_ns, unit_ns};
-  return tick;
-}
-
-static inline uint32_t next_units(uint32_t* since_ns, const tick_units* tick) {
-  const uint32_t sum = *since_ns + tick->rest_ns;
-  const bool carry = sum >= tick->unit_ns;
-  *since_ns = carry ? sum - tick->unit_ns : sum;
-  return tick->whole + carry;
-}
-
-// A small MCU makes few ticks at a time, and has no stack for blocks.
 #if BUSHD_RAMP_INDEX
-
-// Below this many ticks the divisions that a block begins with cost more than it saves.
-#define BLOCK_TICKS 4u
 
 // Where coarse displacements go.
 typedef struct coarse_out {
@@ -152,25 +130,25 @@ typedef struct coarse_out {
   uint8_t direction_bit;
 } coarse_out;
 
-// The blocks below expand many ticks inside one part with its state in registers. How many surely
-// stay inside is known before, so that their loops have no way out; `advance` takes the ticks
-// across a border. Only coarse ones exist: a fine tick is dominated by its division.
+// The blocks below, and those of fine ticks, expand many ticks inside one part with its state in
+// registers. How many surely stay inside is known before, so that their loops have no way out;
+// `advance` takes the ticks across a border.
 
 // Ticks along an indexed side, in its direction (forward) or against it. `*time` is the place on
 // the side in units, `*index` the step that runs there. Precondition: buckets not wider than the
 // shortest delay, so that one comparison finds the step.
-static inline void ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, size_t ticks,
+static inline void ramp_ticks(const bushd_ramp* ramp, const bushd_tick_units* tick, size_t ticks,
                               bool forward, bool whole_only, uint32_t* time, uint32_t* index,
                               uint32_t* since_ns, coarse_out out) {
   const uint32_t* const sum = ramp->sum;
   const uint32_t* const bucket = ramp->bucket;
   const uint8_t shift = ramp->bucket_shift;
-  const tick_units t = *tick;
+  const bushd_tick_units t = *tick;
   uint32_t now = *time;
   uint32_t i = *index;
   uint32_t ns = *since_ns;
   for (; ticks > 0; --ticks) {
-    const uint32_t units = whole_only ? t.whole : next_units(&ns, &t);
+    const uint32_t units = whole_only ? t.whole : bushd_next_units(&ns, &t);
     now = forward ? now + units : now - units;
     uint32_t next = bucket[now >> shift];
     next += sum[next + 1] <= now;
@@ -183,21 +161,13 @@ static inline void ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, si
   *since_ns = ns;
 }
 
-// Ticks that surely end before `units` more have passed; 0 if the buckets are too wide for
-// ramp_ticks.
-static uint32_t safe_ramp_ticks(const bushd_ramp* ramp, const tick_units* tick, uint32_t units) {
-  if (UINT32_C(1) << ramp->bucket_shift > ramp->code[ramp->count - 1]) return 0;
-  return (units - 1) / (tick->whole + (tick->rest_ns != 0));
-}
-
-static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t ticks,
+static size_t coarse_accel_block(bushd_run* run, const bushd_tick_units* tick, size_t ticks,
                                  coarse_out out) {
   const bushd_ramp* ramp = &run->table->accel;
   if (ramp->sum == NULL) return 0;
   uint32_t i = run->accel_at;
   uint32_t now = ramp->sum[i] + (uint32_t)run->since;
-  const uint32_t safe = safe_ramp_ticks(ramp, tick, ramp->sum[run->accel_end] - now);
-  if (ticks > safe) ticks = (size_t)safe;
+  ticks = bushd_safe_ramp_ticks(ramp, tick, ticks, ramp->sum[run->accel_end] - now);
   if (tick->rest_ns == 0) {
     ramp_ticks(ramp, tick, ticks, true, true, &now, &i, &run->since_ns, out);
   } else {
@@ -209,7 +179,7 @@ static size_t coarse_accel_block(bushd_run* run, const tick_units* tick, size_t 
   return ticks;
 }
 
-static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t ticks,
+static size_t coarse_decel_block(bushd_run* run, const bushd_tick_units* tick, size_t ticks,
                                  coarse_out out) {
   const bushd_ramp* ramp = &run->table->decel;
   if (ramp->sum == NULL) return 0;
@@ -217,8 +187,7 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   // (advance_decel).
   uint32_t i = run->decel_left - 1u;
   uint32_t now = ramp->sum[run->decel_left] - (uint32_t)run->since - 1;
-  const uint32_t safe = safe_ramp_ticks(ramp, tick, now + 1 - ramp->sum[bushd_run_decel_end(run)]);
-  if (ticks > safe) ticks = (size_t)safe;
+  ticks = bushd_safe_ramp_ticks(ramp, tick, ticks, now + 1 - ramp->sum[bushd_run_decel_end(run)]);
   if (tick->rest_ns == 0) {
     ramp_ticks(ramp, tick, ticks, false, true, &now, &i, &run->since_ns, out);
   } else {
@@ -230,7 +199,7 @@ static size_t coarse_decel_block(bushd_run* run, const tick_units* tick, size_t 
   return ticks;
 }
 
-static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t ticks,
+static size_t coarse_cruise_block(bushd_run* run, const bushd_tick_units* tick, size_t ticks,
                                   coarse_out out) {
   // In units if ticks are whole units, else in ns: one remainder to carry instead of two.
   const bool in_ns = tick->rest_ns != 0;
@@ -239,8 +208,7 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
   const int64_t tick_length = in_ns ? tick->whole * scale + tick->rest_ns : tick->whole;
   const uint32_t whole = (uint32_t)(tick_length / delay);
   const int64_t rest = tick_length - whole * delay;
-  const uint32_t safe = run->cruise_left / (whole + 1);
-  if (ticks > safe) ticks = (size_t)safe;
+  ticks = bushd_fewer_ticks(ticks, run->cruise_left, whole + 1);
   // Kept negative: what is missing to the next step.
   int64_t missing = (int64_t)run->since * scale + (in_ns ? run->since_ns : 0) - delay;
   const uint8_t byte = (uint8_t)(whole | out.direction_bit);
@@ -263,7 +231,8 @@ static size_t coarse_cruise_block(bushd_run* run, const tick_units* tick, size_t
   return ticks;
 }
 
-static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks, coarse_out out) {
+static size_t coarse_block(bushd_run* run, const bushd_tick_units* tick, size_t ticks,
+                           coarse_out out) {
   if (run->lead_delay != 0 || bushd_run_brake_left(run) != 0 || bushd_run_begins_later(run))
     return 0;
   if (run->accel_at < run->accel_end) return coarse_accel_block(run, tick, ticks, out);
@@ -275,19 +244,19 @@ static size_t coarse_block(bushd_run* run, const tick_units* tick, size_t ticks,
 
 size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, uint8_t* out,
                                size_t stride) {
-  const tick_units tick = in_units(run, tick_ns);
+  const bushd_tick_units tick = bushd_run_tick_units(run, tick_ns);
   const uint8_t direction_bit = run->direction > 0 ? BUSHD_COARSE_DIRECTION : 0;
   size_t n = 0;
   while (n < ticks && bushd_run_parts_left(run) != 0) {
 #if BUSHD_RAMP_INDEX
-    if (ticks - n >= BLOCK_TICKS) {
+    if (ticks - n >= BUSHD_RUN_BLOCK_TICKS) {
       const coarse_out rest = {out + n * stride, stride, direction_bit};
       n += coarse_block(run, &tick, ticks - n, rest);
       // The block may have made the last step: no tick is active after it.
       if (n == ticks || bushd_run_parts_left(run) == 0) break;
     }
 #endif
-    const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
+    const uint32_t steps = advance(run, bushd_next_units(&run->since_ns, &tick));
     bushd_run_count(run, steps);
     out[n++ * stride] = (uint8_t)(steps | direction_bit);
   }
@@ -296,36 +265,43 @@ size_t bushd_run_expand_coarse(bushd_run* run, uint32_t tick_ns, size_t ticks, u
   return active;
 }
 
-// 256 since_ns / unit_ns, rounded down. Dividing what is rounded down rounds as dividing the exact
-// sum does, so the fraction of a step needs 32 bits only; on an 8-bit MCU 64-bit divisions would
-// not fit into a tick.
-static uint32_t sub_units(uint32_t since_ns, uint32_t unit_ns) {
-  if (since_ns == 0) return 0;
-  if (since_ns < UINT32_C(1) << 24) return since_ns * 256u / unit_ns;
-  return (uint32_t)((uint64_t)since_ns * 256u / unit_ns);
-}
-
-// How much of the running delay is over, in 1/256 rounded down.
-static inline uint32_t fraction_now(const bushd_run* run, uint32_t unit_ns) {
-  const bushd_delay delay = bushd_run_delay(run);
-  if (delay == 0) return 0;
-  const uint32_t rest = sub_units(run->since_ns, unit_ns);
+// How much of the running delay is over, in 1/256 rounded down. A small MCU finds the eight bits
+// one by one (bushd_run_share): a division of 32 bits would take it six times as long.
+static inline void note_fraction(bushd_run* run, uint32_t unit_ns) {
 #if BUSHD_SLOW_RUNS
-  if (!bushd_delay_is_code(delay)) return (uint32_t)((run->since * 256u + rest) / delay);
+  const bushd_delay delay = bushd_run_delay(run);
+  const uint32_t rest = delay == 0 ? 0 : bushd_run_sub_units(run->since_ns, unit_ns);
+  if (delay == 0) {
+    run->fraction = 0;
+  } else if (bushd_delay_is_code(delay)) {
+    run->fraction = (uint8_t)(((uint32_t)run->since * 256u + rest) / (uint16_t)delay);
+  } else {
+    run->fraction = (uint8_t)((run->since * 256u + rest) / delay);
+  }
+#else
+  (void)unit_ns;
+  bushd_run_note_fraction(run);
 #endif
-  return ((uint32_t)run->since * 256u + rest) / (uint16_t)delay;
 }
 
 size_t bushd_run_expand_fine(bushd_run* run, uint32_t tick_ns, size_t ticks, int16_t* out,
                              size_t stride) {
-  const tick_units tick = in_units(run, tick_ns);
+  const bushd_tick_units tick = bushd_run_tick_units(run, tick_ns);
   size_t n = 0;
   while (n < ticks && bushd_run_parts_left(run) != 0) {
-    const uint32_t steps = advance(run, next_units(&run->since_ns, &tick));
+#if BUSHD_RAMP_INDEX
+    // Behind a block the part of the run goes on: its last step is not made.
+    if (ticks - n >= BUSHD_RUN_BLOCK_TICKS) {
+      const bushd_fine_out rest = {out + n * stride, stride, run->direction};
+      n += bushd_run_fine_block(run, &tick, ticks - n, rest);
+      if (n == ticks) break;
+    }
+#endif
+    const uint32_t steps = advance(run, bushd_next_units(&run->since_ns, &tick));
     bushd_run_count(run, steps);
-    const uint32_t fraction = fraction_now(run, tick.unit_ns);
-    const int32_t displacement = (int32_t)(steps * 256u + fraction) - (int32_t)run->fraction;
-    run->fraction = (uint8_t)fraction;
+    const uint8_t before = run->fraction;
+    note_fraction(run, tick.unit_ns);
+    const int32_t displacement = (int32_t)(steps * 256u + run->fraction) - before;
     out[n++ * stride] = (int16_t)(displacement * run->direction);
   }
   const size_t active = n;
