@@ -90,7 +90,8 @@ struct Lcm {
 // that no flood of other requests is before them; what is not on a network has one place for all.
 bushd::Result<Lcm> open_lcm(const bushd::config::Lcm& config, bool has_control) {
   using bushd::lcm::Transport;
-  auto all = Transport::open(config.url);
+  // Multicast comes back to who sends it. Another daemon is known by its descriptions.
+  auto all = Transport::open(config.url, {}, {config.prefix + "_STATE", config.prefix + "_HEALTH"});
   if (!all && has_control) {
     spdlog::error("{}; only clients of the control socket are served", all.error().text());
     all = Transport::open("memq://");

@@ -246,8 +246,12 @@ void Core::work() {
   dry_runs_.work();
 }
 
+bool Core::has_work() const {
+  return moves_.begins() || lines_.plans() || !dry_runs_.idle() || !trajectories_.idle();
+}
+
 std::int64_t Core::next_wake_us() const {
-  if (moves_.begins() || lines_.plans() || !dry_runs_.idle() || !trajectories_.idle()) return 0;
+  if (has_work()) return 0;
   std::int64_t wake = std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
                                 idle_drivers_.next_wake_us(), jogs_.next_wake_us()});
   for (const BusId id : installation_.buses()) {

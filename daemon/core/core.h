@@ -81,6 +81,8 @@ class Core {
   // and one slice of large moves or dry runs, far less than a millisecond.
   void keep_up(std::int64_t now_us);
   void work();
+  // Slices of that wait.
+  bool has_work() const;
   // A large move is being begun in slices: requests that are no stops should wait.
   bool begins_moves() const { return moves_.begins(); }
   // Units of work done so far in slices.

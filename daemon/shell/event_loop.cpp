@@ -209,11 +209,12 @@ void EventLoop::keep_up(std::int64_t now) {
 
 Result<void> EventLoop::handle_sources() {
   std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
-  // One call dispatches one source, the one that has waited longest.
+  // One call dispatches one source, the one that has waited longest. The others come before any
+  // work in slices; where there is none, run() looks again.
   for (std::size_t i = 0; i < sources_.size() + ports_.size() + keypads_.size(); ++i) {
     const int dispatched = sd_event_run(event_, static_cast<std::uint64_t>(wait_us));
     if (dispatched < 0 && dispatched != -EINTR) return fail(loop_text(dispatched));
-    if (dispatched <= 0) return {};
+    if (dispatched <= 0 || (reception_.idle() && !core_.has_work())) return {};
     keep_up(now_us());
     wait_us = 0;
   }

@@ -28,9 +28,10 @@ int option(int fd, int name) {
 constexpr std::uint32_t kChannelAt = kUdpHeaderBytes + 8;
 constexpr std::uint32_t kTakeAll = UINT32_MAX;
 
-// Takes the datagram if its channel is this one, byte by byte with the NUL behind it; else goes on
-// behind. A datagram that ends before the channel does is dropped.
-void append_channel(std::vector<sock_filter>& program, const std::string& channel) {
+// Takes or drops the datagram if its channel is this one, byte by byte with the NUL behind it; else
+// goes on behind. A datagram that ends before the channel does is dropped.
+void append_channel(std::vector<sock_filter>& program, const std::string& channel,
+                    std::uint32_t verdict) {
   const std::size_t bytes = channel.size() + 1;
   for (std::size_t i = 0; i < bytes; ++i) {
     const auto at = static_cast<std::uint32_t>(kChannelAt + i);
@@ -40,7 +41,7 @@ void append_channel(std::vector<sock_filter>& program, const std::string& channe
     program.push_back(BPF_STMT(BPF_LD | BPF_B | BPF_ABS, at));
     program.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, byte, 0, beyond));
   }
-  program.push_back(BPF_STMT(BPF_RET | BPF_K, kTakeAll));
+  program.push_back(BPF_STMT(BPF_RET | BPF_K, verdict));
 }
 
 }  // namespace
@@ -59,13 +60,15 @@ std::set<int> udp_sockets() {
   return found;
 }
 
-Result<void> accept_whole_messages_only(int udp_socket, const std::vector<std::string>& channels) {
+Result<void> accept_whole_messages_only(int udp_socket, const std::vector<std::string>& channels,
+                                        const std::vector<std::string>& unheard) {
   std::vector<sock_filter> program{
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kUdpHeaderBytes),  // a shorter datagram is dropped here
       BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kWholeMessage, 1, 0),
       BPF_STMT(BPF_RET | BPF_K, 0),
   };
-  for (const std::string& channel : channels) append_channel(program, channel);
+  for (const std::string& channel : unheard) append_channel(program, channel, 0);
+  for (const std::string& channel : channels) append_channel(program, channel, kTakeAll);
   program.push_back(BPF_STMT(BPF_RET | BPF_K, channels.empty() ? kTakeAll : 0));
   const sock_fprog filter{.len = static_cast<unsigned short>(program.size()),
                           .filter = program.data()};

@@ -20,8 +20,10 @@ namespace bushd::lcm {
 std::set<int> udp_sockets();
 
 // Only datagrams with the magic of a whole LCM message reach the socket from now on; with
-// `channels`, only those on one of these. Precondition: up to 8 names of 1..63 characters.
+// `channels`, only those on one of these, and none on an `unheard` one. Precondition: up to 8 names
+// of 1..63 characters.
 Result<void> accept_whole_messages_only(int udp_socket,
-                                        const std::vector<std::string>& channels = {});
+                                        const std::vector<std::string>& channels = {},
+                                        const std::vector<std::string>& unheard = {});
 
 }  // namespace bushd::lcm

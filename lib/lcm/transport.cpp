@@ -89,7 +89,8 @@ Result<void> check_channel(const std::string& channel) {
 }  // namespace
 
 Result<std::unique_ptr<Transport>> Transport::open(const std::string& url,
-                                                   const std::vector<std::string>& channels) {
+                                                   const std::vector<std::string>& channels,
+                                                   const std::vector<std::string>& unheard) {
   if (!is_usable(url)) return fail(cannot_open(url));
   const std::set<int> others = udp_sockets();
   lcm_t* lcm = lcm_create(url.c_str());
@@ -109,7 +110,7 @@ Result<std::unique_ptr<Transport>> Transport::open(const std::string& url,
     if (multicast && multicast->ttl == 0) {
       if (auto kept = keep_on_loopback(udp_socket, *multicast); !kept) return fail(kept.error());
     }
-    if (auto filtered = accept_whole_messages_only(udp_socket, channels); !filtered)
+    if (auto filtered = accept_whole_messages_only(udp_socket, channels, unheard); !filtered)
       return fail(filtered.error());
   }
   return transport;

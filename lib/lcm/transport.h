@@ -34,9 +34,11 @@ class Transport {
   // The socket's receive buffer is enlarged (lcm/receive_buffer.h), unless the URL has its size:
   // `&recv_buf_size=4194304`.
   // With `channels` the kernel keeps everything else away, so that a flood on other channels is
-  // none here. Up to 8.
+  // none here; and with `unheard` what comes on these, such as what this process sends itself. Up
+  // to 8 in all.
   static Result<std::unique_ptr<Transport>> open(const std::string& url,
-                                                 const std::vector<std::string>& channels = {});
+                                                 const std::vector<std::string>& channels = {},
+                                                 const std::vector<std::string>& unheard = {});
   ~Transport();
   Transport(const Transport&) = delete;
   Transport& operator=(const Transport&) = delete;

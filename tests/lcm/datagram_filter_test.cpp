@@ -65,6 +65,15 @@ TEST_F(DatagramFilter, TakesTheseChannelsOnly) {
       ElementsAre(message("B_STOP"), message("B_EMERGENCY_STOP")));
 }
 
+TEST_F(DatagramFilter, TakesAllButUnheardChannels) {
+  ASSERT_TRUE(accept_whole_messages_only(receiver_, {}, {"B_STATE", "B_HEALTH"}));
+  EXPECT_THAT(
+      passed({message("B_STATE"), message("B_HEALTH"), message("B_MOVE"), message("B_STAT"),
+              message("B_STATES"), message("C_STATE"), message("B_MOVE", "LC03"), message("")}),
+      ElementsAre(message("B_MOVE"), message("B_STAT"), message("B_STATES"), message("C_STATE"),
+                  message("")));
+}
+
 TEST_F(DatagramFilter, HoldsForTheLongestNames) {
   const std::string longest(63, 'x');
   ASSERT_TRUE(accept_whole_messages_only(receiver_, {longest, longest.substr(1), "a", "b"}));
