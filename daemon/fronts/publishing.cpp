@@ -53,9 +53,14 @@ void Publishing::send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> pac
   for (Listener* listener : listeners_) listener->hear(topic, *slot.packet);
 }
 
-void Publishing::publish(McuId mcu, const api::StateSnapshot& of_core) {
-  api::StateSnapshot state = of_core;
-  if (state.detail.empty()) state.detail = trouble_;
+void Publishing::publish(McuId mcu, const api::StateSnapshot& state) {
+  if (trouble_.empty() || !state.detail.empty()) return publish_as_told(mcu, state);
+  api::StateSnapshot with_trouble = state;
+  with_trouble.detail = trouble_;
+  publish_as_told(mcu, with_trouble);
+}
+
+void Publishing::publish_as_told(McuId mcu, const api::StateSnapshot& state) {
   auto& slot = states_[mcu.value];
   const bool changed = !slot.snapshot || !same(*slot.snapshot, state) || slot.dropped != dropped_;
   const bool due = clocks_.now_us() - slot.sent_us >= kRestingPeriodUs;

@@ -78,6 +78,7 @@ class Publishing : public api::Publisher {
     std::int64_t dropped = 0;  // messages, as told with it
   };
 
+  void publish_as_told(McuId mcu, const api::StateSnapshot& state);
   lcm::Part part(std::size_t index, std::size_t parts);
   template <class Snapshot>
   void send(Topic topic, Slot<Snapshot>& slot, Result<lcm::Packet> packet);

@@ -80,7 +80,10 @@ Result<void> Mcu::has_room(const link::McuSetup& setup) const {
 
 Installation::Installation(const config::Config& config, std::uint16_t master) : config_(config) {
   for (const config::Group& group : config.groups) tables_.add(group.table);
-  for (const config::Motor& motor : config.motors) drives_.add(motor.drive);
+  for (const config::Motor& motor : config.motors) {
+    drives_.add(motor.drive);
+    moved_by_people_ += motor.drive.moved_by_people();
+  }
   add_buses(master);
   add_mcus();
   add_motors();
@@ -320,6 +323,8 @@ link::McuSetup Installation::setup_of(McuId mcu, const Tables& tables, const Dri
 
 void Installation::put(MotorId id, const config::Drive& drive) {
   const bool other_table = drives_[id].acceleration != drive.acceleration;
+  moved_by_people_ -= drives_[id].moved_by_people();
+  moved_by_people_ += drive.moved_by_people();
   drives_[id] = drive;
   if (other_table) motors_[id].set_axis(new_axis(id));
 }

@@ -168,6 +168,8 @@ class Installation {
   const config::Config& config() const { return config_; }
   // Currents and velocities as they are now. What is put has yet to be told to the MCU.
   const Drives& drives() const { return drives_; }
+  // People at an MCU move some motor, so that it is worth asking which.
+  bool any_moved_by_people() const { return moved_by_people_ != 0; }
   // Precondition: the motor has no plan; has_table().
   void put(MotorId motor, const config::Drive& drive);
   link::McuSetup setup_of(McuId mcu) const { return setup_of(mcu, tables_, drives_); }
@@ -235,6 +237,7 @@ class Installation {
 
   const config::Config& config_;
   Drives drives_;
+  std::size_t moved_by_people_ = 0;
   Tables tables_;  // in service
   mutable tables::Gentler gentler_;
   ById<BusId, std::unique_ptr<Bus>> buses_;

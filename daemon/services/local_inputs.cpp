@@ -52,6 +52,7 @@ std::optional<std::string> LocalInputs::refusal(MotorId id) const {
 }
 
 std::uint16_t LocalInputs::held(const Mcu& mcu) const {
+  if (!installation_.any_moved_by_people()) return 0;
   unsigned held = 0;
   for (const MotorId id : mcu.motors()) {
     const bool theirs = installation_.drives()[id].moved_by_people();

@@ -94,14 +94,16 @@ void StatePublisher::step(std::int64_t now_us) {
 void StatePublisher::publish_all(std::int64_t now_us) {
   for (const McuId id : installation_.mcus()) {
     const Mcu& mcu = installation_[id];
-    publish(now_us, id, description_of(mcu), state_of(mcu));
+    if (describes(now_us, id)) publish(now_us, id, description_of(mcu));
+    outputs_.publish(id, state_of(mcu));
   }
   const auto of_motor = [this](MotorId motor) {
     return state_of(installation_.mcu_of(motor), installation_[motor]);
   };
   for (std::size_t i = 0; i < pseudo_axes_.size(); ++i) {
-    publish(now_us, McuId{installation_.config().mcus.size() + i}, pseudo_axes_.description(i),
-            pseudo_axes_.state(i, of_motor));
+    const McuId part{installation_.config().mcus.size() + i};
+    if (describes(now_us, part)) publish(now_us, part, pseudo_axes_.description(i));
+    outputs_.publish(part, pseudo_axes_.state(i, of_motor));
   }
   installation_.changed = false;
   sent_us_ = now_us;
@@ -112,14 +114,16 @@ std::int64_t StatePublisher::next_wake_us() const {
   return installation_.changed ? std::min(due_us_, sent_us_ + kMinPeriodUs) : due_us_;
 }
 
-void StatePublisher::publish(std::int64_t now_us, McuId part, api::Description description,
-                             const api::StateSnapshot& state) {
+// A description changes with what is marked as changed, and is long.
+bool StatePublisher::describes(std::int64_t now_us, McuId part) const {
+  return installation_.changed || now_us >= described_[part].due_us;
+}
+
+void StatePublisher::publish(std::int64_t now_us, McuId part, api::Description description) {
   Described& described = described_[part];
-  if (now_us >= described.due_us || description != described.last) {
-    outputs_.publish(part, description);
-    described = {.last = std::move(description), .due_us = now_us + kDescriptionPeriodUs};
-  }
-  outputs_.publish(part, state);
+  if (now_us < described.due_us && description == described.last) return;
+  outputs_.publish(part, description);
+  described = {.last = std::move(description), .due_us = now_us + kDescriptionPeriodUs};
 }
 
 api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& motor) const {

@@ -33,8 +33,8 @@ class StatePublisher {
   api::StateSnapshot state_of(const Mcu& mcu) const;
   api::MotorState state_of(const Mcu& mcu, const motion::Motor& motor) const;
   api::Description description_of(const Mcu& mcu) const;
-  void publish(std::int64_t now_us, McuId part, api::Description description,
-               const api::StateSnapshot& state);
+  bool describes(std::int64_t now_us, McuId part) const;
+  void publish(std::int64_t now_us, McuId part, api::Description description);
 
   struct Described {
     std::optional<api::Description> last;

@@ -5,6 +5,7 @@
 // before anything is allocated for it.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <concepts>
 #include <cstddef>
@@ -101,9 +102,11 @@ class Writer {
     } else if constexpr (std::same_as<T, double>) {
       put(std::bit_cast<std::uint64_t>(value));
     } else if constexpr (std::integral<T>) {
-      for (int shift = static_cast<int>(sizeof(T)) * 8 - 8; shift >= 0; shift -= 8) {
-        bytes_.push_back(static_cast<std::uint8_t>(std::make_unsigned_t<T>(value) >> shift));
-      }
+      std::array<std::uint8_t, sizeof(T)> told;
+      std::uint64_t bits = std::make_unsigned_t<T>(value);
+      for (std::size_t i = sizeof(T); i-- > 0; bits >>= 8)
+        told[i] = static_cast<std::uint8_t>(bits);
+      bytes_.insert(bytes_.end(), told.begin(), told.end());
     } else if constexpr (std::same_as<T, std::string>) {
       put(static_cast<std::int32_t>(value.size() + 1));
       bytes_.insert(bytes_.end(), value.begin(), value.end());
