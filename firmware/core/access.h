@@ -15,6 +15,11 @@ static inline uint16_t bushd_mcu_own_motors(const bushd_mcu* mcu) {
   return (uint16_t)(motor_bit((uint8_t)(mcu->config.motors - 1u)) * 2u - 1u);
 }
 
+// What reports tell in these sections (BUSHD_TELLS_*) may have changed.
+static inline void bushd_mcu_tell(bushd_mcu* mcu, uint8_t sections) {
+  mcu->reports.changed |= sections;
+}
+
 // With phases a motor has BUSHD_PHASE_OUTPUTS of the outputs.
 static inline uint8_t bushd_mcu_motors_with_outputs(const bushd_mcu* mcu) {
   const bool phases = mcu->emission.grid.mode == BUSHD_EMISSION_PHASES;

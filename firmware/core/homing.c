@@ -30,9 +30,14 @@ static bool under_way(const bushd_mcu_homing* homing) {
   return homing->stage >= BUSHD_HOMING_FAST && homing->stage <= BUSHD_HOMING_APPROACH;
 }
 
+static void set_stage(bushd_mcu* mcu, bushd_homing stage) {
+  mcu->homing.stage = (uint8_t)stage;
+  bushd_mcu_tell(mcu, BUSHD_TELLS_AUTONOMOUS);
+}
+
 static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
   bushd_mcu_homing* homing = &mcu->homing;
-  homing->stage = (uint8_t)stage;
+  set_stage(mcu, stage);
   homing->readings = 0;
 #if BUSHD_SLOW_RUNS
   const bushd_delay shortest_delay = homing->slow_shortest_delay;
@@ -45,7 +50,7 @@ static void begin_slow(bushd_mcu* mcu, bushd_homing stage, int8_t direction) {
 
 static void end(bushd_mcu* mcu, bushd_homing stage) {
   const uint8_t m = mcu->homing.motor;
-  mcu->homing.stage = (uint8_t)stage;
+  set_stage(mcu, stage);
   if (bushd_mcu_owner_of_motor(mcu, m) != BUSHD_MCU_OWNER_HOMING) return;
   bushd_mcu_give_to_queue(mcu, m);
   mcu->motor[m].remainder = 0;
@@ -59,6 +64,7 @@ static void arrive(bushd_mcu* mcu) {
   mcu->homed |= motor_bit(homing->motor);
   bushd_mcu_stands_at_switch(mcu, homing->motor, homing->direction);
   end(mcu, BUSHD_HOMING_DONE);
+  mcu->reports.moved |= motor_bit(homing->motor);  // its position has another name
 }
 
 // Counts the readings in a row that are as `wanted`; true if they are enough.
@@ -120,7 +126,7 @@ static void end_fast(bushd_mcu* mcu) {
 static void watch_silence(bushd_mcu* mcu) {
   if (mcu->reception.silent_ticks < mcu->reception.comm_timeout_ticks) return;
   mcu->faults |= BUSHD_FAULT_LINK;
-  mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
+  bushd_mcu_count_ramp_down(mcu);
   bushd_mcu_ramp_down_run(mcu, mcu->homing.motor);
 }
 
@@ -133,7 +139,7 @@ static void go_on(bushd_mcu* mcu, bool active) {
         // Whatever ends the homing before it has backed off.
         bushd_mcu_stands_at_switch(mcu, homing->motor, homing->direction);
         if (!homing->meets_limit) begin_to_stop(mcu, false);
-        homing->stage = BUSHD_HOMING_RAMP_DOWN;
+        set_stage(mcu, BUSHD_HOMING_RAMP_DOWN);
       } else if (done) {
         end_fast(mcu);
       }
@@ -250,7 +256,7 @@ bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
   const int8_t begins = first_direction(mcu, message->motor, message->direction);
   if (begins == 0) return BUSHD_E_FORBIDDEN;
   memset(homing, 0, sizeof *homing);
-  homing->stage = BUSHD_HOMING_FAST;
+  set_stage(mcu, BUSHD_HOMING_FAST);
   homing->motor = message->motor;
   homing->direction = message->direction;
   homing->turned = begins != message->direction;

@@ -15,8 +15,8 @@ typedef struct bushd_mcu_homing {
   uint8_t motor;
   int8_t direction;            // towards the switch
   uint8_t readings;            // of it in a row, as they are waited for
-  bool turned;                 // the fast stage goes the other way: a limit came before the switch
-  bool meets_limit;            // it ramps down because of one
+  bool turned : 1;             // the fast stage goes the other way: a limit came before the switch
+  bool meets_limit : 1;        // it ramps down because of one
   bushd_delay shortest_delay;  // of the fast stage
   uint32_t most_steps;         // of the fast stage
   uint32_t slow_steps;         // of each slow one, at most

@@ -20,9 +20,23 @@ static uint16_t* hit_towards(bushd_mcu* mcu, int8_t direction) {
   return direction > 0 ? &mcu->limits.hit_positive : &mcu->limits.hit_negative;
 }
 
+static void set_hit(bushd_mcu* mcu, int8_t direction, uint16_t bit) {
+  *hit_towards(mcu, direction) |= bit;
+  bushd_mcu_tell(mcu, BUSHD_TELLS_INPUTS);
+}
+
+// Asked every tick of a motor that moves: only a change is news.
+static void clear_hit(bushd_mcu* mcu, int8_t direction, uint16_t bit) {
+  uint16_t* const hit = hit_towards(mcu, direction);
+  if ((*hit & bit) == 0) return;
+  *hit &= (uint16_t)~bit;
+  bushd_mcu_tell(mcu, BUSHD_TELLS_INPUTS);
+}
+
 // From the inputs as debounced.
 static void find_motors(bushd_mcu* mcu) {
   bushd_mcu_limits* limits = &mcu->limits;
+  bushd_mcu_tell(mcu, BUSHD_TELLS_INPUTS);
   limits->at_positive = limits->at_negative = 0;
   if (limits->active == 0) return;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
@@ -127,7 +141,7 @@ uint16_t bushd_mcu_at_limits(const bushd_mcu* mcu) {
 static void leave(bushd_mcu* mcu, uint8_t m, int8_t heading) {
   const int8_t back = (int8_t)-heading;
   const uint16_t bit = motor_bit(m);
-  if ((at_limit(mcu, back) & bit) == 0) *hit_towards(mcu, back) &= (uint16_t)~bit;
+  if ((at_limit(mcu, back) & bit) == 0) clear_hit(mcu, back, bit);
 }
 
 void bushd_mcu_stands_off_limit(bushd_mcu* mcu, uint8_t m, int8_t last_direction) {
@@ -137,12 +151,13 @@ void bushd_mcu_stands_off_limit(bushd_mcu* mcu, uint8_t m, int8_t last_direction
 bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_active, bool homes) {
   const uint16_t bit = motor_bit(m);
   const int8_t back = (int8_t)-heading;
-  uint16_t* const ahead = hit_towards(mcu, heading);
   if (!homes || !bushd_mcu_homes_at_limit(mcu, m, heading)) {
     const bool both_ends = (mcu->limits.both_ends & bit) != 0;
-    if (both_ends && now_active && (*hit_towards(mcu, back) & bit) == 0) *ahead |= bit;
+    if (both_ends && now_active && (*hit_towards(mcu, back) & bit) == 0) {
+      set_hit(mcu, heading, bit);
+    }
     if ((bushd_mcu_forbidden(mcu, heading) & bit) != 0) {
-      *ahead |= bit;
+      set_hit(mcu, heading, bit);
       return true;
     }
   }
@@ -152,10 +167,9 @@ bool bushd_mcu_limit_stops(bushd_mcu* mcu, uint8_t m, int8_t heading, bool now_a
 }
 
 void bushd_mcu_stands_at_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
-  if (bushd_mcu_homes_at_limit(mcu, m, direction)) *hit_towards(mcu, direction) |= motor_bit(m);
+  if (bushd_mcu_homes_at_limit(mcu, m, direction)) set_hit(mcu, direction, motor_bit(m));
 }
 
 void bushd_mcu_has_left_switch(bushd_mcu* mcu, uint8_t m, int8_t direction) {
-  if (!bushd_mcu_homes_at_limit(mcu, m, direction)) return;
-  *hit_towards(mcu, direction) &= (uint16_t)~motor_bit(m);
+  if (bushd_mcu_homes_at_limit(mcu, m, direction)) clear_hit(mcu, direction, motor_bit(m));
 }

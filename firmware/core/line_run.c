@@ -85,7 +85,7 @@ static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, u
   bushd_run_start(&mcu->line.run, bushd_mcu_checked_table(mcu, part->bank), part->steps, 1,
                   part->shortest_delay);
   if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;
-  mcu->line.bank = part->bank;
+  mcu->line.bank = part->bank & 0xFu;
   mcu->line.longest = part->longest;
   mcu->line.step = part->from + 1u;
   mcu->line.last = part->from + part->steps;

@@ -16,11 +16,11 @@ typedef struct bushd_mcu bushd_mcu;
 typedef struct bushd_mcu_line {
   uint16_t unplaced;  // of its motors, before it begins: their followers are still to be started
   uint16_t motors;  // on it: those whose bushd_mcu_on_line counts, as long as their mode is a run's
-  uint8_t bank;     // of its table
+  uint8_t bank : 4;  // of its table
+  bool waits : 1;  // for the trigger, if any motor does: it is those motors' and none is on it yet
   uint32_t longest;
   uint32_t step;  // of the line, that is under way, counted from 1
   uint32_t last;  // and where the run ends
-  bool waits;     // for the trigger, if any motor does: it is those motors' and none is on it yet
   bushd_run run;
 } bushd_mcu_line;
 

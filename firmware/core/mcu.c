@@ -63,7 +63,7 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   mcu->config = *config;
   if (config->scratch != NULL) memset(config->scratch, 0, sizeof *config->scratch);
   mcu->tick_ns = BUSHD_BOOT_TICK_NS;
-  mcu->low_water_ticks = UINT16_MAX;
+  mcu->low_water_ticks = mcu->reports.low_water_ticks = UINT16_MAX;
   bushd_mcu_drive_enable(mcu);
   port->set_tick(port->context, mcu->tick_ns);
   for (uint8_t m = 0; m < config->motors; ++m) mcu->motor[m].table = -1;
@@ -97,6 +97,7 @@ const bushd_slot_buffer* bushd_mcu_swap(bushd_mcu* mcu) {
   if (ended->active != 0) {
     bushd_mcu_add_steps(&mcu->motor[0].position_steps, sizeof mcu->motor[0], ended->steps,
                         mcu->config.motors);
+    mcu->reports.moved |= ended->active;
   }
   mcu->front ^= 1u;
   ++mcu->tick;
@@ -169,6 +170,7 @@ void bushd_mcu_receive(bushd_mcu* mcu, uint8_t byte, int32_t time_in_tick_ns) {
     case BUSHD_RECEIVE_BAD_CRC:
     case BUSHD_RECEIVE_BAD_LENGTH:
       mcu->reception.bad_frames = saturating_increment(mcu->reception.bad_frames);
+      bushd_mcu_tell(mcu, BUSHD_TELLS_COUNTERS);
       return;
     case BUSHD_RECEIVE_FRAME:
       break;

@@ -19,6 +19,7 @@ extern "C" {
 #include "firmware/core/local.h"
 #include "firmware/core/motor.h"
 #include "firmware/core/position_compare.h"
+#include "firmware/core/report.h"
 #include "firmware/core/requests.h"
 #include "firmware/core/slot_buffer.h"
 #include "firmware/core/stream.h"
@@ -52,6 +53,7 @@ struct bushd_mcu {
   bushd_mcu_stream stream;
   bushd_mcu_line line;
   bushd_mcu_reception reception;
+  bushd_mcu_reports reports;
   bushd_mcu_limits limits;
   union {  // one of both at a time; the stage tells which
     bushd_mcu_homing homing;

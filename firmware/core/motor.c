@@ -7,6 +7,7 @@
 #include "firmware/core/line_run.h"
 #include "firmware/core/owner.h"
 #include "firmware/core/position_compare.h"
+#include "firmware/core/state.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/stream_stop.h"
 #include "firmware/core/table_run.h"
@@ -20,7 +21,7 @@ static void queue_ended(bushd_mcu* mcu, uint8_t m) {
   // DIR then still shows the move before: where this one was to go is not known. It has not left
   // rest, so it may stay.
   if ((mcu->stream.begun & motor_bit(m)) == 0) return;
-  mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
+  bushd_mcu_count_ramp_down(mcu);
   bushd_mcu_ramp_down_stream(mcu, m, delay);
 }
 

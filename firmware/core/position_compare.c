@@ -27,8 +27,8 @@ bushd_status bushd_mcu_take_position_compare(bushd_mcu* mcu,
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
   // One that is out ends in its time.
   if (compare->pulse == PULSE_RISES) compare->pulse = PULSE_NONE;
-  compare->motor = message->motor;
-  compare->arrivals = message->arrivals;
+  compare->motor = message->motor & 0xFu;
+  compare->arrivals = message->arrivals & 3u;
   compare->position_steps = message->position_steps;
   compare->delay = in_slots(mcu, message->delay_us);
   compare->width = in_slots(mcu, message->width_us);

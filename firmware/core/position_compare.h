@@ -17,9 +17,9 @@ typedef struct bushd_mcu_slots {
 
 // The position compare output (position_compare.c).
 typedef struct bushd_mcu_position_compare {
-  uint8_t motor;
-  uint8_t arrivals;  // BUSHD_ARRIVES_*
-  uint8_t pulse;     // 0: none, or what comes next of it
+  uint8_t motor : 4;
+  uint8_t arrivals : 2;  // BUSHD_ARRIVES_*
+  uint8_t pulse : 2;     // 0: none, or what comes next of it
   int32_t position_steps;
   bushd_mcu_slots delay;
   bushd_mcu_slots width;

@@ -14,6 +14,7 @@
 #include "firmware/core/local.h"
 #include "firmware/core/owner.h"
 #include "firmware/core/position_compare.h"
+#include "firmware/core/report.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
@@ -23,72 +24,6 @@
 #include "firmware/core/travel.h"
 #include "firmware/core/trigger.h"
 #include "firmware/core/velocity.h"
-
-// What it says of each motor. One out-of-order range has room in a report: that of the lowest
-// motor, and who else has the same one.
-static inline void report_motors(const bushd_mcu* mcu, bushd_report* report) {
-  const bushd_mcu_out_of_order* told = NULL;
-  const bushd_mcu_motor* motor = mcu->motor;
-  bushd_motor_report* to = report->motor;
-  uint16_t running = 0;
-  uint16_t bit = 1;
-  report->out_of_order = 0;
-  for (uint8_t left = mcu->config.motors; left > 0; --left, ++motor, ++to) {
-    if (motor->mode != BUSHD_MCU_STREAM && motor->exact) running |= bit;
-    if (motor->has_out_of_order) {
-      if (told == NULL) told = &motor->out_of_order;
-      if (motor->out_of_order.from == told->from && motor->out_of_order.until == told->until) {
-        report->out_of_order |= bit;
-      }
-    }
-    to->position_steps = motor->position_steps;
-    const bool far = ticks_after(motor->known_until, mcu->tick) > INT16_MAX;
-    to->known_until = (uint16_t)(far ? mcu->tick + INT16_MAX : motor->known_until);
-    bit = (uint16_t)(bit << 1);
-  }
-  report->motor_count = mcu->config.motors;
-  // What people move by local inputs is not for a master to end.
-  report->running = (uint16_t)(running & ~(mcu->autonomous & ~bushd_mcu_moved_by_request(mcu)));
-  report->out_of_order_from = told != NULL ? (uint16_t)told->from : (uint16_t)0;
-  report->out_of_order_until = told != NULL ? (uint16_t)told->until : (uint16_t)0;
-}
-
-// Large on the stack: not a part of the frame of who calls it, below which streams are taken.
-__attribute__((noinline)) static size_t encode_report(bushd_mcu* mcu, uint8_t* payload) {
-  bushd_mcu_update_state(mcu);
-  bushd_report report;
-  report.state = mcu->state;
-  report.faults = mcu->faults;
-  report.flags = mcu->flags;
-  report.epoch = mcu->stream.epoch;
-  report.boot_number = mcu->config.boot_number;
-  report.tick = mcu->tick;
-  report.tick_ns = mcu->port.time_in_tick_ns(mcu->port.context);
-  report.sync_id = mcu->clock.sync_id;
-  report.sync_tick = mcu->clock.sync_tick;
-  report.sync_ns = mcu->clock.sync_ns;
-  report.rate_ppb = mcu->clock.rate_ppb;
-  report.moving = bushd_mcu_moving(mcu);
-  bushd_mcu_report_inputs(mcu, &report);
-  report.reset_cause = mcu->config.reset_cause;
-  report.failed_tests = mcu->failed_tests;
-  report.autonomous = mcu->autonomous;
-  report.homed = mcu->homed;
-  report.homing = mcu->homing.stage;
-  report.bad_frames = mcu->reception.bad_frames;
-  report.rejected_frames = mcu->reception.rejected_frames;
-  report.last_rejection = mcu->reception.last_rejection;
-  report.ramp_downs = mcu->ramp_downs;
-  report.low_water_ticks = mcu->low_water_ticks;
-  mcu->low_water_ticks = UINT16_MAX;
-  report_motors(mcu, &report);
-  report.armed = mcu->trigger.armed;
-  report.trigger_number = mcu->trigger.number;
-  report.trigger_state = mcu->trigger.state;
-  report.start_tick = mcu->trigger.start_tick;
-  report.start_ns = mcu->trigger.start_ns;
-  return bushd_encode_report(&report, payload);
-}
 
 static uint32_t capabilities_of(const bushd_mcu* mcu) {
   uint32_t all = BUSHD_CAN_COARSE | BUSHD_CAN_FINE | BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_TABLE_RUN |
@@ -164,6 +99,7 @@ static bushd_status set_position(bushd_mcu* mcu, const bushd_set_position* messa
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
   if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   mcu->motor[message->motor].position_steps = message->position_steps;
+  mcu->reports.moved |= motor_bit(message->motor);
   mcu->motor[message->motor].remainder = 0;
   return BUSHD_OK;
 }
@@ -209,7 +145,7 @@ static bushd_status answer_poll(bushd_mcu* mcu, const bushd_frame* frame, answer
   bushd_poll_entry entry;
   if (status != BUSHD_OK || !bushd_poll_find(&message, mcu->config.address, &entry)) return status;
   answer_at(a, entry.begin_units);
-  a->size = encode_report(mcu, a->payload);
+  a->size = bushd_mcu_encode_report(mcu, &entry, a->payload);
   return BUSHD_OK;
 }
 

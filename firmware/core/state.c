@@ -42,6 +42,12 @@ void bushd_mcu_update_state(bushd_mcu* mcu) {
 }
 
 void bushd_mcu_reject(bushd_mcu* mcu, bushd_status status) {
+  bushd_mcu_tell(mcu, BUSHD_TELLS_COUNTERS);
   mcu->reception.rejected_frames = saturating_increment(mcu->reception.rejected_frames);
   mcu->reception.last_rejection = (uint8_t)status;
+}
+
+void bushd_mcu_count_ramp_down(bushd_mcu* mcu) {
+  mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
+  bushd_mcu_tell(mcu, BUSHD_TELLS_COUNTERS);
 }

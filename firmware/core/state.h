@@ -16,5 +16,7 @@ uint16_t bushd_mcu_engaged(const bushd_mcu* mcu);
 void bushd_mcu_update_state(bushd_mcu* mcu);
 // A frame was refused: the report says so.
 void bushd_mcu_reject(bushd_mcu* mcu, bushd_status status);
+// A motor had to be ramped down.
+void bushd_mcu_count_ramp_down(bushd_mcu* mcu);
 
 #endif

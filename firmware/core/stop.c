@@ -8,6 +8,7 @@
 #include "firmware/core/access.h"
 #include "firmware/core/line_run.h"
 #include "firmware/core/owner.h"
+#include "firmware/core/state.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/stream_stop.h"
 #include "firmware/core/table_run.h"
@@ -17,7 +18,7 @@ static void end_in_silence(bushd_mcu* mcu, uint8_t m, bool runs, uint32_t next) 
   uint32_t from = next;
   uint32_t rest_from;
   if (runs) {
-    mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
+    bushd_mcu_count_ramp_down(mcu);
   } else if (bushd_mcu_start_waits(mcu, m, next, &rest_from) && ticks_after(rest_from, next) > 0) {
     from = rest_from;  // ticks before it are still made
   }

@@ -159,6 +159,7 @@ void bushd_mcu_sync(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick
   const bool same_master = clock->heard && clock->master == sync->master;
   // A frame that comes twice is one SYNC, and the first time is the one that the others heard.
   if (same_master && clock->sync_id == sync->sync_id) return;
+  bushd_mcu_tell(mcu, BUSHD_TELLS_SYNC);
   const bool known = same_master && sync->follows && (mcu->flags & BUSHD_FLAG_SYNC_HEARD) != 0 &&
                      clock->sync_id == sync->follow_up_id && sync->sync_ns < mcu->tick_ns;
   if (known && (mcu->flags & BUSHD_FLAG_SYNCED) != 0) {

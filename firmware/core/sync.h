@@ -12,12 +12,15 @@ typedef struct bushd_mcu bushd_mcu;
 // The tick counter against the bus's (sync.c). All adjustments are as the port takes them: > 0 is a
 // longer tick.
 typedef struct bushd_mcu_clock {
-  uint8_t
-      settling;  // ticks until the tick timer has another length; times of SYNCs are void till then
-  bool heard;    // a SYNC frame; of the last one:
-  uint16_t master;     // whose it is
-  uint32_t sync_id;    // its id
-  uint32_t sync_tick;  // when it was, if BUSHD_FLAG_SYNC_HEARD
+  // Ticks until the tick timer has another length; times of SYNCs are void till then.
+  uint8_t settling : 2;
+  bool rate_known : 1;   // estimated since the clock was adopted
+  bool corrected : 1;    // the clock was right at corrected_tick of the bus
+  bool other_heard : 1;  // a master that was not `master`
+  bool heard : 1;        // a SYNC frame; of the last one:
+  uint16_t master;       // whose it is
+  uint32_t sync_id;      // its id
+  uint32_t sync_tick;    // when it was, if BUSHD_FLAG_SYNC_HEARD
   uint32_t sync_ns;
   int32_t behind_ns;     // the bus, not yet given to the port
   int32_t slew_now_ns;   // of the present tick
@@ -25,18 +28,15 @@ typedef struct bushd_mcu_clock {
   int32_t rate_now_ns;   // the rate's share in the same
   int32_t rate_next_ns;
   uint32_t told_tick;     // of the bus, that the last SYNC with a follow-up has told
-  bool rate_known;        // estimated since the clock was adopted
   int32_t rate_ppb;       // faster than the crystal
   int32_t rate_step;      // ns a tick, x 4096
   int32_t rate_fraction;  // of it, not yet given
-  bool corrected;         // the clock was right at this time of the bus
   uint32_t corrected_tick;
   uint32_t corrected_ns;
   // Masters that come by turns.
   uint16_t other_master;   // the last one that was not `master`
   uint32_t master_uptime;  // when they were heard last
   uint32_t other_uptime;
-  bool other_heard;
   uint16_t two_masters_ticks;  // until the flag falls
 } bushd_mcu_clock;
 

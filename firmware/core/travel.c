@@ -24,19 +24,24 @@ static bool is_run(const bushd_mcu_travel* travel) {
   return travel->stage == BUSHD_TRAVEL_RUN || travel->stage == BUSHD_TRAVEL_RETURN;
 }
 
+static void set_stage(bushd_mcu* mcu, bushd_travel_stage stage) {
+  mcu->travel.stage = (uint8_t)stage;
+  bushd_mcu_tell(mcu, BUSHD_TELLS_AUTONOMOUS);
+}
+
 static void end(bushd_mcu* mcu, bushd_travel_stage stage) {
   bushd_mcu_travel* travel = &mcu->travel;
   if (travel->stage == BUSHD_TRAVEL_ARMED) {
     mcu->port.set_trigger(mcu->port.context, BUSHD_EDGE_NONE);
   }
-  travel->stage = (uint8_t)stage;
+  set_stage(mcu, stage);
   if (bushd_mcu_owner_of_motor(mcu, travel->motor) != BUSHD_MCU_OWNER_TRAVEL) return;
   bushd_mcu_give_to_queue(mcu, travel->motor);
   mcu->motor[travel->motor].remainder = 0;
 }
 
 static void wait_for_edge(bushd_mcu* mcu) {
-  mcu->travel.stage = BUSHD_TRAVEL_ARMED;
+  set_stage(mcu, BUSHD_TRAVEL_ARMED);
   mcu->trigger.state = BUSHD_TRIGGER_ARMED;
   mcu->port.set_trigger(mcu->port.context,
                         bushd_mcu_edge_of_pin(mcu, (bushd_edge)mcu->travel.edge));
@@ -50,7 +55,7 @@ static void begin(bushd_mcu* mcu, bushd_travel_stage stage) {
     end(mcu, BUSHD_TRAVEL_EARLY);
     return;
   }
-  travel->stage = (uint8_t)stage;
+  set_stage(mcu, stage);
   travel->readings = (uint16_t)(2u * mcu->inputs.debounce_ticks + 2u);
   bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), travel->steps,
                   travel->direction, 0);
@@ -81,7 +86,7 @@ static void plan_return(bushd_mcu* mcu) {
     travel->due_tick = first;
     travel->due_ns = 0;
   }
-  travel->stage = BUSHD_TRAVEL_RETURN_DELAY;
+  set_stage(mcu, BUSHD_TRAVEL_RETURN_DELAY);
 }
 
 static bool is_at(const bushd_mcu* mcu, int8_t direction) {
@@ -148,7 +153,7 @@ void bushd_mcu_go_travel(bushd_mcu* mcu, uint16_t active_inputs) {
   if (!bushd_mcu_travels(travel)) return;
   if (mcu->reception.silent_ticks >= mcu->reception.comm_timeout_ticks) {
     mcu->faults |= BUSHD_FAULT_LINK;
-    if (is_run(travel)) mcu->ramp_downs = saturating_increment(mcu->ramp_downs);
+    if (is_run(travel)) bushd_mcu_count_ramp_down(mcu);
   }
   if (mcu->faults != 0) bushd_mcu_ramp_down_run(mcu, travel->motor);
   if (bushd_mcu_owner_of_motor(mcu, travel->motor) == BUSHD_MCU_OWNER_TRAVEL) {
@@ -163,13 +168,13 @@ void bushd_mcu_travel_at_edge(bushd_mcu* mcu, int32_t time_in_tick_ns) {
   const int64_t after_ns = (int64_t)bushd_mcu_bus_ns(mcu, time_in_tick_ns) + travel->delay_ns;
   travel->due_tick = mcu->tick + (uint32_t)(after_ns / mcu->tick_ns);
   travel->due_ns = (uint32_t)(after_ns % mcu->tick_ns);
-  travel->stage = BUSHD_TRAVEL_DELAY;
+  set_stage(mcu, BUSHD_TRAVEL_DELAY);
   mcu->port.set_trigger(mcu->port.context, BUSHD_EDGE_NONE);
 }
 
 bool bushd_mcu_travel_meets_limit(bushd_mcu* mcu) {
   if (bushd_run_done(&mcu->motor[mcu->travel.motor].made.run)) return false;
-  if (is_run(&mcu->travel)) mcu->travel.stage = BUSHD_TRAVEL_EARLY;
+  if (is_run(&mcu->travel)) set_stage(mcu, BUSHD_TRAVEL_EARLY);
   return true;
 }
 
@@ -244,12 +249,12 @@ bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message) 
   bushd_mcu_begin_by_itself(mcu, message->motor, steps ? 1 : 0, message->direction, 0,
                             BUSHD_MCU_TRAVEL);
   if (steps) {
-    travel->stage = BUSHD_TRAVEL_STEPS;
+    set_stage(mcu, BUSHD_TRAVEL_STEPS);
     travel->readings = (uint16_t)((travel->wait_ns + mcu->tick_ns - 1u) / mcu->tick_ns + 1u);
   } else if (travel->edge != BUSHD_EDGE_NONE) {
     wait_for_edge(mcu);
   } else {
-    travel->stage = BUSHD_TRAVEL_DELAY;
+    set_stage(mcu, BUSHD_TRAVEL_DELAY);
   }
   return BUSHD_OK;
 }

@@ -36,6 +36,7 @@ static bool may_arm(bushd_mcu* mcu) {
 
 static void await_edge(bushd_mcu* mcu, uint16_t motors, uint8_t number, bushd_edge edge,
                        uint32_t delay_us) {
+  bushd_mcu_tell(mcu, BUSHD_TELLS_AUTONOMOUS);
   mcu->trigger.armed = motors;
   mcu->trigger.number = number;
   mcu->trigger.state = BUSHD_TRIGGER_ARMED;
@@ -84,6 +85,7 @@ bushd_status bushd_mcu_arm_line(bushd_mcu* mcu, const bushd_line_trigger* messag
 }
 
 void bushd_mcu_disarm(bushd_mcu* mcu, bushd_trigger_state why) {
+  bushd_mcu_tell(mcu, BUSHD_TELLS_AUTONOMOUS);
   mcu->trigger.armed = 0;
   mcu->trigger.state = (uint8_t)why;
   mcu->port.set_trigger(mcu->port.context, BUSHD_EDGE_NONE);

@@ -10,7 +10,14 @@ namespace {
 // Every transmitter sends a delimiter first.
 constexpr double kFrameCost = BUSHD_FRAME_OVERHEAD + 1.0;
 constexpr double kSyncBytes = 19.0;
-constexpr double kPollEntryBytes = 3.0;
+constexpr double kPollEntryBytes = BUSHD_POLL_ENTRY;
+
+// The window of one whose motors all move, whether its report fills it or not.
+double report_bytes(std::uint8_t motors) {
+  const auto all = static_cast<std::uint16_t>((1u << motors) - 1u);
+  const unsigned sections = motors != 0 ? BUSHD_NEWS_IN_MOTION : BUSHD_NEWS_AT_REST;
+  return static_cast<double>(bushd_report_size(static_cast<std::uint8_t>(sections), all));
+}
 
 }  // namespace
 
@@ -24,7 +31,7 @@ double bus_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
   bytes_per_s += (kFrameCost + 1.0 + kFirstWindowUs * bytes_per_us) * polls_per_s;
   for (const std::uint8_t motors : motors_per_mcu) {
     const double report =
-        kPollEntryBytes + kFrameCost + BUSHD_REPORT_SIZE(motors) + kWindowGuardUs * bytes_per_us;
+        kPollEntryBytes + kFrameCost + report_bytes(motors) + kWindowGuardUs * bytes_per_us;
     bytes_per_s += report * polls_per_s;
     if (motors == 0) continue;
     const double ticks = ticks_per_frame(motors, format, tick_ns);

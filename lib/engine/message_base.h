@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-#define BUSHD_PROTOCOL_VERSION 5u
+#define BUSHD_PROTOCOL_VERSION 6u
 #define BUSHD_MOTORS_PER_MCU 16u
 #define BUSHD_TABLE_BANKS 8u
 #define BUSHD_SCRATCH_BANK 8u  // volatile: its table is lost at a reset (BUSHD_CAN_SCRATCH)

@@ -1,4 +1,4 @@
-// Messages of motion: time, ticks, table runs, homing, polls and reports (engine/message.h).
+// Messages of motion: time, ticks, table runs, homing (engine/message.h).
 #ifndef BUSHD_ENGINE_MESSAGE_MOTION_H
 #define BUSHD_ENGINE_MESSAGE_MOTION_H
 
@@ -54,20 +54,6 @@ typedef struct bushd_local {
   uint16_t keypad;
   uint16_t keypad_ticks;
 } bushd_local;
-
-// Asks `count` MCUs for reports, each in a reply window of its own: entry i (bushd_poll_entry)
-// names an address and when, after this frame's end, its answer begins.
-#define BUSHD_POLL_MAX_ENTRIES ((BUSHD_FRAME_MAX_PAYLOAD - 1u) / 3u)
-typedef struct bushd_poll_entry {
-  uint8_t address;
-  uint16_t begin_units;  // BUSHD_REPLY_UNIT_NS
-} bushd_poll_entry;
-typedef struct bushd_poll {
-  uint8_t count;           // >= 1
-  const uint8_t* entries;  // count x 3 bytes
-} bushd_poll;
-// The entry with this address, if there is one.
-bool bushd_poll_find(const bushd_poll* poll, uint8_t address, bushd_poll_entry* entry);
 
 // Two-step synchronisation. `sync_id` identifies this SYNC; its time is the end of its frame. If
 // `follows`, the time of `follow_up_id` was (sync_tick, sync_ns into that tick) of bus time.
@@ -239,66 +225,12 @@ typedef struct bushd_emergency {
   bushd_stop_mode mode;
 } bushd_emergency;
 
-typedef struct bushd_motor_report {
-  int32_t position_steps;  // steps made until the start of `tick`
-  uint16_t known_until;    // low 16 bits of the first tick for which nothing is decided; at most
-                           // 32767 after `tick`
-} bushd_motor_report;
-
-typedef struct bushd_report {
-  uint8_t state;   // bushd_state
-  uint8_t faults;  // BUSHD_FAULT_*
-  uint8_t flags;   // BUSHD_FLAG_*
-  uint8_t epoch;
-  uint16_t boot_number;
-  uint32_t tick;     // the tick being emitted
-  uint32_t tick_ns;  // how far into it, when the poll's frame ended
-  uint32_t sync_id;  // the last SYNC heard, and when it ended by the MCU's own clock
-  uint32_t sync_tick;
-  uint32_t sync_ns;
-  int32_t rate_ppb;          // how much faster than its crystal the MCU counts, to follow the bus
-  uint16_t moving;           // motors not at rest
-  uint16_t running;          // of them, those in a table run
-  uint16_t inputs;           // bit per motor: active
-  uint16_t bad_frames;       // CRC and length errors; saturates
-  uint16_t rejected_frames;  // valid frames that could not be used; saturates
-  uint8_t last_rejection;    // bushd_status of the last one
-  uint16_t ramp_downs;       // motors that had to be ramped down since boot; saturates
-  uint16_t low_water_ticks;  // the fewest ticks that a moving motor had queued, since the report
-                             // before; 65535: none moved
-  // Ticks that these motors have beyond a gap: from the tick `out_of_order_from` (low 16 bits) on,
-  // until `out_of_order_until`.
-  uint16_t out_of_order;
-  uint16_t out_of_order_from;
-  uint16_t out_of_order_until;
-  uint16_t forbidden_positive;  // motors that a limit keeps from moving in this direction
-  uint16_t forbidden_negative;
-  uint8_t system_inputs;   // active, BUSHD_INPUT_*
-  uint16_t current;        // of the supply, 0..1023
-  uint8_t reset_cause;     // BUSHD_RESET_*
-  uint8_t failed_tests;    // at boot, BUSHD_TEST_*
-  uint16_t autonomous;     // motors that move by homing, travel or local inputs
-  uint16_t homed;          // motors whose last homing since boot was done
-  uint8_t homing;          // bushd_homing or bushd_travel_stage, of the last of both
-  uint16_t armed;          // motors that wait for the trigger
-  uint8_t trigger_number;  // of the last one taken; 0: none since boot
-  uint8_t trigger_state;   // bushd_trigger_state
-  uint32_t start_tick;     // when it began, or will, if BUSHD_TRIGGER_STARTED
-  uint32_t start_ns;       // after the beginning of start_tick
-  uint8_t motor_count;     // <= BUSHD_MOTORS_PER_MCU
-  bushd_motor_report motor[BUSHD_MOTORS_PER_MCU];
-} bushd_report;
-
-#define BUSHD_REPORT_SIZE(motors) (78u + 6u * (motors))
-
 // Encoders return the payload's size. Preconditions are the ranges given above.
 size_t bushd_encode_home(const bushd_home* message, uint8_t* payload);
 size_t bushd_encode_local(const bushd_local* message, uint8_t* payload);
 size_t bushd_encode_travel(const bushd_travel* message, uint8_t* payload);
-size_t bushd_encode_poll(const bushd_poll_entry* entries, uint8_t count, uint8_t* payload);
 size_t bushd_encode_sync(const bushd_sync* message, uint8_t* payload);
 size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload);
-size_t bushd_encode_report(const bushd_report* message, uint8_t* payload);
 
 // Writes header and delays of a ticks payload and returns where the displacements go; the caller
 // writes count x motors of them there (bushd_put_i16 or plain bytes). `delays` has an entry per
@@ -321,7 +253,6 @@ size_t bushd_encode_position_compare(const bushd_position_compare* message, uint
 bushd_status bushd_decode_home(const uint8_t* payload, size_t size, bushd_home* message);
 bushd_status bushd_decode_local(const uint8_t* payload, size_t size, bushd_local* message);
 bushd_status bushd_decode_travel(const uint8_t* payload, size_t size, bushd_travel* message);
-bushd_status bushd_decode_poll(const uint8_t* payload, size_t size, bushd_poll* message);
 bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message);
 bushd_status bushd_decode_sync(const uint8_t* payload, size_t size, bushd_sync* message);
 bushd_status bushd_decode_ticks(const uint8_t* payload, size_t size, bushd_ticks* message);
@@ -335,7 +266,6 @@ bushd_status bushd_decode_table_run(const uint8_t* payload, size_t size, bushd_t
 bushd_status bushd_decode_trigger(const uint8_t* payload, size_t size, bushd_trigger* message);
 bushd_status bushd_decode_position_compare(const uint8_t* payload, size_t size,
                                            bushd_position_compare* message);
-bushd_status bushd_decode_report(const uint8_t* payload, size_t size, bushd_report* message);
 
 #ifdef __cplusplus
 }

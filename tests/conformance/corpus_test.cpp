@@ -220,7 +220,7 @@ class ImageReplay final : public fuzz::Programmed {
   // An answer that noise has asked for may fall upon a question.
   bool ask(bushd_report& report) {
     for (int attempt = 0; attempt < 3; ++attempt) {
-      const std::array<std::uint8_t, 4> me = {1, address(), 0, 0};
+      const std::array<std::uint8_t, 6> me = {1, address(), 0, 0, 0, 255};
       if (send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, me) &&
           bushd_decode_report(answer_.payload.data(), answer_.payload.size(), &report) ==
               BUSHD_OK) {

@@ -156,7 +156,7 @@ TEST_P(Faults, ATableRunEndsWhenNobodyIsHeard) {
   }
   start_run();
   pass_ticks(30);
-  broadcast(BUSHD_MSG_POLL, {1, 99, 0, 0});
+  broadcast(BUSHD_MSG_POLL, {1, 99, 0, 0, 0, 255});
   pass_ticks(100);
   expect_alike(BUSHD_FAULT_LINK, 60, 200);
 }

@@ -175,8 +175,9 @@ TEST_P(Triggered, WhereOneMcuCannotBeArmedTheOthersDoNotWait) {
   toml.insert(toml.find(fifth) + fifth.size(), "limit = \"positive\"\n");
   Lab limited(toml, {}, &pins);
   limited.connect();
+  limited.bus(0).mcu(1).set_inputs({0b010, 0});
+  limited.run_for(0.003);  // a tick later the MCU knows, and the daemon does not
   const auto move = limited.send(armed({"m01", "m04", "m05"}, {50, 60, 70}));
-  limited.bus(0).mcu(1).set_inputs({0b010, 0});  // at this very moment
   const Answer result = limited.wait(move, 2);
   EXPECT_EQ(result.result, "limit") << result.reason;
   EXPECT_EQ(result.motor_results, (std::vector<std::string>{"stopped", "limit", "limit"}));

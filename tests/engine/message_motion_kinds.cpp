@@ -1,3 +1,6 @@
+#include <array>
+#include <bit>
+
 #include "engine/message_kinds.h"
 
 namespace bushd::test {
@@ -61,14 +64,49 @@ Bytes any_ticks() {
   return payload;
 }
 
+// With motors 0 .. 15, as reports before have told.
+bushd_status report_again(const Bytes& payload, Bytes* again) {
+  bushd_report m{};
+  m.motor_count = BUSHD_MOTORS_PER_MCU;
+  const bushd_status status = bushd_decode_report(payload.data(), payload.size(), &m);
+  if (status != BUSHD_OK) return status;
+  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
+  again->resize(bushd_encode_report(&m, again->data()));
+  return status;
+}
+
+// With a section at least, so that a number of 0 is wrong. Sizes as in docs/protocol.md.
+Bytes any_report() {
+  constexpr std::array<size_t, 6> kSectionBytes = {3, 16, 7, 7, 12, 15};
+  const auto sections = between<uint8_t>(1, 63);
+  const auto motors = *rc::gen::arbitrary<uint16_t>();
+  size_t size = 22;
+  size_t motor_count_at = 0;
+  size_t trigger_state_at = 0;
+  for (size_t i = 0; i < kSectionBytes.size(); ++i) {
+    if ((sections >> i & 1) == 0) continue;
+    if (i == 0) motor_count_at = size + 2;
+    if (i == 5) trigger_state_at = size + 6;
+    size += kSectionBytes[i];
+  }
+  Bytes payload = random_bytes(size + 6u * static_cast<size_t>(std::popcount(motors)));
+  payload[0] = between<uint8_t>(0, 3);
+  payload[6] = between<uint8_t>(1, 255);
+  payload[7] = sections;
+  bushd_put_u16(&payload[8], motors);
+  if (motor_count_at != 0) payload[motor_count_at] = BUSHD_MOTORS_PER_MCU;
+  if (trigger_state_at != 0) payload[trigger_state_at] = between<uint8_t>(0, 6);
+  return payload;
+}
+
 bushd_status poll_again(const Bytes& payload, Bytes* again) {
   bushd_poll m{};
   const bushd_status status = bushd_decode_poll(payload.data(), payload.size(), &m);
   if (status != BUSHD_OK) return status;
   std::vector<bushd_poll_entry> entries;
   for (size_t i = 0; i < m.count; ++i) {
-    const uint8_t* const at = m.entries + 3 * i;
-    entries.push_back({at[0], bushd_get_u16(at + 1)});
+    const uint8_t* const at = m.entries + BUSHD_POLL_ENTRY * i;
+    entries.push_back({at[0], bushd_get_u16(at + 1), at[3], at[4]});
   }
   again->resize(BUSHD_FRAME_MAX_PAYLOAD);
   again->resize(bushd_encode_poll(entries.data(), m.count, again->data()));
@@ -77,7 +115,7 @@ bushd_status poll_again(const Bytes& payload, Bytes* again) {
 
 Bytes any_poll() {
   const auto count = between<uint8_t>(1, BUSHD_POLL_MAX_ENTRIES);
-  Bytes payload = random_bytes(1u + 3u * count);
+  Bytes payload = random_bytes(1u + BUSHD_POLL_ENTRY * count);
   payload[0] = count;
   return payload;
 }
@@ -399,16 +437,11 @@ Kinds motion_kinds() {
         codec(bushd_decode_emergency, bushd_encode_emergency),
         {{"no such way", set8(0, 2)}}}},
       {"report",
-       {[] {
-          const auto motors = between<uint8_t>(0, 16);
-          Bytes payload = random_bytes(BUSHD_REPORT_SIZE(motors));
-          payload[0] = between<uint8_t>(0, 3);
-          payload[68] = between<uint8_t>(0, 6);
-          payload[77] = motors;
-          return payload;
-        },
-        codec(bushd_decode_report, bushd_encode_report),
-        {{"state 4", set8(0, 4)}, {"trigger state 7", set8(68, 7)}, {"17 motors", set8(77, 17)}}}},
+       {any_report,
+        report_again,
+        {{"state 4", set8(0, 4)},
+         {"a section that is none", set8(7, 0x40)},
+         {"no number, but sections", set8(6, 0)}}}},
   };
 }
 

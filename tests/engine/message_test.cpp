@@ -185,7 +185,8 @@ TEST(MessagePoll, RefusesToAskNobody) {
 }
 
 TEST(MessagePoll, TellsEachAddressItsWindow) {
-  const std::vector<bushd_poll_entry> entries{{7, 50}, {1, 700}, {255, 65535}};
+  const std::vector<bushd_poll_entry> entries{
+      {7, 50, 3, 22}, {1, 700, 0, 255}, {255, 65535, 255, 0}};
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_poll(entries.data(), 3, payload.data()));
   bushd_poll poll{};
@@ -195,14 +196,16 @@ TEST(MessagePoll, TellsEachAddressItsWindow) {
     ASSERT_TRUE(bushd_poll_find(&poll, expected.address, &entry));
     EXPECT_EQ(entry.address, expected.address);
     EXPECT_EQ(entry.begin_units, expected.begin_units);
+    EXPECT_EQ(entry.known, expected.known);
+    EXPECT_EQ(entry.room, expected.room);
   }
   bushd_poll_entry entry{};
   EXPECT_FALSE(bushd_poll_find(&poll, 2, &entry));
 }
 
 TEST(MessagePoll, TheMostEntriesFillAFrame) {
-  EXPECT_LE(1 + 3 * BUSHD_POLL_MAX_ENTRIES, BUSHD_FRAME_MAX_PAYLOAD);
-  EXPECT_GT(1 + 3 * (BUSHD_POLL_MAX_ENTRIES + 1), BUSHD_FRAME_MAX_PAYLOAD);
+  EXPECT_LE(1 + 5 * BUSHD_POLL_MAX_ENTRIES, BUSHD_FRAME_MAX_PAYLOAD);
+  EXPECT_GT(1 + 5 * (BUSHD_POLL_MAX_ENTRIES + 1), BUSHD_FRAME_MAX_PAYLOAD);
 }
 
 TEST(MessageIdentity, OfAnotherVersionTellsThatVersionAndNothingElse) {
@@ -269,6 +272,93 @@ TEST(MessageTicks, CapacityIsTheMostThatFitsAFrame) {
 
 TEST(MessageReport, OfSixteenMotorsFitsAFrame) {
   EXPECT_LE(BUSHD_REPORT_SIZE(BUSHD_MOTORS_PER_MCU), BUSHD_FRAME_MAX_PAYLOAD);
+}
+
+bushd_report told_before() {
+  bushd_report report{};
+  report.motor_count = 3;
+  report.inputs = 0x1234;
+  report.sync_id = 77;
+  report.running = 1;
+  report.autonomous = 2;
+  report.low_water_ticks = 9;
+  report.out_of_order = 4;
+  report.out_of_order_from = 5;
+  report.out_of_order_until = 6;
+  for (uint8_t m = 0; m < 3; ++m) report.motor[m] = {100 + m, static_cast<uint16_t>(7000 + m)};
+  return report;
+}
+
+Bytes encoded(const bushd_report& report) {
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_report(&report, payload.data()));
+  return payload;
+}
+
+TEST(MessageReport, WhatItDoesNotTellStaysButForMotion) {
+  bushd_report news{};
+  news.number = 9;
+  news.sections = BUSHD_TELLS_INPUTS;
+  news.motors = 2;
+  news.tick = 70'000;
+  news.inputs = 3;
+  news.motor[1] = {-5, 4'500};
+  bushd_report report = told_before();
+  const Bytes payload = encoded(news);
+  ASSERT_EQ(bushd_decode_report(payload.data(), payload.size(), &report), BUSHD_OK);
+  EXPECT_EQ(report.number, 9);
+  EXPECT_EQ(report.inputs, 3);
+  EXPECT_EQ(report.sync_id, 77u);
+  EXPECT_EQ(report.motor_count, 3);
+  EXPECT_EQ(report.running | report.autonomous | report.out_of_order, 0);
+  EXPECT_EQ(report.out_of_order_from | report.out_of_order_until, 0);
+  EXPECT_EQ(report.low_water_ticks, 65'535);
+  EXPECT_EQ(report.motor[0].position_steps, 100);
+  EXPECT_EQ(report.motor[1].position_steps, -5);
+  EXPECT_EQ(report.motor[2].position_steps, 102);
+  EXPECT_EQ(report.motor[0].known_until, (70'000 + 2) & 0xFFFF);
+  EXPECT_EQ(report.motor[1].known_until, 4'500);
+  EXPECT_FALSE(bushd_report_is_whole(&report));
+}
+
+TEST(MessageReport, RefusesMotorsThatAreNotThere) {
+  bushd_report news{};
+  news.number = 9;
+  news.motors = 8;
+  bushd_report report = told_before();
+  const Bytes payload = encoded(news);
+  EXPECT_EQ(bushd_decode_report(payload.data(), payload.size(), &report), BUSHD_E_FORMAT);
+  news.sections = BUSHD_TELLS_BOOT;
+  news.motor_count = 17;
+  const Bytes many = encoded(news);
+  report = told_before();
+  EXPECT_EQ(bushd_decode_report(many.data(), many.size(), &report), BUSHD_E_FORMAT);
+}
+
+TEST(MessageReport, IsWholeWithAllSectionsAndMotors) {
+  bushd_report news{};
+  news.number = 1;
+  news.sections = BUSHD_TELLS_ALL;
+  news.motors = 7;
+  news.motor_count = 3;
+  EXPECT_TRUE(bushd_report_is_whole(&news));
+  for (const int bit : {1, 2, 4, 8, 16, 32}) {
+    bushd_report part = news;
+    part.sections = static_cast<uint8_t>(BUSHD_TELLS_ALL - bit);
+    EXPECT_FALSE(bushd_report_is_whole(&part)) << bit;
+  }
+  news.motors = 3;
+  EXPECT_FALSE(bushd_report_is_whole(&news));
+}
+
+TEST(MessageReport, HasTheSizeThatItsEncoderMakes) {
+  holds("any sections and motors", [] {
+    bushd_report report{};
+    report.sections = between<uint8_t>(0, BUSHD_TELLS_ALL);
+    report.motors = *rc::gen::arbitrary<uint16_t>();
+    RC_ASSERT(bushd_report_size(report.sections, report.motors) == encoded(report).size());
+  });
+  EXPECT_EQ(bushd_report_size(BUSHD_TELLS_ALL, 0xFFFF), BUSHD_REPORT_SIZE(BUSHD_MOTORS_PER_MCU));
 }
 
 TEST(Status, EveryCodeHasItsOwnText) {

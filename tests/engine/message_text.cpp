@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <type_traits>
 
 #include "engine/message.h"
 
@@ -132,8 +133,8 @@ void put(const bushd_local& m, Fields& f) {
 void put(const bushd_poll& m, Fields& f) {
   std::string entries;
   for (size_t i = 0; i < m.count; ++i) {
-    const uint8_t* const at = m.entries + 3 * i;
-    append(&entries, parts({at[0], bushd_get_u16(at + 1)}));
+    const uint8_t* const at = m.entries + BUSHD_POLL_ENTRY * i;
+    append(&entries, parts({at[0], bushd_get_u16(at + 1), at[3], at[4]}));
   }
   f.add("count", m.count).add_text("entries", entries);
 }
@@ -209,28 +210,46 @@ void put(const bushd_emission& m, Fields& f) {
   f.add("step_us", m.step_us).add("settle_us", m.settle_us);
   f.add("dir_setup_us", m.dir_setup_us).add("pulse_us", m.pulse_us);
 }
+void put_sections(const bushd_report& m, Fields& f) {
+  if (m.sections & BUSHD_TELLS_BOOT) {
+    f.add("reset_cause", m.reset_cause).add("failed_tests", m.failed_tests);
+    f.add("motor_count", m.motor_count);
+  }
+  if (m.sections & BUSHD_TELLS_SYNC) {
+    f.add("sync_id", m.sync_id).add("sync_tick", m.sync_tick).add("sync_ns", m.sync_ns);
+    f.add("rate_ppb", m.rate_ppb);
+  }
+  if (m.sections & BUSHD_TELLS_INPUTS) {
+    f.add("inputs", m.inputs).add("forbidden_positive", m.forbidden_positive);
+    f.add("forbidden_negative", m.forbidden_negative).add("system_inputs", m.system_inputs);
+  }
+  if (m.sections & BUSHD_TELLS_COUNTERS) {
+    f.add("bad_frames", m.bad_frames).add("rejected_frames", m.rejected_frames);
+    f.add("last_rejection", m.last_rejection).add("ramp_downs", m.ramp_downs);
+  }
+  if (m.sections & BUSHD_TELLS_MOTION) {
+    f.add("running", m.running).add("autonomous", m.autonomous);
+    f.add("low_water_ticks", m.low_water_ticks).add("out_of_order", m.out_of_order);
+    f.add("out_of_order_from", m.out_of_order_from).add("out_of_order_until", m.out_of_order_until);
+  }
+  if (m.sections & BUSHD_TELLS_AUTONOMOUS) {
+    f.add("homed", m.homed).add("homing", m.homing).add("armed", m.armed);
+    f.add("trigger_number", m.trigger_number).add("trigger_state", m.trigger_state);
+    f.add("start_tick", m.start_tick).add("start_ns", m.start_ns);
+  }
+}
 void put(const bushd_report& m, Fields& f) {
   f.add("state", m.state).add("faults", m.faults).add("flags", m.flags).add("epoch", m.epoch);
-  f.add("boot_number", m.boot_number).add("tick", m.tick).add("tick_ns", m.tick_ns);
-  f.add("sync_id", m.sync_id).add("sync_tick", m.sync_tick).add("sync_ns", m.sync_ns);
-  f.add("rate_ppb", m.rate_ppb).add("moving", m.moving).add("running", m.running);
-  f.add("inputs", m.inputs).add("bad_frames", m.bad_frames);
-  f.add("rejected_frames", m.rejected_frames).add("last_rejection", m.last_rejection);
-  f.add("ramp_downs", m.ramp_downs).add("low_water_ticks", m.low_water_ticks);
-  f.add("out_of_order", m.out_of_order).add("out_of_order_from", m.out_of_order_from);
-  f.add("out_of_order_until", m.out_of_order_until);
-  f.add("forbidden_positive", m.forbidden_positive);
-  f.add("forbidden_negative", m.forbidden_negative).add("system_inputs", m.system_inputs);
-  f.add("current", m.current).add("reset_cause", m.reset_cause);
-  f.add("failed_tests", m.failed_tests).add("autonomous", m.autonomous).add("homed", m.homed);
-  f.add("homing", m.homing).add("armed", m.armed);
-  f.add("trigger_number", m.trigger_number).add("trigger_state", m.trigger_state);
-  f.add("start_tick", m.start_tick).add("start_ns", m.start_ns).add("motor_count", m.motor_count);
+  f.add("boot_number", m.boot_number).add("number", m.number).add("sections", m.sections);
+  f.add("motors", m.motors).add("moving", m.moving).add("current", m.current);
+  f.add("tick", m.tick).add("tick_ns", m.tick_ns);
+  put_sections(m, f);
   std::string motors;
-  for (size_t i = 0; i < m.motor_count; ++i) {
+  for (size_t i = 0; i < BUSHD_MOTORS_PER_MCU; ++i) {
+    if ((m.motors >> i & 1) == 0) continue;
     append(&motors, parts({m.motor[i].position_steps, m.motor[i].known_until}));
   }
-  f.add_text("motor", motors);
+  if (m.motors != 0) f.add_text("motor", motors);
 }
 void put(const bushd_acknowledgement& m, Fields& f) {
   f.add("status", m.status);
@@ -240,6 +259,8 @@ template <class Message>
 std::string text(const char* name, const bushd_frame& frame,
                  bushd_status (*decode)(const uint8_t*, size_t, Message*)) {
   Message message{};
+  // One report alone does not say which motors there are.
+  if constexpr (std::is_same_v<Message, bushd_report>) message.motor_count = BUSHD_MOTORS_PER_MCU;
   const bushd_status status = decode(frame.payload, frame.payload_size, &message);
   if (status != BUSHD_OK) return std::string(name) + ": " + bushd_status_text(status);
   Fields fields;

@@ -9,7 +9,9 @@
 // - ticks N: N tick boundaries pass
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -113,6 +115,47 @@ TEST(ProtocolDocument, DecodedFramesAreRight) {
       ADD_FAILURE() << "unknown keyword " << line.keyword;
     }
   }
+}
+
+// A row of a drawing, as the table of the engine has it: names, or types.
+std::vector<std::string> row_below(const std::string& heading, bool names) {
+  std::ifstream file(source_path("docs/protocol.md"));
+  std::vector<std::string> row;
+  bool found = false;
+  for (std::string text; row.empty() && std::getline(file, text);) {
+    found |= text == heading;
+    if (!found) continue;
+    if (names && text.rfind("    | ", 0) == 0) {
+      std::istringstream cells(text.substr(6));
+      for (std::string cell; std::getline(cells, cell, '|');) {
+        cell = cell.substr(0, cell.find_last_not_of(' ') + 1);
+        cell.erase(0, cell.find_first_not_of(' '));
+        std::ranges::replace_if(cell, [](char c) { return c == ' ' || c == '-'; }, '_');
+        if (!cell.empty()) row.push_back(cell);
+      }
+    } else if (!names && (text.rfind("     u", 0) == 0 || text.rfind("     i", 0) == 0)) {
+      std::istringstream cells(text);
+      for (std::string cell; cells >> cell;) row.push_back(cell);
+    }
+  }
+  return row;
+}
+
+// One table describes a report to both ends; this page draws the same.
+TEST(ProtocolDocument, DrawsTheSectionsOfAReportAsTheTableHasThem) {
+  const std::map<std::string, std::string> types = {
+      {"8", "u8"}, {"16", "u16"}, {"32", "u32"}, {"S32", "i32"}};
+  using Row = std::vector<std::string>;
+#define NAME_OF(type, name) #name,
+#define TYPE_OF(type, name) types.at(#type),
+#define EXPECT_DRAWN(heading, fields)                          \
+  EXPECT_EQ(row_below(heading, true), (Row{fields(NAME_OF)})); \
+  EXPECT_EQ(row_below(heading, false), (Row{fields(TYPE_OF)}));
+#define EXPECT_SECTION(name, bit, fields) \
+  EXPECT_DRAWN(#name ", section " + std::to_string(1 << (bit)), fields)
+  EXPECT_DRAWN("### 89 report", BUSHD_REPORT_BASE)
+  EXPECT_DRAWN("For each motor that is named", BUSHD_REPORT_MOTOR)
+  BUSHD_REPORT_SECTIONS(EXPECT_SECTION)
 }
 
 // The MCU of the exchange: address 1, two motors, boot number 4660, unique id 1 .. 8. Every request

@@ -162,7 +162,7 @@ TEST(Receive, AnswersBeginWithADelimiter) {
 TEST(Receive, AnswersInPiecesAreTheSame) {
   const auto report_of = [](bool in_pieces) {
     Rig rig({.motors = 16, .in_pieces = in_pieces});
-    rig.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, {1, 7, 5, 0});
+    rig.frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, {1, 7, 5, 0, 0, 255});
     if (in_pieces) {
       EXPECT_FALSE(rig.answer()) << "it waits until there is time for it";
       rig.work();

@@ -29,14 +29,14 @@ Bytes address_of(std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE> id, std::uint8_t
 
 TEST(Requests, PollIsAnsweredInTheWindowThatItNames) {
   Rig rig({.address = 7});
-  rig.frame(0, BUSHD_MSG_POLL, poll_of({{3, 50}, {7, 1234}, {9, 5000}}));
+  rig.frame(0, BUSHD_MSG_POLL, poll_of({{3, 50, 0, 255}, {7, 1234, 0, 255}, {9, 5000, 0, 255}}));
   const auto got = rig.answer();
   ASSERT_TRUE(got);
   EXPECT_EQ(got->type, BUSHD_MSG_POLL);
   EXPECT_EQ(got->delay_ns, 12'340'000u);
-  rig.frame(0, BUSHD_MSG_POLL, poll_of({{7, 0}}));
+  rig.frame(0, BUSHD_MSG_POLL, poll_of({{7, 0, 0, 255}}));
   EXPECT_EQ(rig.answer()->delay_ns, 0u);
-  rig.frame(0, BUSHD_MSG_POLL, poll_of({{3, 50}, {9, 5000}}));
+  rig.frame(0, BUSHD_MSG_POLL, poll_of({{3, 50, 0, 255}, {9, 5000, 0, 255}}));
   EXPECT_FALSE(rig.answer()) << "not named";
   rig.frame(0, BUSHD_MSG_POLL, {});
   rig.frame(0, BUSHD_MSG_POLL, {2, 7, 0, 0});

@@ -218,17 +218,6 @@ bushd_status Rig::request(std::uint8_t type, const Bytes& payload) {
   return static_cast<bushd_status>(acknowledgement.status);
 }
 
-bushd_report Rig::poll() {
-  frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, {1, mcu_.config.address, 0, 0});
-  const auto got = answer();
-  bushd_report report{};
-  EXPECT_TRUE(got);
-  if (!got) return report;
-  EXPECT_EQ(got->type, BUSHD_MSG_POLL);
-  EXPECT_EQ(bushd_decode_report(got->payload.data(), got->payload.size(), &report), BUSHD_OK);
-  return report;
-}
-
 bushd_identity Rig::identify() {
   frame(BUSHD_MSG_IDENTIFY, {0, 0, 1, 0, 0});
   const auto got = answer();

@@ -110,7 +110,13 @@ class Rig {
   std::uint8_t last_sequence() const { return sequence_; }
   // Sends a request to this MCU and returns the status that it acknowledges with.
   bushd_status request(std::uint8_t type, const Bytes& payload);
+  // What reports have told, this one included.
   bushd_report poll();
+  // The answer to a POLL of its own kind; `before`: what is known already.
+  std::optional<bushd_report> ask_report(std::uint8_t known, std::uint8_t room,
+                                         const bushd_report& before);
+  // What the MCU would tell one that knows nothing; as if it had not been asked.
+  bushd_report all_of_report();
   bushd_identity identify();
 
   bushd_status configure(bushd_format format, std::uint32_t tick_ns = kTickNs,
@@ -218,6 +224,7 @@ class Rig {
   std::vector<std::uint16_t> codes_;
   std::array<std::uint8_t, BUSHD_MCU_MAX_REPLY> reply_{};
   bushd_mcu mcu_{};
+  bushd_report report_{};
   const bushd_slot_buffer* slot_buffer_ = nullptr;
   bushd_format format_ = BUSHD_FORMAT_COARSE;
   std::uint8_t sequence_ = 0;

@@ -77,6 +77,7 @@ class CoreRig : public Programmed {
   std::array<bushd_mcu_velocity, BUSHD_MAX_VELOCITY_MOTORS> velocity_{};
   std::vector<std::uint8_t> reply_ = std::vector<std::uint8_t>(BUSHD_MCU_MAX_REPLY);
   bushd_mcu mcu_{};
+  bushd_report report_{};
 
  private:
   struct Pins {
@@ -86,6 +87,8 @@ class CoreRig : public Programmed {
 
   // From here on exactly one answer is due; returns it.
   bushd_frame ask(std::uint8_t address, std::uint8_t type, Bytes payload);
+  // What reports have told, with one that is asked for now.
+  const bushd_report& next_report();
   // Counters may be set to anything and then wrap.
   std::uint32_t position(std::size_t m) const {
     return static_cast<std::uint32_t>(mcu_.motor[m].position_steps);

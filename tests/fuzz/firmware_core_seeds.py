@@ -81,7 +81,7 @@ def rest(ticks):
 
 
 def poll(*addresses):
-    return frame(POLL, bytes([len(addresses)]) + b"".join(struct.pack("<BH", a, 10) for a in addresses), True)
+    return frame(POLL, bytes([len(addresses)]) + b"".join(struct.pack("<BHBB", a, 10, 0, 255) for a in addresses), True)
 
 
 def configure(fine):

@@ -408,6 +408,10 @@ class Bus {
         (mcu.configured ? BUSHD_FLAG_CONFIGURED : 0) | (mcu.synced ? BUSHD_FLAG_SYNCED : 0) |
         (mcu.enabled ? BUSHD_FLAG_ENABLED : 0) | (mcu.marked ? BUSHD_FLAG_SYNC_HEARD : 0));
     report.boot_number = kBootNumber;
+    // All of it, as an MCU may.
+    report.number = static_cast<std::uint8_t>(1 + now_us_ / 1000 % 255);
+    report.sections = BUSHD_TELLS_ALL;
+    report.motors = (1u << kMotors) - 1u;
     report.tick = static_cast<std::uint32_t>(now_us_ / tick_us);
     report.tick_ns = static_cast<std::uint32_t>(now_us_ % tick_us * 1000);
     report.sync_id = mcu.sync_id;

@@ -141,10 +141,10 @@ void decode_for_mcu(Bytes payload) {
 void decode_poll(Bytes payload) {
   std::array<bushd_poll_entry, 256> entries;
   const auto encode = [&](const bushd_poll* message, std::uint8_t* out) {
-    BUSHD_REQUIRE(inside(payload, message->entries, 3u * message->count));
+    BUSHD_REQUIRE(inside(payload, message->entries, BUSHD_POLL_ENTRY * message->count));
     for (std::size_t i = 0; i < message->count; ++i) {
-      const std::uint8_t* const at = message->entries + 3 * i;
-      entries[i] = {at[0], bushd_get_u16(at + 1)};
+      const std::uint8_t* const at = message->entries + BUSHD_POLL_ENTRY * i;
+      entries[i] = {at[0], bushd_get_u16(at + 1), at[3], at[4]};
     }
     return bushd_encode_poll(entries.data(), message->count, out);
   };
@@ -303,6 +303,23 @@ void decode_trigger(Bytes payload) {
   decoded(payload, &compare, bushd_decode_position_compare, bushd_encode_position_compare);
 }
 
+// It goes on from what is known, here nothing but how many motors there are.
+void decode_report(Bytes payload) {
+  bushd_report report{};
+  report.motor_count = BUSHD_MOTORS_PER_MCU;
+  const bushd_status status = bushd_decode_report(payload.data(), payload.size(), &report);
+  BUSHD_REQUIRE(status == BUSHD_OK || status == BUSHD_E_LENGTH || status == BUSHD_E_FORMAT);
+  if (status != BUSHD_OK) return;
+  Payload again;
+  BUSHD_REQUIRE(same(payload, again, bushd_encode_report(&report, again.data())));
+  BUSHD_REQUIRE(report.state <= BUSHD_STATE_FAULT);
+  BUSHD_REQUIRE(report.motor_count <= BUSHD_MOTORS_PER_MCU);
+  BUSHD_REQUIRE(payload.size() == bushd_report_size(report.sections, report.motors));
+  if (bushd_report_is_whole(&report)) {
+    BUSHD_REQUIRE(payload.size() == BUSHD_REPORT_SIZE(report.motor_count));
+  }
+}
+
 void decode_for_master(Bytes payload) {
   bushd_identity identity;
   std::memset(&identity, 0xA5, sizeof identity);
@@ -312,12 +329,7 @@ void decode_for_master(Bytes payload) {
   } else if (decoded(payload, &identity, bushd_decode_identity, bushd_encode_identity)) {
     BUSHD_REQUIRE(identity.motors >= 1 && identity.motors <= BUSHD_MOTORS_PER_MCU);
   }
-  bushd_report report;
-  if (decoded(payload, &report, bushd_decode_report, bushd_encode_report)) {
-    BUSHD_REQUIRE(report.state <= BUSHD_STATE_FAULT);
-    BUSHD_REQUIRE(report.motor_count <= BUSHD_MOTORS_PER_MCU);
-    BUSHD_REQUIRE(payload.size() == BUSHD_REPORT_SIZE(report.motor_count));
-  }
+  decode_report(payload);
   bushd_tables tables;
   decoded(payload, &tables, bushd_decode_tables, bushd_encode_tables);
   bushd_acknowledgement acknowledgement;

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <iterator>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -86,6 +87,8 @@ class FrameMaster {
 
   // Sends now, behind a delimiter as everybody who takes the line does.
   void post(std::uint8_t address, std::uint8_t type, std::span<const std::uint8_t> payload) {
+    // Who has which address may change.
+    if (type == BUSHD_MSG_SET_ADDRESS) told_.clear();
     bus_.master_send(Bytes{0}, bus_.now_ns());
     bus_.master_send(wire(address, type, ++sequence_, payload), bus_.now_ns());
   }
@@ -155,19 +158,26 @@ class FrameMaster {
     return static_cast<bushd_status>(ack.status);
   }
 
+  // What is new since the report before, and with it all that the MCU has told.
   bushd_report poll(std::uint8_t address) {
-    bushd_report report{};
+    bushd_report& report = told_[address];
     frames.clear();
-    const Bytes payload = {1, address, 0, 0};
+    const Bytes payload = {1, address, 0, 0, report.number, 255};
     send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, payload);
     if (frames.size() != 1 || frames[0].address != address) {
       ADD_FAILURE() << "no report from " << int{address};
-      return report;
+      return {};
     }
     const Bytes& reply = frames[0].payload;
-    EXPECT_EQ(bushd_decode_report(reply.data(), reply.size(), &report), BUSHD_OK);
+    bushd_report news = report;
+    if (news.number == 0) news.motor_count = BUSHD_MOTORS_PER_MCU;
+    EXPECT_EQ(bushd_decode_report(reply.data(), reply.size(), &news), BUSHD_OK);
+    EXPECT_TRUE(report.number != 0 || bushd_report_is_whole(&news));
+    report = news;
     return report;
   }
+  // The next poll of it asks for all.
+  void forget_report(std::uint8_t address) { told_.erase(address); }
 
   bushd_tables tables(std::uint8_t address) {
     bushd_tables told{};
@@ -284,6 +294,7 @@ class FrameMaster {
   bushd_receiver receiver_{};
   std::uint8_t sequence_ = 0;
   std::uint32_t sync_id_ = 0;
+  std::map<std::uint8_t, bushd_report> told_;
 };
 
 }  // namespace bushd::sim

@@ -132,7 +132,8 @@ TEST(Bus, TwoMcusOfOneAddressCollide) {
 // Reply windows of one broadcast, as the master lays them out: no collision, one answer each.
 TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirWindows) {
   const TimeNs asked_ns = bus.now_ns();
-  const std::array<bushd_poll_entry, 3> entries = {{{2, 500}, {9, 900}, {1, 1300}}};
+  const std::array<bushd_poll_entry, 3> entries = {
+      {{2, 500, 0, 255}, {9, 900, 0, 255}, {1, 1300, 0, 255}}};
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
   const std::size_t size = bushd_encode_poll(entries.data(), 3, payload.data());
   master.frames.clear();
@@ -146,7 +147,7 @@ TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirWindows) {
     const std::size_t bytes = 1 + master.frames[i].payload.size() + BUSHD_FRAME_OVERHEAD;
     EXPECT_EQ(master.frames[i].end_ns,
               poll_ns + begin_ns[i] + static_cast<TimeNs>(bytes) * kByteNs);
-    bushd_report report;
+    bushd_report report{};
     ASSERT_EQ(bushd_decode_report(master.frames[i].payload.data(), master.frames[i].payload.size(),
                                   &report),
               BUSHD_OK);

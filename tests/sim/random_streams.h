@@ -134,7 +134,9 @@ class RandomStreams : public testing::Test {
         payload[0] = 1;
         payload[1] = kAddress;
         payload[2] = payload[3] = 0;
-        size = 4;
+        payload[4] = byte();
+        payload[5] = byte();
+        size = 6;
         break;
       default:
         return bytes(random_.below(40));
@@ -227,7 +229,7 @@ class RandomStreams : public testing::Test {
     for (int attempt = 0; attempt < 3; ++attempt) {
       master_.patience_ns = attempt == 0 ? kPatienceNs : 5 * kPatienceNs;
       const auto reply = master_.request(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL,
-                                         Bytes{1, kAddress, 0, 0}, kAddress);
+                                         Bytes{1, kAddress, 0, 0, 0, 255}, kAddress);
       if (reply &&
           bushd_decode_report(reply->payload.data(), reply->payload.size(), &report) == BUSHD_OK) {
         master_.patience_ns = kPatienceNs;

@@ -33,7 +33,7 @@ def c_encoder(index, message, fields):
         lines.append(f"  return bushd_encode_table_data({fields['bank']}, {fields['offset']}, {fields['count']}, codes, "
                      "payload);")
     elif message == "poll":
-        entries = ", ".join(f"{{{address}, {begin}}}" for address, begin in fields["entries"])
+        entries = ", ".join(f"{{{', '.join(map(str, entry))}}}" for entry in fields["entries"])
         lines.append(f"  static const bushd_poll_entry entries[] = {{{entries}}};")
         lines.append(f"  return bushd_encode_poll(entries, {fields['count']}, payload);")
     elif message == "table_ticks":
@@ -82,7 +82,8 @@ def c_encoder(index, message, fields):
         lines.append("  memset(&message, 0, sizeof message);")
         for name, value in fields.items():
             if name == "motor" and isinstance(value, list):
-                for i, (steps, until) in enumerate(value):
+                told = [i for i in range(16) if fields["motors"] >> i & 1]
+                for i, (steps, until) in zip(told, value, strict=True):
                     lines.append(f"  message.motor[{i}].position_steps = {steps};")
                     lines.append(f"  message.motor[{i}].known_until = {until};")
             elif name == "unique_id":

@@ -25,7 +25,7 @@ PARTS = {
                   ("cruise_left", 4), ("decel_left", 2)],
     "table_run": [("head", 1), ("steps", 4), ("shortest_delay", 2)],
     "line": [("head", 1), ("increment", 4)],
-    "entries": [("address", 1), ("begin", 2)],
+    "entries": [("address", 1), ("begin", 2), ("known", 1), ("room", 1)],
     "unique_id": [("unique_id", 8)],
     "delays": [],
     "displacements": [],

@@ -1,5 +1,18 @@
 """The layouts of all payloads, as docs/protocol.md has them."""
 
+# What a report has only if its `sections` say so: section i if bit i is set.
+REPORT_SECTIONS = [
+    [("reset_cause", 1), ("failed_tests", 1), ("motor_count", 1)],
+    [("sync_id", 4), ("sync_tick", 4), ("sync_ns", 4), ("rate_ppb", -4)],
+    [("inputs", 2), ("forbidden_positive", 2), ("forbidden_negative", 2), ("system_inputs", 1)],
+    [("bad_frames", 2), ("rejected_frames", 2), ("last_rejection", 1), ("ramp_downs", 2)],
+    [("running", 2), ("autonomous", 2), ("low_water_ticks", 2), ("out_of_order", 2), ("out_of_order_from", 2),
+     ("out_of_order_until", 2)],
+    [("homed", 2), ("homing", 1), ("armed", 2), ("trigger_number", 1), ("trigger_state", 1), ("start_tick", 4),
+     ("start_ns", 4)],
+]
+SECTION_OF = {name: bit for bit, section in enumerate(REPORT_SECTIONS) for name, _ in section}
+
 # A payload field: (name, bytes; negative: signed).
 LAYOUTS = {
     "identify": (0x01, [("salt", 2), ("windows", 1), ("window_units", 2)]),
@@ -11,7 +24,7 @@ LAYOUTS = {
     "assign": (0x06, [("motor", 1), ("bank", 1)]),
     "control": (0x07, [("actions", 1), ("faults", "optional")]),
     "set_position": (0x08, [("motor", 1), ("position_steps", -4)]),
-    "poll": (0x09, [("count", 1), ("entries", [1, 2])]),
+    "poll": (0x09, [("count", 1), ("entries", [1, 2, 1, 1])]),
     "sync": (0x0A, [("master", 2), ("sync_id", 4), ("follows", 1), ("follow_up_id", 4), ("sync_tick", 4), ("sync_ns", 4)]),
     "ticks": (0x0B, [("epoch", 1), ("flags", 1), ("first_tick", 4), ("count", 1), ("mask", 2), ("delays", [2]),
                      ("displacements", [1])]),
@@ -43,15 +56,9 @@ LAYOUTS = {
     "identity": (0x81, [("protocol_version", 1), ("motors", 1), ("firmware_version", 2), ("boot_number", 2),
                         ("slots", 2), ("queue_ticks", 2), ("table_codes", 2), ("capabilities", 4),
                         ("unique_id", [1])]),
-    "report": (0x89, [("state", 1), ("faults", 1), ("flags", 1), ("epoch", 1), ("boot_number", 2), ("tick", 4),
-                      ("tick_ns", 4), ("sync_id", 4), ("sync_tick", 4), ("sync_ns", 4), ("rate_ppb", -4), ("moving", 2),
-                      ("running", 2), ("inputs", 2), ("bad_frames", 2), ("rejected_frames", 2), ("last_rejection", 1),
-                      ("ramp_downs", 2), ("low_water_ticks", 2), ("out_of_order", 2), ("out_of_order_from", 2),
-                      ("out_of_order_until", 2), ("forbidden_positive", 2), ("forbidden_negative", 2),
-                      ("system_inputs", 1), ("current", 2), ("reset_cause", 1), ("failed_tests", 1),
-                      ("autonomous", 2), ("homed", 2), ("homing", 1),
-                      ("armed", 2), ("trigger_number", 1), ("trigger_state", 1),
-                      ("start_tick", 4), ("start_ns", 4), ("motor_count", 1), ("motor", [-4, 2])]),
+    "report": (0x89, [("state", 1), ("faults", 1), ("flags", 1), ("epoch", 1), ("boot_number", 2), ("number", 1),
+                      ("sections", 1), ("motors", 2), ("moving", 2), ("current", 2), ("tick", 4), ("tick_ns", 4)] +
+               [field for section in REPORT_SECTIONS for field in section] + [("motor", [-4, 2])]),
     "tables": (0x90, [("valid", 1), ("held", [4, 4])]),
     "acknowledgement": (0x82, [("status", 1)]),
 }
@@ -89,9 +96,23 @@ def line_bytes(_, motor, direction, increment):
 ENTRIES = {"run_state": run_state_bytes, "table_run": table_run_bytes, "line": line_bytes}
 
 
+def is_left_out(name, fields):
+    """Of a report: the section that the field is in, or all motors."""
+    if "sections" not in fields:
+        return False
+    if name == "motor":
+        assert len(fields.get(name, [])) == fields["motors"].bit_count()
+        return fields["motors"] == 0
+    left_out = name in SECTION_OF and not fields["sections"] >> SECTION_OF[name] & 1
+    assert left_out == (name not in fields)
+    return left_out
+
+
 def payload_of(layout, fields):
     out = b""
     for name, width in layout:
+        if is_left_out(name, fields):
+            continue
         if width == "optional":
             out += bytes([fields[name]]) if name in fields else b""
             continue

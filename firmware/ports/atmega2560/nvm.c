@@ -18,7 +18,8 @@ _Static_assert(sizeof(nvm_head) == NVM_HEAD_BYTES, "as laid down");
 
 extern const __flash uint32_t image_seal;  // boot_tests.S
 
-static enum { COMPARE, WRITE, WRITE_HEAD } phase;
+enum { COMPARE, WRITE, WRITE_HEAD };
+static uint8_t phase;
 static bushd_mcu_nvm_scan scan;
 static uint32_t planned;  // CRC of what is being written
 static uint8_t in_head;   // bytes of it that are written

@@ -35,8 +35,12 @@ bool Rs485Master::answered(std::int64_t now_us, const Transactions::Answer& answ
   poller_.answered(answer.mcu);
   switch (answer.type) {
     case BUSHD_MSG_POLL: {
-      bushd_report report;
+      const McuRecord& mcu = mcus_[answer.mcu];
+      bushd_report report = mcu.known != 0 ? mcu.view.report : bushd_report{};
+      if (mcu.known == 0) report.motor_count = BUSHD_MOTORS_PER_MCU;
       if (!decoded(answer, bushd_decode_report, &report)) return false;
+      if (report.number == 0) return poller_.no_room(answer.mcu);
+      if (mcu.known == 0 && !bushd_report_is_whole(&report)) return false;
       handle_report(now_us, answer, report);
       return true;
     }
@@ -96,9 +100,10 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   }
   view.report = report;
   view.reported = true;
+  mcu.known = report.number;
   mcu.answered = false;
   view.outdated_us = 0;
-  poller_.follow_report(index);
+  poller_.follow_report(now_us, index);
   connector_.follow_stop(index);
   if (report.faults & BUSHD_FAULT_OVERCURRENT) connector_.drivers_off(index);
   const auto agreement = synchroniser_.follow_report(now_us, index, answer.line_us, answer.in_time);
@@ -130,6 +135,7 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
 // has.
 void Rs485Master::ask_at_end(std::int64_t now_us, McuIndex mcu) {
   const std::optional<Tick> end = streams_.next_end(mcu);
+  poller_.expect_motion(mcu, streams_.active(mcu) != 0);
   const Tick now = clock().tick_at(now_us);
   // What lies farther ahead the next report asks for.
   const bool soon = end && *end <= now + clock().ticks_in(2 * fieldbus::kPollPeriodUs);

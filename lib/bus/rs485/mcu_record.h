@@ -38,6 +38,8 @@ struct McuRecord {
   McuSetup setup;
   McuView view;
   McuHealth health;
+  // Number of the last report; 0: `view.report` is nothing that a later one can go on from.
+  std::uint8_t known = 0;
   bool poll_wanted = false;         // its report is needed sooner than its turn would come
   bool answered = false;            // something that was asked of it, since its last report
   std::uint8_t trigger_number = 0;  // the last that it was given

@@ -19,6 +19,8 @@ constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
 constexpr int kMaxMissedReplies = 10;    // about half a second
+// An MCU that was not asked for so long may have given the number to another report.
+constexpr std::int64_t kKnownForUs = 1'000'000;
 
 }  // namespace
 
@@ -49,8 +51,30 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   return asked;
 }
 
-std::int64_t Poller::reply_us(const McuRecord& mcu) const {
-  return writer_.line_us(BUSHD_REPORT_SIZE(mcu.view.identity.motors) + BUSHD_FRAME_OVERHEAD + 1);
+void Poller::forget_old(std::int64_t now_us) {
+  for (const McuIndex i : mcus_.indices()) {
+    if (now_us - polled_[i].reported_us >= kKnownForUs) mcus_[i].known = 0;
+  }
+}
+
+// Payload bytes of its report: for all, where all may be told. Otherwise for what is likely; at
+// rest that is a SYNC, or two smaller sections.
+std::uint8_t Poller::room(McuIndex mcu) const {
+  const McuRecord& record = mcus_[mcu];
+  const Polled& polled = polled_[mcu];
+  const bushd_report& report = record.view.report;
+  const bool all = record.view.phase != McuPhase::kOnline || record.known == 0 ||
+                   polled.missed_replies != 0 || polled.has_more;
+  const bool moves = polled.moves || record.answered || (report.moving | report.armed) != 0;
+  const auto motors = static_cast<std::uint16_t>((1u << record.view.identity.motors) - 1u);
+  const std::size_t room = all     ? bushd_report_size(BUSHD_TELLS_ALL, motors)
+                           : moves ? bushd_report_size(BUSHD_NEWS_IN_MOTION, motors)
+                                   : bushd_report_size(BUSHD_NEWS_AT_REST, 0);
+  return static_cast<std::uint8_t>(room);
+}
+
+std::int64_t Poller::reply_us(std::size_t payload) const {
+  return writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
 }
 
 std::int64_t Poller::cycle_us() const {
@@ -59,11 +83,11 @@ std::int64_t Poller::cycle_us() const {
   for (const McuRecord& mcu : mcus_) {
     if (mcu.view.phase == McuPhase::kOffline) continue;
     ++entries;
-    const std::int64_t with_us = answers_us + reply_us(mcu) + kWindowGuardUs;
+    const std::int64_t with_us =
+        answers_us + reply_us(BUSHD_REPORT_SIZE(mcu.view.identity.motors)) + kWindowGuardUs;
     if (answers_us == 0 || with_us <= kMaxCycleUs) answers_us = with_us;
   }
-  constexpr std::size_t kEntryBytes = 3;
-  return writer_.line_us(2 + entries * kEntryBytes + BUSHD_FRAME_OVERHEAD) + kFirstWindowUs +
+  return writer_.line_us(2 + entries * BUSHD_POLL_ENTRY + BUSHD_FRAME_OVERHEAD) + kFirstWindowUs +
          answers_us;
 }
 
@@ -71,17 +95,19 @@ bool Poller::send_wanted(std::int64_t now_us) {
   if (std::none_of(mcus_.begin(), mcus_.end(), [](const McuRecord& m) { return m.poll_wanted; })) {
     return false;
   }
+  forget_old(now_us);
   std::vector<bushd_poll_entry> entries;
   std::vector<Transactions::ReplyWindow> windows;
   std::int64_t begin_us = kFirstWindowUs;
   for (const McuIndex i : choose(now_us)) {
     const McuRecord& mcu = mcus_[i];
-    const std::int64_t end_us = begin_us + reply_us(mcu);
+    const std::uint8_t most = room(i);
+    const std::int64_t end_us = begin_us + reply_us(most);
     const bool full = entries.size() == BUSHD_POLL_MAX_ENTRIES || end_us > kMaxCycleUs;
     if (full && !entries.empty()) break;
     const auto units = static_cast<std::uint16_t>((begin_us + kUnitUs - 1) / kUnitUs);
-    entries.push_back({mcu.setup.address.value, units});
-    windows.push_back({.mcu = i, .address = mcu.setup.address, .end_us = end_us});
+    entries.push_back({mcu.setup.address.value, units, mcu.known, most});
+    windows.push_back({.mcu = i, .address = mcu.setup.address, .end_us = end_us, .payload = most});
     begin_us = end_us + kWindowGuardUs;
   }
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
@@ -122,12 +148,22 @@ bool Poller::missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
   return false;
 }
 
-void Poller::follow_report(McuIndex mcu) {
+void Poller::follow_report(std::int64_t now_us, McuIndex mcu) {
+  polled_[mcu].reported_us = now_us;
+  polled_[mcu].has_more = false;
   polled_[mcu].counters.follow(mcus_[mcu].view.report, mcus_[mcu].health);
+}
+
+bool Poller::no_room(McuIndex mcu) {
+  if (std::exchange(polled_[mcu].has_more, true)) return false;
+  mcus_[mcu].poll_wanted = true;
+  return true;
 }
 
 void Poller::went_offline(McuIndex mcu) {
   polled_[mcu].missed_replies = 0;
+  polled_[mcu].has_more = polled_[mcu].moves = false;
+  mcus_[mcu].known = 0;
   polled_[mcu].news_us = INT64_MAX;
   mcus_[mcu].poll_wanted = mcus_[mcu].answered = false;
 }

@@ -1,6 +1,9 @@
 // Polls: one request for the reports of many MCUs, each in a window of its own, so that the
 // adapter's latency is paid once. Whoever missed its last reply answers first: if it misses this
 // one too, the one after it ends the waiting.
+//
+// A window is as long as what is to be told is likely to need. A report with more news says so, and
+// is asked for again.
 #pragma once
 
 #include <algorithm>
@@ -28,6 +31,8 @@ class Poller {
   // before. INT64_MAX: nothing is expected. Such extra polls take at most half of the time, so
   // they may come later; no routine poll does.
   void expect_news(McuIndex mcu, std::int64_t at_us) { polled_[mcu].news_us = at_us; }
+  // Until told otherwise motors of it move, or are to.
+  void expect_motion(McuIndex mcu, bool expected) { polled_[mcu].moves = expected; }
   // When the MCU's turn comes. Precondition: it is not offline.
   std::int64_t due_us(McuIndex mcu) const {
     const Polled& polled = polled_[mcu];
@@ -38,8 +43,10 @@ class Poller {
   void answered(McuIndex mcu) { polled_[mcu].missed_replies = 0; }
   // Or none. Returns true if the MCU has missed so many replies that it is taken for lost.
   bool missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type);
-  // The MCU's record has a new report: what has become of its counters.
-  void follow_report(McuIndex mcu);
+  // What the MCU's record has of reports was of this time, or is void.
+  void follow_report(std::int64_t now_us, McuIndex mcu);
+  // What is new found no room: it is asked again, and gets room for all. False: it had that.
+  bool no_room(McuIndex mcu);
   void went_offline(McuIndex mcu);
 
  private:
@@ -47,11 +54,16 @@ class Poller {
     std::int64_t routine_us = 0;       // its turn
     std::int64_t news_us = INT64_MAX;  // expect_news
     int missed_replies = 0;            // requests in a row without an answer
+    std::int64_t reported_us = 0;      // the last report
+    bool moves = false;                // expect_motion
+    bool has_more = false;             // no_room
     ReportedCounters counters;
   };
 
   std::vector<McuIndex> choose(std::int64_t now_us) const;
-  std::int64_t reply_us(const McuRecord& mcu) const;
+  void forget_old(std::int64_t now_us);
+  std::uint8_t room(McuIndex mcu) const;
+  std::int64_t reply_us(std::size_t payload) const;
 
   PerMcu<McuRecord>& mcus_;
   Transactions& transactions_;

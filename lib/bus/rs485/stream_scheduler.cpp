@@ -89,6 +89,14 @@ bool StreamScheduler::has_ticks_to_send(McuIndex mcu) const {
                      [](const Stream& s) { return s.active && !s.finished; });
 }
 
+std::uint16_t StreamScheduler::active(McuIndex mcu) const {
+  std::uint16_t motors = 0;
+  for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if (mcus_[mcu].stream[m].active) motors |= bit(m);
+  }
+  return motors;
+}
+
 std::optional<Tick> StreamScheduler::next_end(McuIndex mcu) const {
   std::optional<Tick> next;
   for (std::uint8_t motor = 0; motor < BUSHD_MOTORS_PER_MCU; ++motor) {
@@ -166,11 +174,8 @@ std::int64_t StreamScheduler::arrival_us(std::int64_t now_us, std::uint16_t mask
 
 std::int64_t StreamScheduler::round_us() const {
   std::int64_t us = 0;
-  for (const Mcu& mcu : mcus_) {
-    std::uint16_t mask = 0;
-    for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-      if (mcu.stream[m].active) mask |= bit(m);
-    }
+  for (const McuIndex i : mcus_.indices()) {
+    const std::uint16_t mask = active(i);
     if (mask != 0) us += frame_us(mask, ticks_per_frame(mask));
   }
   return us;

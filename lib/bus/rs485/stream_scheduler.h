@@ -122,6 +122,8 @@ class StreamScheduler {
   // The first tick of this motor that has not been sent.
   Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
   bool has_ticks_to_send(McuIndex mcu) const;
+  // Its motors that have a stream or a run.
+  std::uint16_t active(McuIndex mcu) const;
   // The next tick, after that of its report, at which a motor of this MCU comes to rest by its
   // plan.
   std::optional<Tick> next_end(McuIndex mcu) const;

@@ -20,7 +20,10 @@ void Transactions::ask(std::int64_t now_us, const Request& request) {
   const std::int64_t quiet_us = end_us + request.reply_windows_us;
   open_ = Open{.type = request.type,
                .sequence = sequence,
-               .awaited = {{.mcu = request.mcu, .address = request.address, .expected_us = end_us}},
+               .awaited = {{.mcu = request.mcu,
+                            .address = request.address,
+                            .longest_us = end_us,
+                            .longest = request.reply_payload}},
                .sent_us = writer_.free_us(),
                .quiet_us = quiet_us,
                .timeout_us = quiet_us + patience_us_,
@@ -41,8 +44,10 @@ void Transactions::ask_all(std::int64_t now_us, std::uint8_t type,
                .timeout_us = quiet_us + patience_us_,
                .several = false};
   for (const ReplyWindow& window : windows) {
-    open_->awaited.push_back(
-        {.mcu = window.mcu, .address = window.address, .expected_us = sent_us + window.end_us});
+    open_->awaited.push_back({.mcu = window.mcu,
+                              .address = window.address,
+                              .longest_us = sent_us + window.end_us,
+                              .longest = window.payload});
   }
 }
 
@@ -75,16 +80,24 @@ void Transactions::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
     return;
   }
   from->answered = true;
-  note_latency(now_us, *from);
+  const std::int64_t expected_us = expected_of(*from, frame.payload_size);
+  note_latency(now_us, expected_us);
   const McuIndex mcu = from->mcu;
   const Answer answer = {.mcu = mcu,
                          .type = open_->type,
                          .payload = {frame.payload, frame.payload_size},
-                         .line_us = from->expected_us - open_->sent_us,
+                         .line_us = expected_us - open_->sent_us,
                          .in_time = now_us <= open_->timeout_us};
   if (!listener_.answered(now_us, answer)) ++health_.crc_errors;
   // Answers come in the order of their windows: after the last one nobody is waited for.
   if (open_ && !open_->several && mcu == open_->awaited.back().mcu) finish(now_us);
+}
+
+// The end of an answer with so many bytes, if nothing but the line takes time. It begins where the
+// longest one would.
+std::int64_t Transactions::expected_of(const Awaited& from, std::size_t payload) const {
+  return from.longest_us - writer_.line_us(from.longest) +
+         writer_.line_us(std::min(from.longest, payload));
 }
 
 Transactions::Awaited* Transactions::awaited_from(const bushd_frame& frame) {
@@ -115,9 +128,9 @@ void Transactions::be_more_patient() {
 }
 
 // In which of several windows an answer came is not known here.
-void Transactions::note_latency(std::int64_t now_us, const Awaited& from) {
+void Transactions::note_latency(std::int64_t now_us, std::int64_t expected_us) {
   if (open_->several) return;
-  const std::int64_t latency_us = std::max<std::int64_t>(now_us - from.expected_us, 0);
+  const std::int64_t latency_us = std::max<std::int64_t>(now_us - expected_us, 0);
   health_.latency.add(latency_us);
   patience_us_ = std::clamp(std::max(4 * latency_us, patience_us_ - patience_us_ / 8),
                             kMinPatienceUs, kMaxPatienceUs);

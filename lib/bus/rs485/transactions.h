@@ -68,7 +68,8 @@ class Transactions {
   struct ReplyWindow {
     McuIndex mcu;
     McuAddress address;
-    std::int64_t end_us;  // of its answer, from the request's end
+    std::int64_t end_us;  // of its longest answer, from the request's end
+    std::size_t payload;  // bytes of that
   };
   // A broadcast that each of these answers in a window of its own, in this order. An MCU may begin
   // later than its window by up to `late_us`.
@@ -94,7 +95,9 @@ class Transactions {
   struct Awaited {
     McuIndex mcu;
     McuAddress address;
-    std::int64_t expected_us;  // when its answer ends if nothing but the line takes time
+    // When its longest answer ends if nothing but the line takes time, and the payload of that.
+    std::int64_t longest_us;
+    std::size_t longest;
     bool answered = false;
   };
   struct Open {
@@ -114,7 +117,8 @@ class Transactions {
 
   void handle_frame(std::int64_t now_us, const bushd_frame& frame);
   Awaited* awaited_from(const bushd_frame& frame);
-  void note_latency(std::int64_t now_us, const Awaited& from);
+  std::int64_t expected_of(const Awaited& from, std::size_t payload) const;
+  void note_latency(std::int64_t now_us, std::int64_t expected_us);
   // An answer to what has expired is taken once.
   bool take_if_expired(const bushd_frame& frame);
   void be_more_patient();

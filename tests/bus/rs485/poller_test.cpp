@@ -8,6 +8,7 @@
 namespace bushd::test {
 namespace {
 
+using testing::Each;
 using testing::ElementsAre;
 
 struct Nobody : link::Transactions::Listener {
@@ -25,12 +26,16 @@ class Polling : public testing::Test {
   std::vector<int> asked() {
     std::vector<int> addresses;
     begins_us.clear();
+    known.clear();
+    room.clear();
     for (const Sent& frame : take_sent(writer)) {
       EXPECT_EQ(frame.type, BUSHD_MSG_POLL);
       EXPECT_EQ(frame.address, link::kBroadcast);
-      for (std::size_t i = 1; i + 2 < frame.payload.size(); i += 3) {
+      for (std::size_t i = 1; i + 4 < frame.payload.size(); i += 5) {
         addresses.push_back(frame.payload[i]);
         begins_us.push_back(bushd_get_u16(&frame.payload[i + 1]) * 10);
+        known.push_back(frame.payload[i + 3]);
+        room.push_back(frame.payload[i + 4]);
       }
     }
     transactions.abandon();
@@ -43,13 +48,15 @@ class Polling : public testing::Test {
   link::Transactions transactions{writer, nobody};
   link::Poller poller{mcus, transactions, writer};
   std::vector<int> begins_us;
+  std::vector<int> known;
+  std::vector<int> room;
 };
 
 TEST_F(Polling, AllAreAskedByOneFrame) {
   ASSERT_TRUE(poller.send_due(1'000'000));
   EXPECT_TRUE(transactions.open());
   EXPECT_THAT(asked(), ElementsAre(1, 2, 3, 4));
-  // 10 + 32 + 6 bytes for each motor at 20 us, and the guard.
+  // 10 + 82 + 6 bytes for each motor at 20 us, and the guard.
   const int slot_us = begins_us[1] - begins_us[0];
   EXPECT_GE(begins_us[0], 1'000);
   EXPECT_GE(slot_us, (BUSHD_FRAME_OVERHEAD + 1 + int{BUSHD_REPORT_SIZE(4)}) * 20 + 600);
@@ -95,7 +102,7 @@ TEST_F(Polling, ExtraPollsLeaveTheLineToOthers) {
   const std::int64_t window_us =
       begins_us[0] + writer.line_us(BUSHD_REPORT_SIZE(4) + BUSHD_FRAME_OVERHEAD + 1);
   const std::int64_t took_us =
-      writer.line_us(2 + 3 + BUSHD_FRAME_OVERHEAD + 1) + window_us + transactions.patience_us();
+      writer.line_us(1 + 5 + BUSHD_FRAME_OVERHEAD + 1) + window_us + transactions.patience_us();
   EXPECT_GE(poller.due_us(kSecond), std::min<std::int64_t>(1'010'000 + 4 * took_us, 1'050'000));
   EXPECT_LE(poller.due_us(kSecond), 1'050'000);
 }
@@ -146,16 +153,90 @@ TEST_F(Polling, CountersOfReportsAddUpOverRestarts) {
        std::initializer_list<std::uint16_t>{5, 7, 2}) {  // the third by another boot
     report.bad_frames = bad;
     report.ramp_downs = 1;
-    poller.follow_report(kFirst);
+    poller.follow_report(0, kFirst);
   }
   EXPECT_EQ(mcus[kFirst].health.crc_errors, 9u);
   EXPECT_EQ(mcus[kFirst].health.ramp_downs, 1u);
   EXPECT_FALSE(mcus[kFirst].health.low_water_ticks);
   report.low_water_ticks = 12;
-  poller.follow_report(kFirst);
+  poller.follow_report(0, kFirst);
   report.low_water_ticks = 40;
-  poller.follow_report(kFirst);
+  poller.follow_report(0, kFirst);
   EXPECT_EQ(mcus[kFirst].health.low_water_ticks, 12);
+}
+
+TEST_F(Polling, WhoIsAtRestGetsRoomForLittle) {
+  poller.send_due(1'000'000);
+  EXPECT_THAT(asked(), ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(known, ElementsAre(0, 0, 0, 0));
+  EXPECT_THAT(room, Each(82 + 4 * 6));
+  mcus[kFirst].known = 9;
+  poller.follow_report(1'001'000, kFirst);
+  poller.send_due(1'050'000);
+  asked();
+  EXPECT_THAT(known, ElementsAre(9, 0, 0, 0));
+  EXPECT_THAT(room, ElementsAre(22 + 16, 106, 106, 106));
+  EXPECT_EQ(begins_us[1] - begins_us[0], (38 + 10) * 20 + 600 + 10) << "its window is short";
+}
+
+TEST_F(Polling, WhoMayHaveMuchToTellGetsRoomForIt) {
+  const auto room_of_first = [&](std::int64_t now_us) {
+    mcus[kFirst].known = 9;
+    poller.follow_report(now_us - 1'000, kFirst);
+    poller.send_due(now_us);
+    asked();
+    return room.front();
+  };
+  std::int64_t now_us = 1'000'000;
+  const auto later = [&] { return now_us += 50'000; };
+  EXPECT_EQ(room_of_first(later()), 38);
+  constexpr int kInMotion = 22 + 16 + 7 + 12 + 15 + 4 * 6;
+  mcus[kFirst].view.report.moving = 8;
+  EXPECT_EQ(room_of_first(later()), kInMotion);
+  mcus[kFirst].view.report.moving = 0;
+  mcus[kFirst].view.report.armed = 1;
+  EXPECT_EQ(room_of_first(later()), kInMotion);
+  mcus[kFirst].view.report.armed = 0;
+  mcus[kFirst].answered = true;
+  EXPECT_EQ(room_of_first(later()), kInMotion);
+  mcus[kFirst].answered = false;
+  poller.expect_motion(kFirst, true);
+  EXPECT_EQ(room_of_first(later()), kInMotion);
+  poller.expect_motion(kFirst, false);
+  EXPECT_EQ(room_of_first(later()), 38);
+  mcus[kFirst].view.phase = link::McuPhase::kConnecting;
+  EXPECT_EQ(room_of_first(later()), 106);
+  mcus[kFirst].view.phase = link::McuPhase::kOnline;
+  poller.missed(now_us, kFirst, BUSHD_MSG_POLL);
+  EXPECT_EQ(room_of_first(later()), 106);
+  poller.answered(kFirst);
+  EXPECT_EQ(room_of_first(later()), 38);
+}
+
+TEST_F(Polling, WhatHadNoRoomIsAskedForAtOnce) {
+  mcus[kFirst].known = 9;
+  poller.follow_report(1'000'000, kFirst);
+  poller.send_due(1'000'000);
+  asked();
+  EXPECT_EQ(room.front(), 38);
+  EXPECT_TRUE(poller.no_room(kFirst));
+  ASSERT_TRUE(poller.send_wanted(1'004'000));
+  EXPECT_THAT(asked(), ElementsAre(1));
+  EXPECT_THAT(known, ElementsAre(9));
+  EXPECT_THAT(room, ElementsAre(106));
+  EXPECT_FALSE(poller.no_room(kFirst)) << "it had room for all: no such MCU keeps the line busy";
+  EXPECT_FALSE(mcus[kFirst].poll_wanted);
+}
+
+TEST_F(Polling, WhatIsKnownIsForgottenAfterASecondAndWithTheMcu) {
+  mcus[kFirst].known = mcus[kSecond].known = 9;
+  poller.follow_report(1'000'000, kFirst);
+  poller.follow_report(1'000'001, kSecond);
+  poller.send_due(2'000'000);
+  asked();
+  EXPECT_THAT(known, ElementsAre(0, 9, 0, 0));
+  poller.went_offline(kSecond);
+  EXPECT_EQ(mcus[kSecond].known, 0);
 }
 
 class ManyPolling : public Polling {

@@ -21,7 +21,7 @@ class Unfit : public testing::TestWithParam<Misfit> {};
 INSTANTIATE_TEST_SUITE_P(Identities, Unfit,
                          testing::Values(Misfit{"Version",
                                                 [](bushd_identity& i) { i.protocol_version = 9; },
-                                                {"protocol version 9", "this program version 5",
+                                                {"protocol version 9", "this program version 6",
                                                  "update"}},
                                          Misfit{"Outputs",
                                                 [](bushd_identity& i) { i.motors = 3; },

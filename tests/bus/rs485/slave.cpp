@@ -5,6 +5,59 @@
 
 namespace bushd::test {
 
+namespace {
+
+// By what the last report told: an MCU may keep all of it.
+std::uint8_t sections_with_news(const bushd_report& last, const bushd_report& now) {
+  const auto part = [&](auto... fields) { return ((last.*fields != now.*fields) || ...); };
+  using R = bushd_report;
+  unsigned sections = 0;
+  if (part(&R::reset_cause, &R::failed_tests, &R::motor_count)) sections |= BUSHD_TELLS_BOOT;
+  if (part(&R::sync_id, &R::sync_tick, &R::sync_ns, &R::rate_ppb)) sections |= BUSHD_TELLS_SYNC;
+  if (part(&R::inputs, &R::forbidden_positive, &R::forbidden_negative, &R::system_inputs)) {
+    sections |= BUSHD_TELLS_INPUTS;
+  }
+  if (part(&R::bad_frames, &R::rejected_frames, &R::last_rejection, &R::ramp_downs)) {
+    sections |= BUSHD_TELLS_COUNTERS;
+  }
+  const bool moves = (now.running | now.autonomous | now.out_of_order) != 0;
+  if (moves || now.low_water_ticks != UINT16_MAX) sections |= BUSHD_TELLS_MOTION;
+  if (part(&R::homed, &R::homing, &R::armed, &R::trigger_number, &R::trigger_state, &R::start_tick,
+           &R::start_ns)) {
+    sections |= BUSHD_TELLS_AUTONOMOUS;
+  }
+  return static_cast<std::uint8_t>(sections);
+}
+
+std::uint16_t motors_with_news(const bushd_report& last, const bushd_report& now) {
+  unsigned motors = now.moving;
+  for (unsigned m = 0; m < now.motor_count; ++m) {
+    const bool rests = now.motor[m].known_until == static_cast<std::uint16_t>(now.tick + 2);
+    const bool stays = now.motor[m].position_steps == last.motor[m].position_steps;
+    if (!rests || !stays) motors |= 1u << m;
+  }
+  return static_cast<std::uint16_t>(motors);
+}
+
+void choose_news(bushd_report& last, bushd_report& now, const bushd_poll_entry& entry) {
+  now.number = static_cast<std::uint8_t>(last.number % 255 + 1);
+  if (now.number == entry.known) now.number = static_cast<std::uint8_t>(now.number % 255 + 1);
+  now.sections = 63;
+  now.motors = static_cast<std::uint16_t>((1u << now.motor_count) - 1u);
+  if (entry.known != 0 && entry.known == last.number) {
+    now.sections = sections_with_news(last, now);
+    now.motors = motors_with_news(last, now);
+  }
+  if (bushd_report_size(now.sections, now.motors) > entry.room) {
+    now.number = now.sections = 0;
+    now.motors = 0;
+    return;
+  }
+  last = now;
+}
+
+}  // namespace
+
 FakeBus::FakeBus(int count, int motors, bushd_format format, std::uint32_t tick_ns,
                  std::uint32_t baud) {
   for (int i = 0; i < 200; ++i) codes.push_back(static_cast<std::uint16_t>(250 - i));
@@ -143,7 +196,8 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
       ASSERT_EQ(bushd_decode_poll(p.data(), p.size(), &poll), BUSHD_OK);
       bushd_poll_entry entry;
       if (!bushd_poll_find(&poll, slave.address, &entry)) return;
-      return answer(slave, frame, sequence, report(slave), std::int64_t{entry.begin_units} * 10);
+      return answer(slave, frame, sequence, report(slave, entry),
+                    std::int64_t{entry.begin_units} * 10);
     }
     case BUSHD_MSG_SYNC: {
       bushd_sync sync;
@@ -352,7 +406,7 @@ void FakeBus::take_table_run(Slave& slave, const Heard& frame) {
   }
 }
 
-Bytes FakeBus::report(Slave& slave) {
+Bytes FakeBus::report(Slave& slave, const bushd_poll_entry& entry) {
   follow_time(slave);
   bushd_report r{};
   const std::uint8_t ready = BUSHD_FLAG_CONFIGURED | BUSHD_FLAG_SYNCED | BUSHD_FLAG_ENABLED;
@@ -389,6 +443,7 @@ Bytes FakeBus::report(Slave& slave) {
   r.rejected_frames = slave.rejected;
   r.motor_count = slave.identity.motors;
   slave.spoils(r);
+  choose_news(slave.told, r, entry);
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_report(&r, payload.data()));
   return payload;

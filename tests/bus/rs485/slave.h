@@ -73,6 +73,8 @@ struct Slave {
   // Everything it took, by motor and tick.
   std::array<std::map<std::uint32_t, std::int16_t>, BUSHD_MOTORS_PER_MCU> taken;
   std::uint16_t rejected = 0;
+  // The last report. One that has it gets what is new.
+  bushd_report told{};
   std::uint16_t low_water = UINT16_MAX;
 };
 
@@ -177,7 +179,7 @@ class FakeBus {
   void answer(const Slave& slave, const Heard& frame, std::uint8_t sequence, const Bytes& payload,
               std::int64_t delay_us = 0);
   void follow_time(Slave& slave);
-  Bytes report(Slave& slave);
+  Bytes report(Slave& slave, const bushd_poll_entry& entry);
 
   bushd_receiver receiver_{};
   std::multimap<std::int64_t, std::pair<Heard, std::uint8_t>> frames_;

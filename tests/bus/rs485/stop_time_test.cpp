@@ -197,9 +197,9 @@ struct Times {
     const double width = line.format == BUSHD_FORMAT_FINE ? 2 : 1;
     const double room = std::floor((247 - 9 - 2.0 * line.motors) / (width * line.motors));
     const double ticks = std::min({16.0, room, std::floor(150'000.0 / line.tick_us)});
-    const double report = line_us(frame + 78 + 6.0 * line.motors) + 600;
+    const double report = line_us(frame + 72 + 6.0 * line.motors) + 600;
     round = line.mcus * line_us(frame + 9 + line.motors * (2 + width * ticks));
-    poll = line_us(frame + 1 + 3.0 * line.mcus) + 1'000 + 600 +
+    poll = line_us(frame + 1 + 5.0 * line.mcus) + 1'000 + 600 +
            std::min(line.mcus * report, std::max(report, 60'000.0));
     const double longest = line_us(257);
     stop = 5'000 + std::max(poll, longest) + round + 10'000 + 4.0 * line.tick_us;

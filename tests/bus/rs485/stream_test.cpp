@@ -270,6 +270,7 @@ TEST_P(Stream, PortLostDropsAllStreams) {
   bus.run_for(500'000);
   bus.master->port_lost(bus.now_us, "unplugged");
   bus.master->port_opened(bus.now_us);
+  bus.run_for(10'000);  // what was on the way
   bus.heard.clear();
   bus.run_for(1'500'000);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_TICKS).size(), 0u);

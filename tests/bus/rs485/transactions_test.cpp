@@ -37,8 +37,8 @@ class Transacting : public testing::Test, protected Transactions::Listener {
     sequence = take_sent(writer).back().sequence;
   }
   void poll() {
-    const std::vector<Transactions::ReplyWindow> windows = {{kSecond, McuAddress{9}, 3'000},
-                                                            {kFirst, McuAddress{4}, 6'000}};
+    const std::vector<Transactions::ReplyWindow> windows = {
+        {kSecond, McuAddress{9}, 3'000, 2}, {kFirst, McuAddress{4}, 6'000, longest}};
     transactions.ask_all(now_us, BUSHD_MSG_POLL, {}, windows, 600);
     sequence = take_sent(writer).back().sequence;
   }
@@ -57,6 +57,7 @@ class Transacting : public testing::Test, protected Transactions::Listener {
   bool expected = true;
   std::string story;
   Transactions::Answer last{};
+  std::size_t longest = 2;  // payload of the second answer that is polled
 };
 
 TEST_F(Transacting, AnswerEndsTheTransaction) {
@@ -99,6 +100,17 @@ TEST_F(Transacting, LastAnswerOfAPollNamesThoseWhoOweOne) {
   answer(4, BUSHD_MSG_POLL);
   EXPECT_EQ(story, "a0 u1 e ");
   EXPECT_FALSE(transactions.open());
+}
+
+// It begins where a longer one would, so it ends sooner.
+TEST_F(Transacting, AnswerThatIsShorterThanItsWindowIsExpectedSooner) {
+  longest = 2 + 50;  // bytes of 20 us
+  poll();
+  const std::int64_t sent_us = writer.free_us();
+  now_us = sent_us + 6'000 - 50 * 20 + 300;
+  answer(4, BUSHD_MSG_POLL);
+  EXPECT_EQ(last.line_us, 5'000);
+  EXPECT_EQ(transactions.health().latency.recent_us, 300);
 }
 
 TEST_F(Transacting, NobodyAnswersUntilTheTimeout) {

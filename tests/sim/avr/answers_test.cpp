@@ -16,7 +16,7 @@ TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
   Random random(1, 0);
   for (int i = 0; i < 1000; ++i) {
     pass(random.between(0, TimeNs{kTickNs}));
-    master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0});
+    master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0, 0, 255});
     const TimeNs asked_ns = bus_.wire_busy_until_ns();
     master_.frames.clear();
     master_.drain();
@@ -42,7 +42,7 @@ TEST_F(AvrAnswers, AreWholeWhateverPassesByBefore) {
   // Polls of this MCU, to be answered after 16 ms.
   const auto ask = [&] {
     master_.frames.clear();
-    const Bytes poll = {1, kAddress, 1600 & 0xFF, 1600 >> 8};
+    const Bytes poll = {1, kAddress, 1600 & 0xFF, 1600 >> 8, 0, 255};
     master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, poll);
   };
   const auto expect_answer = [&] {

@@ -38,7 +38,7 @@ class AvrAlone : public McuAlone {
     std::size_t polls = 0;
     while (poll_ms != 0 && bus_.now_ns() < end_ns) {
       ++polls;
-      master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 100, 0});
+      master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 100, 0, 0, 255});
       pass(poll_ms * TimeNs{1'000'000});
     }
     bus_.advance_to(std::max(end_ns, bus_.now_ns()));

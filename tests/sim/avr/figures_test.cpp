@@ -89,7 +89,7 @@ TEST_P(AvrFigures, SixteenMotorsLoseNoStep) {
     send_frame(first, tick);
     if (load.frames_a_poll != 0 && tick / ticks_per_frame() % load.frames_a_poll == 1) {
       ++polls;
-      master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0});
+      master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0, 0, 255});
     }
     bus_.advance_to(begin_ns + tick_ns * (tick + ticks_per_frame()));
   }

@@ -16,7 +16,8 @@ class AvrFlooded : public AvrAlone {
   bool answers_after(const Bytes& flood) {
     bus_.master_send(flood, bus_.now_ns());
     return master_
-        .request(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0}, kAddress)
+        .request(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, Bytes{1, kAddress, 0, 0, 0, 255},
+                 kAddress)
         .has_value();
   }
 };
