@@ -54,5 +54,21 @@ TEST(BusBudget, IsACloseUpperBoundOfWhatIsSent) {
   }
 }
 
+// The share of ten seconds without motion in which the line carries bytes.
+double share_at_rest(int slaves, std::uint32_t baud) {
+  FakeBus bus(slaves, BUSHD_MOTORS_PER_MCU, BUSHD_FORMAT_FINE, FakeBus::kTickNs, baud);
+  bus.connect();
+  bus.run_for(2'000'000);
+  const std::int64_t before = bus.master_bytes + bus.slave_bytes;
+  bus.run_for(10'000'000);
+  const std::int64_t bytes = bus.master_bytes + bus.slave_bytes - before;
+  return static_cast<double>(bytes) * 10 / baud / 10.0;
+}
+
+TEST(BusLoad, AtRestIsAFewPercent) {
+  EXPECT_LE(share_at_rest(2, 500'000), 0.05);
+  EXPECT_LE(share_at_rest(16, 1'000'000), 0.15);
+}
+
 }  // namespace
 }  // namespace bushd::test
