@@ -220,7 +220,7 @@ CommonStart Rs485Master::earliest_common_start(std::int64_t now_us,
   if (in_one_frame(together)) {
     return {.at = std::max(horizon_.earliest_at_once(carried_us, margin_us), after)};
   }
-  const std::int64_t round_us = carried_us - free_us + poller_.cycle_us();
+  const std::int64_t round_us = carried_us - free_us + poller_.cycle_us(together);
   carried_us = free_us + round_us + horizon_.held_back_us() + streams_.withdrawal_us(together) +
                setup_.tick_ns / 1000;
   const CommonStart confirmed = {
@@ -244,7 +244,7 @@ std::int64_t Rs485Master::line_free_us(std::int64_t now_us) const {
 
 // An exchange, the program, and what the adapter may hold back of a frame.
 std::int64_t Rs485Master::doubt_margin_us() const {
-  return poller_.cycle_us() + StartMargin::kLeastUs + 2 * horizon_.held_back_us();
+  return poller_.cycle_us({}) + StartMargin::kLeastUs + 2 * horizon_.held_back_us();
 }
 
 Tick Rs485Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {

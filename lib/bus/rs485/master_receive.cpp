@@ -135,7 +135,7 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
 // has.
 void Rs485Master::ask_at_end(std::int64_t now_us, McuIndex mcu) {
   const std::optional<Tick> end = streams_.next_end(mcu);
-  poller_.expect_motion(mcu, streams_.active(mcu) != 0);
+  poller_.expect_motion(mcu, streams_.active(mcu));
   const Tick now = clock().tick_at(now_us);
   // What lies farther ahead the next report asks for.
   const bool soon = end && *end <= now + clock().ticks_in(2 * fieldbus::kPollPeriodUs);

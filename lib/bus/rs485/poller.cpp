@@ -15,6 +15,8 @@ using fieldbus::kWindowGuardUs;
 
 // Nothing else is sent meanwhile; queues that have run low must not wait for longer.
 constexpr std::int64_t kMaxCycleUs = 60'000;
+constexpr std::uint8_t kNewsAtRest = BUSHD_NEWS_AT_REST;
+constexpr std::uint8_t kNewsOfPlans = BUSHD_NEWS_IN_MOTION & ~BUSHD_TELLS_AUTONOMOUS;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
@@ -59,18 +61,20 @@ void Poller::forget_old(std::int64_t now_us) {
 
 // Payload bytes of its report: for all, where all may be told. Otherwise for what is likely; at
 // rest that is a SYNC, or two smaller sections.
-std::uint8_t Poller::room(McuIndex mcu) const {
+std::uint8_t Poller::room(McuIndex mcu, std::uint16_t to_move) const {
   const McuRecord& record = mcus_[mcu];
   const Polled& polled = polled_[mcu];
   const bushd_report& report = record.view.report;
+  const auto of_mcu = static_cast<std::uint16_t>((1u << record.view.identity.motors) - 1u);
   const bool all = record.view.phase != McuPhase::kOnline || record.known == 0 ||
                    polled.missed_replies != 0 || polled.has_more;
-  const bool moves = polled.moves || record.answered || (report.moving | report.armed) != 0;
-  const auto motors = static_cast<std::uint16_t>((1u << record.view.identity.motors) - 1u);
-  const std::size_t room = all     ? bushd_report_size(BUSHD_TELLS_ALL, motors)
-                           : moves ? bushd_report_size(BUSHD_NEWS_IN_MOTION, motors)
-                                   : bushd_report_size(BUSHD_NEWS_AT_REST, 0);
-  return static_cast<std::uint8_t>(room);
+  if (all) return static_cast<std::uint8_t>(bushd_report_size(BUSHD_TELLS_ALL, of_mcu));
+  if (record.answered || (report.autonomous | report.armed) != 0) {
+    return static_cast<std::uint8_t>(bushd_report_size(BUSHD_NEWS_IN_MOTION, of_mcu));
+  }
+  const auto motors = static_cast<std::uint16_t>(polled.motors | report.moving | to_move);
+  return static_cast<std::uint8_t>(
+      bushd_report_size(motors != 0 ? kNewsOfPlans : kNewsAtRest, motors));
 }
 
 std::int64_t Poller::reply_us(std::size_t payload) const {
@@ -91,6 +95,22 @@ std::int64_t Poller::cycle_us() const {
          answers_us;
 }
 
+std::int64_t Poller::cycle_us(std::span<const ToBegin> together) const {
+  std::int64_t answers_us = 0;
+  std::size_t entries = 0;
+  for (const McuIndex i : mcus_.indices()) {
+    if (mcus_[i].view.phase == McuPhase::kOffline) continue;
+    std::uint16_t to_move = 0;
+    for (const ToBegin& begin : together) {
+      if (begin.mcu == i) to_move |= begin.motors;
+    }
+    ++entries;
+    answers_us += reply_us(room(i, to_move)) + kWindowGuardUs;
+  }
+  return writer_.line_us(2 + entries * BUSHD_POLL_ENTRY + BUSHD_FRAME_OVERHEAD) + kFirstWindowUs +
+         std::min(answers_us, kMaxCycleUs);
+}
+
 bool Poller::send_wanted(std::int64_t now_us) {
   if (std::none_of(mcus_.begin(), mcus_.end(), [](const McuRecord& m) { return m.poll_wanted; })) {
     return false;
@@ -101,7 +121,7 @@ bool Poller::send_wanted(std::int64_t now_us) {
   std::int64_t begin_us = kFirstWindowUs;
   for (const McuIndex i : choose(now_us)) {
     const McuRecord& mcu = mcus_[i];
-    const std::uint8_t most = room(i);
+    const std::uint8_t most = room(i, 0);
     const std::int64_t end_us = begin_us + reply_us(most);
     const bool full = entries.size() == BUSHD_POLL_MAX_ENTRIES || end_us > kMaxCycleUs;
     if (full && !entries.empty()) break;
@@ -162,7 +182,8 @@ bool Poller::no_room(McuIndex mcu) {
 
 void Poller::went_offline(McuIndex mcu) {
   polled_[mcu].missed_replies = 0;
-  polled_[mcu].has_more = polled_[mcu].moves = false;
+  polled_[mcu].has_more = false;
+  polled_[mcu].motors = 0;
   mcus_[mcu].known = 0;
   polled_[mcu].news_us = INT64_MAX;
   mcus_[mcu].poll_wanted = mcus_[mcu].answered = false;

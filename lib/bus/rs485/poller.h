@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "bus/rs485/common_start.h"
 #include "bus/rs485/mcu_record.h"
 #include "bus/rs485/transactions.h"
 #include "engine/message.h"
@@ -31,8 +33,10 @@ class Poller {
   // before. INT64_MAX: nothing is expected. Such extra polls take at most half of the time, so
   // they may come later; no routine poll does.
   void expect_news(McuIndex mcu, std::int64_t at_us) { polled_[mcu].news_us = at_us; }
-  // Until told otherwise motors of it move, or are to.
-  void expect_motion(McuIndex mcu, bool expected) { polled_[mcu].moves = expected; }
+  // The same of one at once, in which motors of these MCUs are to move.
+  std::int64_t cycle_us(std::span<const ToBegin> together) const;
+  // Until told otherwise these motors of it move, or are to.
+  void expect_motion(McuIndex mcu, std::uint16_t motors) { polled_[mcu].motors = motors; }
   // When the MCU's turn comes. Precondition: it is not offline.
   std::int64_t due_us(McuIndex mcu) const {
     const Polled& polled = polled_[mcu];
@@ -55,14 +59,14 @@ class Poller {
     std::int64_t news_us = INT64_MAX;  // expect_news
     int missed_replies = 0;            // requests in a row without an answer
     std::int64_t reported_us = 0;      // the last report
-    bool moves = false;                // expect_motion
+    std::uint16_t motors = 0;          // expect_motion
     bool has_more = false;             // no_room
     ReportedCounters counters;
   };
 
   std::vector<McuIndex> choose(std::int64_t now_us) const;
   void forget_old(std::int64_t now_us);
-  std::uint8_t room(McuIndex mcu) const;
+  std::uint8_t room(McuIndex mcu, std::uint16_t to_move) const;
   std::int64_t reply_us(std::size_t payload) const;
 
   PerMcu<McuRecord>& mcus_;
