@@ -53,7 +53,7 @@ void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
         }
       },
       [&](const link::StartMissed& event) { misses_start(mcu_of(event), Output{event.motor}); },
-      [&](const link::StartInDoubt& event) { moves_.doubts_start(now_us, bus, event.at); },
+      [&](const link::StartUnconfirmed& event) { moves_.withdraw_start(now_us, bus, event.at); },
       [&](const link::PositionUncertain& event) {
         is_uncertain(mcu_of(event), Output{event.motor});
       },

@@ -183,6 +183,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     straight->pace = pace;
   }
   const bool by_mcus = pace || in_mcus(number, line);
+  const bool anew = begins_anew(number, line);
   const std::map<BusId, motion::Tick> start = starts_of(now_us, line, motors, by_mcus);
   for (const std::size_t i : indices) {
     motion::Motor& motor = installation_[line.motors[i]];
@@ -194,7 +195,7 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     on_line.target_steps = line.end_of(i);
     on_line.to_point = to == line.target;
     on_line.last_run = line.legs() == 1 && to == line.target;
-    const std::uint32_t from = same_way ? place_of(line.motors[i]) : 0;
+    const std::uint32_t from = same_way ? place_of(line.motors[i], anew) : 0;
     motion::LineShare share = line.share(i, from, to);
     share.line = number;
     share.in_mcus = by_mcus;
@@ -220,7 +221,7 @@ std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us, const Line& 
   for (const auto& [bus, of_bus] : masks) {
     std::vector<link::ToBegin> together;
     for (const auto& [mcu, outputs] : of_bus) {
-      together.push_back({installation_[mcu].on_bus(), outputs, link::Told::kLineRun});
+      together.push_back({installation_[mcu].on_bus(), outputs, link::StartMessages::kLineRun});
     }
     link::BusMaster& master = installation_[bus].master;
     const link::CommonStart start = master.earliest_common_start(now_us, together);
@@ -230,9 +231,10 @@ std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us, const Line& 
   return starts;
 }
 
-std::uint32_t Lines::place_of(MotorId motor) const {
+std::uint32_t Lines::place_of(MotorId motor, bool anew) const {
   const motion::Axis& axis = installation_[motor].axis();
-  return installation_[motor].is_late() ? axis.line()->from : axis.line_planned_end();
+  const bool not_begun = anew && (installation_[motor].is_late() || only_waits(motor));
+  return not_begun ? axis.line()->from : axis.line_planned_end();
 }
 
 const motion::OnLine* Lines::on_line(MotorId motor, std::uint64_t number) const {
@@ -270,13 +272,18 @@ bool Lines::follow(std::int64_t now_us, std::uint64_t number, Line& line) {
     any = true;
     const bool paused = installation_[id].is_paused();
     const bool stops = installation_[id].stops() && !paused;
-    // One that makes no step only waits for the others.
-    const motion::Axis& axis = installation_[id].axis();
-    const bool stands = motor->stands || (late && axis.end_tick() <= axis.start_tick());
+    const bool stands = motor->stands || (late && only_waits(id));
     all_stand = all_stand && stands && !stops && (!paused || motor->resumes);
   }
   if (any && all_stand) go_on(now_us, number, line);
   return any;
+}
+
+// It makes no step of the run, and is not told of it.
+bool Lines::only_waits(MotorId motor) const {
+  const motion::Axis& axis = installation_[motor].axis();
+  const bool would_begin = installation_[motor].is_late() || installation_[motor].is_withdrawn();
+  return !would_begin && axis.end_tick() <= axis.start_tick();
 }
 
 bool Lines::begins_anew(std::uint64_t number, const Line& line) const {
@@ -294,7 +301,7 @@ void Lines::end_split_start(std::uint64_t number, const Line& line) {
     if (motor.is_late()) {
       late.push_back(id);
     } else {
-      begun = begun || motor.position_steps() != motor.axis().from_steps();
+      begun = begun || moves_.has_begun(id);
     }
   }
   if (!begun && line.tries < CommonStarts::kMostTries) return;
@@ -349,16 +356,20 @@ void Lines::end(std::int64_t now_us, std::uint64_t number, const Line& line,
 // All stand where their runs have led. Those that have been stopped earlier than others, since
 // their MCU was the only one to hear of it at once, catch up first.
 void Lines::go_on(std::int64_t now_us, std::uint64_t number, Line& line) {
-  line.tries = begins_anew(number, line) ? line.tries + 1 : 1;
+  const bool late = begins_anew(number, line);
+  line.tries = late ? line.tries + 1 : 1;
+  for (const MotorId id : line.motors) {
+    if (late && only_waits(id)) journal_.ended(id, "late");
+  }
   std::uint32_t farthest = 0;
   for (const MotorId id : line.motors) {
-    farthest = std::max(farthest, place_of(id));
+    farthest = std::max(farthest, place_of(id, late));
   }
   std::vector<std::size_t> behind;
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     all.push_back(i);
-    if (place_of(line.motors[i]) < farthest) behind.push_back(i);
+    if (place_of(line.motors[i], late) < farthest) behind.push_back(i);
   }
   if (!behind.empty()) return begin_run(now_us, number, line, behind, farthest);
   if (AlongPath* along = line.path()) {

@@ -104,11 +104,12 @@ class Lines final : public Service {
   // Each bus has a tick of its own: there is one bus, or one a motor.
   std::map<BusId, motion::Tick> starts_of(std::int64_t now_us, const Line& line,
                                           const std::vector<MotorId>& motors, bool by_mcus);
-  // Where a motor's run has led, or was to begin; in steps of the line.
-  std::uint32_t place_of(MotorId motor) const;
+  // Where a motor's run has led, or if it begins anew was to begin; in steps of the line.
+  std::uint32_t place_of(MotorId motor, bool anew) const;
   // Those that have missed their start when others have begun.
   void end_split_start(std::uint64_t number, const Line& line);
   bool begins_anew(std::uint64_t number, const Line& line) const;  // a motor has missed its start
+  bool only_waits(MotorId motor) const;
   bool makes_another(const Mcu& mcu, std::uint64_t number) const;  // line than this one
   std::optional<WantedTable> table_to_upload(const api::MoveLine& request, bool armed) const;
   std::optional<WantedTable> table_to_upload(const Line& line, bool armed) const;

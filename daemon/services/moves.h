@@ -82,8 +82,10 @@ class Moves final : public Service {
   // with it has, all of them begin anew; else it ends.
   void misses_start(MotorId motor);
   // Those that were to begin together at this tick of the bus are given rest instead, and miss it.
-  void doubts_start(std::int64_t now_us, const Bus& bus, motion::Tick at);
+  void withdraw_start(std::int64_t now_us, const Bus& bus, motion::Tick at);
   void end(MotorId motor, const motion::event::Ended& ended);
+  // Whether a motor that moves has begun its run, as its MCU reports.
+  bool has_begun(MotorId motor) const;
 
   // Whether motors of an accepted move are still to begin. Until then requests should wait, but
   // for stops.

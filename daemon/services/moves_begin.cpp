@@ -36,6 +36,7 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
     if (!motor.stands()) {
+      if (motor.is_withdrawn()) starts_.leaves(part.motor);
       motor.aim(part.legs.front().target, part.legs.front().shortest_delay);
     } else {
       plan_start({part.motor, part.legs.front()},
@@ -71,17 +72,18 @@ std::map<BusId, link::CommonStart> Moves::starts_of(std::int64_t now_us,
 
 link::CommonStart Moves::start_of(std::int64_t now_us, BusId bus, const std::vector<FirstLeg>& legs,
                                   bool at_once) const {
-  std::map<std::pair<McuId, link::Told>, std::uint16_t> masks;
+  std::map<std::pair<McuId, link::StartMessages>, std::uint16_t> masks;
   link::CommonStart later;
   for (const auto& [id, leg] : legs) {
     const Mcu& mcu = installation_.mcu_of(id);
     const motion::Motor& motor = installation_[id];
     const std::int64_t steps = leg.target - motor.position_steps();
     // No state tells of a run with delays that are no codes.
-    const link::Told told = by_table(id, steps, leg.shortest_delay)   ? link::Told::kTableRun
-                            : bushd_delay_is_code(leg.shortest_delay) ? link::Told::kStates
-                                                                      : link::Told::kTicks;
-    masks[{mcu.id, told}] |= static_cast<std::uint16_t>(1u << motor.output().value);
+    const link::StartMessages messages =
+        by_table(id, steps, leg.shortest_delay)   ? link::StartMessages::kTableRun
+        : bushd_delay_is_code(leg.shortest_delay) ? link::StartMessages::kStates
+                                                  : link::StartMessages::kTicks;
+    masks[{mcu.id, messages}] |= static_cast<std::uint16_t>(1u << motor.output().value);
     later.at = std::max(later.at, mcu.earliest_start(now_us, motor.output()));
   }
   if (!at_once) return later;
@@ -126,7 +128,7 @@ void Moves::misses_start(MotorId id) {
   starts_.misses(id);
 }
 
-void Moves::doubts_start(std::int64_t now_us, const Bus& bus, motion::Tick at) {
+void Moves::withdraw_start(std::int64_t now_us, const Bus& bus, motion::Tick at) {
   std::vector<MotorId> withdrawn;
   for (const McuId mcu : bus.mcus) {
     for (const MotorId id : installation_[mcu].motors()) {
@@ -143,6 +145,11 @@ void Moves::pause_late(MotorId id) {
   unbegun_.erase(id);
   starts_.leaves(id);
   installation_[id].pause();
+}
+
+bool Moves::has_begun(MotorId id) const {
+  return installation_.mcu_of(id).view().tick > installation_[id].axis().start_tick() &&
+         has_moved(id);
 }
 
 bool Moves::has_moved(MotorId id) const {
@@ -170,7 +177,8 @@ void Moves::start_anew(std::int64_t now_us) {
   }
   std::vector<FirstLeg> legs;
   for (const MotorId id : decision.again) legs.push_back({id, installation_[id].take_leg()});
-  const bool at_once = legs.size() <= kBeginsPerSlice;
+  // Behind a large move that begins in slices there is no telling when it is their turn.
+  const bool at_once = !begins() && legs.size() <= kBeginsPerSlice;
   const std::map<BusId, link::CommonStart> start = starts_of(now_us, legs, at_once);
   for (const FirstLeg& leg : legs) {
     const motion::Motor& motor = installation_[leg.motor];

@@ -94,8 +94,8 @@ bool Motor::has_missed_start(const bushd_report& report) const {
 }
 
 bool Motor::may_begin_anew() const {
-  const bool on_path = axis_.line() && axis_.line()->track;
-  return moves() && !follows() && !on_path;
+  const bool streamed_line = axis_.line() && !axis_.line()->in_mcus;
+  return moves() && !follows() && !streamed_line;
 }
 
 bool Motor::awaits_new_start() {

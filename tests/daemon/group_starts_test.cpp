@@ -188,7 +188,7 @@ class StartLead : public testing::TestWithParam<Lead> {};
 
 // From the request to the beginning, at any phase of the polls. The goals are: of one motor 25 ms,
 // of a group at two MCUs 30 ms, at eight 50 ms in 99 of 100 cases. A request that comes just when a
-// poll of all eight has begun waits for it: 14 ms of 20 us a byte, instead of 7 ms on average.
+// poll of all eight has begun waits until that is over.
 TEST_P(StartLead, IsTheTimeOfFramesAndOneExchange) {
   const auto& [name, mcus, motors, line, most_us] = GetParam();
   FirstSteps first;

@@ -82,7 +82,7 @@ class BusMaster {
     return {.at = earliest};
   }
   // What begins at this tick begins together: if it is not known in time that all MCUs have what
-  // they need for it, StartInDoubt says so while none has begun. To be called before begin().
+  // they need for it, StartUnconfirmed says so while none has begun. To be called before begin().
   virtual void confirm_start(Tick /*at*/) {}
   // A motion has missed its start: what begins at once next gets more time.
   virtual void start_missed() {}

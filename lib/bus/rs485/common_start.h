@@ -8,8 +8,8 @@
 
 namespace bushd::link {
 
-// How an MCU is told of what its motors do.
-enum class Told : std::uint8_t {
+// What messages tell an MCU how its motors begin.
+enum class StartMessages : std::uint8_t {
   kTableRun,  // each motor's whole run (TableRuns::begin_table_run)
   kLineRun,   // the whole run of a line (LineRuns::begin_line_run)
   kStates,    // ticks, by states of runs where the MCU takes them
@@ -20,7 +20,7 @@ enum class Told : std::uint8_t {
 struct ToBegin {
   McuIndex mcu;
   std::uint16_t motors;
-  Told told;
+  StartMessages messages;
 };
 
 struct CommonStart {

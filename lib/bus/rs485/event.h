@@ -40,7 +40,7 @@ struct StartMissed {
 };
 // The motors that were to begin together at this tick (BusMaster::confirm_start) should not begin:
 // not all of their MCUs are known to have got their first frames. Give them rest from `at` on.
-struct StartInDoubt {
+struct StartUnconfirmed {
   Tick at;
 };
 
@@ -51,6 +51,6 @@ struct PositionUncertain {
 };
 
 using Event = std::variant<McuOnline, McuOffline, McuReported, ReplacementFailed, RequestRefused,
-                           StartMissed, StartInDoubt, PositionUncertain>;
+                           StartMissed, StartUnconfirmed, PositionUncertain>;
 
 }  // namespace bushd::link

@@ -114,28 +114,28 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   synchroniser_.lines_run(streams_.runs_line());
   transactions_.expire(now_us);
   streams_.fail_late_replacements(now_us);
-  doubt_late_starts(now_us);
+  withdraw_late_starts(now_us);
   streams_.fail_late_starts(now_us);
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
   if (transactions_.open() && now_us >= transactions_.quiet_us()) {
     emergency_.send_due(now_us);
-    while (streams_.withdraws() && streams_.send_due_replacement(now_us)) {
-    }
+    if (streams_.withdraws()) transactions_.give_up(now_us);
   }
   while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
   }
   return writer_.bytes();
 }
 
-void Rs485Master::doubt_late_starts(std::int64_t now_us) {
+void Rs485Master::withdraw_late_starts(std::int64_t now_us) {
   if (!clock().valid() || (transactions_.open() && now_us < transactions_.quiet_us())) return;
-  streams_.doubt_late_starts(std::max(line_free_us(now_us), writer_.free_us()), doubt_margin_us());
+  streams_.withdraw_late_starts(std::max(line_free_us(now_us), writer_.free_us()),
+                                withdrawal_margin_us());
 }
 
 // How long nothing may be sent, and then all others have their turn first: a poll whose last answer
 // is missing.
 std::int64_t Rs485Master::silence_us() const {
-  return poller_.cycle_us() + transactions_.patience_us() + streams_.round_us();
+  return poller_.longest_cycle_us() + transactions_.patience_us() + streams_.round_us();
 }
 
 // By urgency: an emergency, also one that binds an MCU that has just come; queues that are all but
@@ -164,21 +164,21 @@ bool Rs485Master::send_next(std::int64_t now_us) {
 std::int64_t Rs485Master::next_wake_us() const {
   if (!port_open_) return INT64_MAX;
   if (transactions_.open()) {
-    std::int64_t urgent_us = doubt_us();
+    std::int64_t urgent_us = withdrawal_due_us();
     if (emergency_.active()) urgent_us = std::min(urgent_us, emergency_.due_us());
     if (streams_.withdraws()) urgent_us = stepped_us_;
     return std::min(transactions_.timeout_us(), std::max(urgent_us, transactions_.quiet_us()));
   }
-  std::int64_t wake = begun_ ? stepped_us_ : std::min(synchroniser_.due_us(), doubt_us());
+  std::int64_t wake = begun_ ? stepped_us_ : std::min(synchroniser_.due_us(), withdrawal_due_us());
   if (emergency_.active()) wake = std::min(wake, emergency_.due_us());
   for (const McuIndex i : mcus_.indices()) wake = std::min(wake, wake_us(i));
   return std::max(wake, writer_.room_from_us());
 }
 
-std::int64_t Rs485Master::doubt_us() const {
+std::int64_t Rs485Master::withdrawal_due_us() const {
   if (!clock().valid()) return INT64_MAX;
   const std::int64_t free_us = std::max(line_free_us(stepped_us_), writer_.free_us());
-  return streams_.doubt_us(free_us, doubt_margin_us());
+  return streams_.withdrawal_due_us(free_us, withdrawal_margin_us());
 }
 
 std::int64_t Rs485Master::wake_us(McuIndex mcu) const {
@@ -220,21 +220,22 @@ CommonStart Rs485Master::earliest_common_start(std::int64_t now_us,
   if (in_one_frame(together)) {
     return {.at = std::max(horizon_.earliest_at_once(carried_us, margin_us), after)};
   }
-  const std::int64_t round_us = carried_us - free_us + poller_.cycle_us(together);
-  carried_us = free_us + round_us + horizon_.held_back_us() + streams_.withdrawal_us(together) +
-               setup_.tick_ns / 1000;
+  const std::int64_t frames_us = carried_us - free_us;
+  carried_us += poller_.expected_cycle_us(together) + horizon_.held_back_us() +
+                streams_.withdrawal_us(together) + setup_.tick_ns / 1000;
   const CommonStart confirmed = {
       .at = std::max(horizon_.earliest_at_once(carried_us, margin_us), after), .to_confirm = true};
   if (confirmed.at > later.at) return later;
   const std::int64_t repair_us = repair_time_.margin_us(now_us) - StartMargin::kLeastUs;
-  const std::int64_t more_us = repair_us > 0 ? std::max(repair_us, round_us) : 0;
+  const std::int64_t again_us = frames_us + poller_.longest_cycle_us();
+  const std::int64_t more_us = repair_us > 0 ? std::max(repair_us, again_us) : 0;
   return {.at = confirmed.at + clock().ticks_in(more_us), .to_confirm = true};
 }
 
 bool Rs485Master::in_one_frame(std::span<const ToBegin> together) const {
   if (together.size() != 1) return false;
   const ToBegin& begin = together.front();
-  return begin.told != Told::kStates || std::has_single_bit(begin.motors);
+  return begin.messages != StartMessages::kStates || std::has_single_bit(begin.motors);
 }
 
 // When what is sent next would begin, if the MCUs that are asked answer in their time or never.
@@ -243,15 +244,15 @@ std::int64_t Rs485Master::line_free_us(std::int64_t now_us) const {
 }
 
 // An exchange, the program, and what the adapter may hold back of a frame.
-std::int64_t Rs485Master::doubt_margin_us() const {
-  return poller_.cycle_us({}) + StartMargin::kLeastUs + 2 * horizon_.held_back_us();
+std::int64_t Rs485Master::withdrawal_margin_us() const {
+  return poller_.expected_cycle_us({}) + StartMargin::kLeastUs + 2 * horizon_.held_back_us();
 }
 
 Tick Rs485Master::earliest_replace(std::int64_t now_us, std::span<const ToReplace> together) const {
   const StreamScheduler::LineUse use = {
       .free_us = transactions_.open() ? transactions_.quiet_us() : now_us,
       .margin_us = kCriticalMarginUs,
-      .confirm_us = kFollowFirstUs + streams_.round_us() + poller_.cycle_us()};
+      .confirm_us = kFollowFirstUs + streams_.round_us() + poller_.longest_cycle_us()};
   return horizon_.earliest_replace(now_us, streams_.carried_us(now_us, use, together));
 }
 

@@ -174,10 +174,10 @@ class Rs485Master final : public BusMaster,
   std::int64_t silence_us() const;
   bool in_one_frame(std::span<const ToBegin> together) const;
   std::int64_t line_free_us(std::int64_t now_us) const;
-  std::int64_t doubt_margin_us() const;
-  void doubt_late_starts(std::int64_t now_us);
+  std::int64_t withdrawal_margin_us() const;
+  void withdraw_late_starts(std::int64_t now_us);
   void ask_again_for_start(std::int64_t now_us, McuIndex mcu);
-  std::int64_t doubt_us() const;
+  std::int64_t withdrawal_due_us() const;
   std::int64_t wake_us(McuIndex mcu) const;
   const BusClock& clock() const { return synchroniser_.clock(); }
 

@@ -39,8 +39,9 @@ bool Rs485Master::answered(std::int64_t now_us, const Transactions::Answer& answ
       bushd_report report = mcu.known != 0 ? mcu.view.report : bushd_report{};
       if (mcu.known == 0) report.motor_count = BUSHD_MOTORS_PER_MCU;
       if (!decoded(answer, bushd_decode_report, &report)) return false;
-      if (report.number == 0) return poller_.no_room(answer.mcu);
-      if (mcu.known == 0 && !bushd_report_is_whole(&report)) return false;
+      const bool restarted = report.boot_number != mcu.view.identity.boot_number;
+      if (report.number == 0 && !restarted) return poller_.no_room(answer.mcu);
+      if (mcu.known == 0 && !restarted && !bushd_report_is_whole(&report)) return false;
       handle_report(now_us, answer, report);
       return true;
     }

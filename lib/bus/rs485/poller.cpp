@@ -60,7 +60,7 @@ void Poller::forget_old(std::int64_t now_us) {
 }
 
 // Payload bytes of its report: for all, where all may be told. Otherwise for what is likely; at
-// rest that is a SYNC, or two smaller sections.
+// rest that is a SYNC, or what fits in its place.
 std::uint8_t Poller::room(McuIndex mcu, std::uint16_t to_move) const {
   const McuRecord& record = mcus_[mcu];
   const Polled& polled = polled_[mcu];
@@ -81,7 +81,7 @@ std::int64_t Poller::reply_us(std::size_t payload) const {
   return writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
 }
 
-std::int64_t Poller::cycle_us() const {
+std::int64_t Poller::longest_cycle_us() const {
   std::int64_t answers_us = 0;
   std::size_t entries = 0;
   for (const McuRecord& mcu : mcus_) {
@@ -95,7 +95,7 @@ std::int64_t Poller::cycle_us() const {
          answers_us;
 }
 
-std::int64_t Poller::cycle_us(std::span<const ToBegin> together) const {
+std::int64_t Poller::expected_cycle_us(std::span<const ToBegin> together) const {
   std::int64_t answers_us = 0;
   std::size_t entries = 0;
   for (const McuIndex i : mcus_.indices()) {

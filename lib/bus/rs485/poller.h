@@ -28,13 +28,13 @@ class Poller {
   // The same, and those whose turn has come.
   bool send_due(std::int64_t now_us);
   // How long the line is taken by a poll of all MCUs that are not offline, its answers included.
-  std::int64_t cycle_us() const;
+  std::int64_t longest_cycle_us() const;
+  // By one now, if what is likely is told, and these motors are to move.
+  std::int64_t expected_cycle_us(std::span<const ToBegin> together) const;
   // At this time the MCU's report will have something new: it is asked then, unless its turn comes
   // before. INT64_MAX: nothing is expected. Such extra polls take at most half of the time, so
   // they may come later; no routine poll does.
   void expect_news(McuIndex mcu, std::int64_t at_us) { polled_[mcu].news_us = at_us; }
-  // The same of one at once, in which motors of these MCUs are to move.
-  std::int64_t cycle_us(std::span<const ToBegin> together) const;
   // Until told otherwise these motors of it move, or are to.
   void expect_motion(McuIndex mcu, std::uint16_t motors) { polled_[mcu].motors = motors; }
   // When the MCU's turn comes. Precondition: it is not offline.

@@ -75,7 +75,6 @@ class StreamScheduler {
   // too late is not sent: StartMissed says so.
   void fail_late_starts(std::int64_t now_us);
   bool send_due_replacement(std::int64_t now_us);
-  // stream_starts.cpp
   // Few frames tell of the whole run, or of as much as the MCU can hold.
   bool tells_at_once(const ToBegin& begin) const;
   // How long the line takes for the first frames of these motors. Precondition: tells_at_once.
@@ -87,13 +86,14 @@ class StreamScheduler {
   void confirm_start(Tick at);
   // An MCU has been sent what a motor of such a start needs, and is to say whether it has it.
   bool start_is_open(McuIndex mcu) const;
-  // Called once in a step, before anything is sent: StartInDoubt for those that are not confirmed,
-  // if there is no time for `margin_us` before frames that keep them from beginning, on a line that
-  // is free from `free_us` on.
-  void doubt_late_starts(std::int64_t free_us, std::int64_t margin_us);
+  // Called once in a step, before anything is sent: StartUnconfirmed for those that are not
+  // confirmed, if there is no time for `margin_us` before frames that keep them from beginning, on
+  // a line that is free from `free_us` on.
+  void withdraw_late_starts(std::int64_t free_us, std::int64_t margin_us);
   // When that will be; INT64_MAX: no start is to be confirmed.
-  std::int64_t doubt_us(std::int64_t free_us, std::int64_t margin_us) const;
-  // A replacement waits that keeps a motor from beginning.
+  std::int64_t withdrawal_due_us(std::int64_t free_us, std::int64_t margin_us) const;
+  // A replacement waits that keeps a motor from beginning: what StartUnconfirmed has asked for, if
+  // it was done before the next step.
   bool withdraws() const;
   // When the line will have carried these replacements, one for each MCU, if they are asked for
   // now.
@@ -220,6 +220,7 @@ class StreamScheduler {
   // The last tick in which frames that keep motors from beginning at this one may arrive.
   static Tick last_to_withdraw(Tick at);
   std::int64_t withdrawal_us(Tick at) const;
+  bool waits_for_replacement(Tick at) const;
 
   // stream_frames.cpp
   void finish_ended(McuIndex mcu);

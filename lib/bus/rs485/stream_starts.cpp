@@ -14,8 +14,8 @@ bool StreamScheduler::tells_states(McuIndex mcu) const {
 }
 
 bool StreamScheduler::tells_at_once(const ToBegin& begin) const {
-  if (begin.told == Told::kTicks) return false;
-  return begin.told != Told::kStates || tells_states(begin.mcu);
+  if (begin.messages == StartMessages::kTicks) return false;
+  return begin.messages != StartMessages::kStates || tells_states(begin.mcu);
 }
 
 std::int64_t StreamScheduler::first_frames_us(const ToBegin& begin) const {
@@ -23,10 +23,10 @@ std::int64_t StreamScheduler::first_frames_us(const ToBegin& begin) const {
   const auto frame = [this](std::size_t payload) {
     return writer_.line_us(payload + BUSHD_FRAME_OVERHEAD + 1);
   };
-  if (begin.told == Told::kTableRun) {
+  if (begin.messages == StartMessages::kTableRun) {
     return frame(BUSHD_TABLE_RUN_HEADER + motors * BUSHD_TABLE_RUN_MAX_ENTRY);
   }
-  if (begin.told == Told::kLineRun) {
+  if (begin.messages == StartMessages::kLineRun) {
     return frame(BUSHD_LINE_RUN_HEADER + motors * BUSHD_LINE_RUN_ENTRY);
   }
   constexpr auto kMost = static_cast<std::size_t>(kMotorsPerStates);
@@ -88,7 +88,7 @@ std::int64_t StreamScheduler::withdrawal_us(Tick at) const {
   return us;
 }
 
-void StreamScheduler::doubt_late_starts(std::int64_t free_us, std::int64_t margin_us) {
+void StreamScheduler::withdraw_late_starts(std::int64_t free_us, std::int64_t margin_us) {
   for (Mcu& mcu : mcus_) mcu.withdraws = mcu.withdraws && mcu.replacing != 0;
   std::erase_if(to_confirm_, [&](Tick at) {
     bool open = false;
@@ -98,18 +98,26 @@ void StreamScheduler::doubt_late_starts(std::int64_t free_us, std::int64_t margi
     if (clock_.tick_at(arrival_us + margin_us) < last_to_withdraw(at)) return false;
     // Where that cannot be told them in time they begin, some perhaps without others.
     if (too_late(at, clock_.tick_at(arrival_us))) return true;
-    for (const McuIndex i : mcus_.indices()) {
-      if (to_begin_at(i, at) != 0 && (mcus_[i].replacing | mcus_[i].replaced) != 0) return true;
-    }
+    if (waits_for_replacement(at)) return false;
     for (const McuIndex i : mcus_.indices()) mcus_[i].withdraws = to_begin_at(i, at) != 0;
-    events_.push_back(StartInDoubt{at});
+    events_.push_back(StartUnconfirmed{at});
     return true;
   });
 }
 
-std::int64_t StreamScheduler::doubt_us(std::int64_t free_us, std::int64_t margin_us) const {
+// An MCU gets no other replacement before it has said whether it has taken the one before.
+bool StreamScheduler::waits_for_replacement(Tick at) const {
+  for (const McuIndex i : mcus_.indices()) {
+    if (mcus_[i].replaced != 0 && to_begin_at(i, at) != 0) return true;
+  }
+  return false;
+}
+
+std::int64_t StreamScheduler::withdrawal_due_us(std::int64_t free_us,
+                                                std::int64_t margin_us) const {
   std::int64_t first_us = INT64_MAX;
   for (const Tick at : to_confirm_) {
+    if (waits_for_replacement(at)) continue;
     const Tick tick = clock_.tick_at(free_us + withdrawal_us(at) + margin_us);
     const Tick left = std::max<Tick>(last_to_withdraw(at) - tick, 0);
     first_us = std::min(first_us, free_us + left * setup_.tick_ns / 1000);

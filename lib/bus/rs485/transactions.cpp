@@ -137,7 +137,10 @@ void Transactions::note_latency(std::int64_t now_us, std::int64_t expected_us) {
 }
 
 void Transactions::expire(std::int64_t now_us) {
-  if (!open_ || now_us < open_->timeout_us) return;
+  if (open_ && now_us >= open_->timeout_us) give_up(now_us);
+}
+
+void Transactions::give_up(std::int64_t now_us) {
   std::ranges::rotate(expired_, expired_.begin() + 1);
   expired_.back() = Expired{.type = open_->type, .sequence = open_->sequence};
   finish(now_us);

@@ -79,6 +79,8 @@ class Transactions {
   void receive(std::int64_t now_us, std::span<const std::uint8_t> bytes);
   // Ends the transaction whose answers are overdue.
   void expire(std::int64_t now_us);
+  // Ends it now, as if they were overdue. Precondition: open().
+  void give_up(std::int64_t now_us);
 
   bool open() const { return open_.has_value(); }
   // When the last answer should have passed, and when it is not waited for any more. Precondition:

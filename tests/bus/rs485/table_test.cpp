@@ -187,7 +187,8 @@ TEST_P(Tables, WhatOneFrameTellsBeginsAsSoonAsThatCanCome) {
     const Tick now = bus.master->tick_at(bus.now_us);
     const std::uint16_t motors = whole ? 0b1010 : 0b0010;
     const link::ToBegin begins[] = {
-        {McuIndex{0}, motors, whole ? link::Told::kTableRun : link::Told::kStates}};
+        {McuIndex{0}, motors,
+         whole ? link::StartMessages::kTableRun : link::StartMessages::kStates}};
     const Tick start = bus.master->earliest_common_start(bus.now_us, begins).at;
     EXPECT_LE(start - now, lead) << phase;
     for (std::uint8_t m = 0; m < 4; ++m) {
@@ -220,7 +221,7 @@ TEST_P(Tables, AStartThatWouldComeTooLateIsNotSent) {
 
 TEST_P(Tables, AMissedStartLeavesMoreTimeForTheNext) {
   const auto lead = [this] {
-    const link::ToBegin begins[] = {{McuIndex{0}, 1, link::Told::kTableRun}};
+    const link::ToBegin begins[] = {{McuIndex{0}, 1, link::StartMessages::kTableRun}};
     return bus.master->earliest_common_start(bus.now_us, begins).at -
            bus.master->tick_at(bus.now_us);
   };
