@@ -99,8 +99,9 @@ TEST(Moves, StopAtEveryPhaseOfAMoveLosesNoStep) {
   }
 }
 
+// What is told in few frames begins sooner than a stop can take effect.
 TEST(Moves, StopBeforeTheStartMakesNoStep) {
-  Lab lab(hall(1, 2));
+  Lab lab(hall(1, 2, "fine_ticks"));
   lab.connect();
   const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {500, 500});
   lab.wait(lab.send(Ask::kStop, {}));
