@@ -48,10 +48,10 @@ INSTANTIATE_TEST_SUITE_P(Formats, Regressions, testing::Values("fine", "coarse")
                          [](const auto& format) { return std::string(format.param); });
 
 // A stop that takes effect at the very tick of the start: the start was with the MCU already, and
-// nobody told it that there was nothing to do any more. Two streams of an MCU start 100 ms after
-// the request.
+// nobody told it that there was nothing to do any more. What is told tick by tick starts 100 ms
+// after the request.
 TEST_P(Regressions, StopAtTheTickOfTheStart) {
-  Lab lab(hall(1, 2, GetParam()));
+  Lab lab(hall(1, 2, GetParam() + std::string("_ticks")));
   lab.connect();
   std::int64_t stands = 0;
   for (double after_s = 0.060; after_s < 0.080; after_s += 0.001) {
@@ -70,7 +70,7 @@ TEST_P(Regressions, StopAtTheTickOfTheStart) {
 // A stop before the start that is lost on the way: the move has begun by the time that a second one
 // is planned, so there is something to run down from.
 TEST_P(Regressions, LostStopBeforeTheStart) {
-  Lab lab(hall(1, 2, GetParam()));
+  Lab lab(hall(1, 2, GetParam() + std::string("_ticks")));
   lab.connect();
   const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {5000, 5000});
   lab.run_for(0.060);

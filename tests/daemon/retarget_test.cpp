@@ -228,10 +228,11 @@ TEST_P(Retarget, IsPlannedAgainIfTheMcuDoesNotGetIt) {
 }
 
 // Two streams of an MCU begin together, and leave time for that.
+// What is told tick by tick starts 100 ms after the request.
 TEST_P(Retarget, BeforeTheStartIsAnotherMove) {
   for (const std::int64_t target : {900, -400, 0}) {
     for (const int later_ms : {0, 5, 40, 60}) {
-      JudgedLab lab(2, GetParam());
+      JudgedLab lab(2, GetParam() + std::string("_ticks"));
       lab->send(Ask::kMoveTo, {"m01", "m02"}, {500, 500});
       lab->run_for(later_ms * 1e-3);
       lab.expect_reached(lab->send(Ask::kMoveTo, {"m01"}, {target}), "m01", target);
