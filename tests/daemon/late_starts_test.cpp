@@ -24,7 +24,7 @@ using testing::Not;
 
 constexpr std::uint8_t kAllMcus = 0;
 
-// Of one MCU, with what would keep others from beginning without it.
+// Motion of one MCU, and what would keep others from beginning without it.
 bool carries_motion(const bushd_frame& frame, std::uint8_t address) {
   const bool motion = frame.type == BUSHD_MSG_TICKS || frame.type == BUSHD_MSG_TABLE_TICKS ||
                       frame.type == BUSHD_MSG_TABLE_RUN || frame.type == BUSHD_MSG_LINE_RUN;

@@ -70,7 +70,8 @@ class Logs(EndToEndTest):
         self.command("move", "--wait", "a0", "5")
         self.file("moves.jsonl").unlink()
         self.command("move", "--wait", "a0", "5")
-        self.assertEqual([event["event"] for event in self.logged()], ["request", "move", "result"])
+        self.assertEqual([event["event"] for event in self.moves()], ["move", "result"])
+        self.assertEqual(self.logged()[0]["event"], "request")
         self.assertIn("was removed or renamed", self.bushd.said())
 
     def test_a_full_disk_is_told_once_and_when_it_is_over(self):

@@ -54,7 +54,7 @@ class Moves(EndToEndTest):
         self.assertEqual(self.positions()["a0"], -self.positions()["b0"])
         self.assertEqual(self.bushd.end(), 0)
         self.assertEqual(self.bushsim.end(), 0)
-        self.assertEqual([event["moves"] for event in self.logged() if event["event"] == "move"], ["table"] * 4)
+        self.assertEqual([event["moves"] for event in self.moves() if event["event"] == "move"], ["table"] * 4)
         self.assert_one_result_each()
         self.assert_trace_is_right(status)
 

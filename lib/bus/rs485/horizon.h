@@ -34,7 +34,7 @@ class Horizon {
     return first_changeable(clock_.tick_at(now_us) + 1) + clock_.ticks_in(lead_us);
   }
 
-  // Of an answer, by the adapter.
+  // How long the adapter may hold an answer back.
   std::int64_t held_back_us() const { return std::min(latency_.recent_us, kMaxHeldBackUs); }
 
   // Queues are kept this full.
