@@ -3,13 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/lab.h"
+#include "daemon/lost_frames.h"
 #include "engine/frame.h"
 #include "sim/edge.h"
 
@@ -43,23 +43,6 @@ class FirstSteps final : public sim::EdgeSink {
  private:
   std::map<std::pair<std::size_t, unsigned>, sim::TimeNs> at_ns_;
 };
-
-// These bytes without the frames that are lost.
-std::vector<std::uint8_t> without(const std::vector<std::uint8_t>& bytes,
-                                  const std::function<bool(const bushd_frame&)>& lost) {
-  std::vector<std::uint8_t> through;
-  std::vector<std::uint8_t> pending;  // until its frame is complete
-  bushd_receiver receiver{};
-  bushd_frame frame;
-  for (const std::uint8_t byte : bytes) {
-    pending.push_back(byte);
-    if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
-    if (!lost(frame)) through.insert(through.end(), pending.begin(), pending.end());
-    pending.clear();
-  }
-  through.insert(through.end(), pending.begin(), pending.end());
-  return through;
-}
 
 // A byte is wrong in one frame of all that the line carries, in either direction.
 class OneFrameIsLost {

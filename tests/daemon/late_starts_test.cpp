@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/lost_frames.h"
 #include "daemon/on_line.h"
 #include "daemon/services/common_starts.h"
 #include "daemon/traced.h"
@@ -38,20 +39,8 @@ void lose_motion(Lab& lab, double seconds, std::uint8_t address) {
   const std::int64_t until_us = lab.now_us() + static_cast<std::int64_t>(seconds * 1e6);
   lab.on_send = [&lab, until_us, address](std::size_t, std::vector<std::uint8_t>& bytes) {
     if (lab.now_us() >= until_us) return true;
-    std::vector<std::uint8_t> through;
-    std::vector<std::uint8_t> pending;  // until its frame is complete
-    bushd_receiver receiver{};
-    bushd_frame frame;
-    for (const std::uint8_t byte : bytes) {
-      pending.push_back(byte);
-      if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
-      if (!carries_motion(frame, address)) {
-        through.insert(through.end(), pending.begin(), pending.end());
-      }
-      pending.clear();
-    }
-    through.insert(through.end(), pending.begin(), pending.end());
-    bytes = std::move(through);
+    bytes = without(
+        bytes, [address](const bushd_frame& frame) { return carries_motion(frame, address); });
     return true;
   };
 }

@@ -1,26 +1,29 @@
-// A line on which one MCU does not hear one kind of message: for Lab::on_send.
+// Frames that get lost on their way to MCUs.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "engine/frame.h"
 
 namespace bushd::test {
 
-// What Lab::on_send is to be: whatever the daemon sends at once gets through as a whole, or, with
-// a frame of this type (BUSHD_MSG_*) to this address in it, not at all.
-inline auto loses(std::uint8_t address, std::uint8_t type) {
-  return [address, type](std::size_t, std::vector<std::uint8_t>& bytes) {
-    bushd_receiver receiver{};
-    bushd_frame frame;
-    for (const std::uint8_t byte : bytes) {
-      if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
-      if (frame.address == address && frame.type == type) return false;
-    }
-    return true;
-  };
+// These bytes without the frames that are lost.
+inline std::vector<std::uint8_t> without(const std::vector<std::uint8_t>& bytes,
+                                         const std::function<bool(const bushd_frame&)>& lost) {
+  std::vector<std::uint8_t> through;
+  std::vector<std::uint8_t> pending;  // until its frame is complete
+  bushd_receiver receiver{};
+  bushd_frame frame;
+  for (const std::uint8_t byte : bytes) {
+    pending.push_back(byte);
+    if (bushd_receive_byte(&receiver, byte, &frame) != BUSHD_RECEIVE_FRAME) continue;
+    if (!lost(frame)) through.insert(through.end(), pending.begin(), pending.end());
+    pending.clear();
+  }
+  through.insert(through.end(), pending.begin(), pending.end());
+  return through;
 }
 
 }  // namespace bushd::test
