@@ -39,8 +39,8 @@ void lose_motion(Lab& lab, double seconds, std::uint8_t address) {
   const std::int64_t until_us = lab.now_us() + static_cast<std::int64_t>(seconds * 1e6);
   lab.on_send = [&lab, until_us, address](std::size_t, std::vector<std::uint8_t>& bytes) {
     if (lab.now_us() >= until_us) return true;
-    bytes = without(
-        bytes, [address](const bushd_frame& frame) { return carries_motion(frame, address); });
+    bytes = without(bytes,
+                    [address](const bushd_frame& frame) { return carries_motion(frame, address); });
     return true;
   };
 }
