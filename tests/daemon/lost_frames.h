@@ -1,6 +1,7 @@
 // Frames that get lost on their way to MCUs.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -24,6 +25,17 @@ inline std::vector<std::uint8_t> without(const std::vector<std::uint8_t>& bytes,
   }
   through.insert(through.end(), pending.begin(), pending.end());
   return through;
+}
+
+// What Lab::on_send is to be: whatever the daemon sends at once gets through as a whole, or, with
+// a frame of this type (BUSHD_MSG_*) to this address in it, not at all.
+inline auto loses(std::uint8_t address, std::uint8_t type) {
+  return [address, type](std::size_t, std::vector<std::uint8_t>& bytes) {
+    const auto lost = [&](const bushd_frame& frame) {
+      return frame.address == address && frame.type == type;
+    };
+    return without(bytes, lost).size() == bytes.size();
+  };
 }
 
 }  // namespace bushd::test
