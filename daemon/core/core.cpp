@@ -214,7 +214,7 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::Configure& r) { settings_.request(asker, r); },
                  [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
                  [&](const api::MovePath& r) { lines_.request(asker, r); },
-                 [&](const api::Camac& r) { camac_.request(now, asker, r); },
+                 [&](const api::Camac& r) { camac_.request(asker, r); },
                  [&](const api::Follow& r) { trajectories_.request(now, asker, r); },
                  [&](const api::ArmLine& r) {
                    if (!r.while_connected || while_connected_.take(asker)) lines_.request(asker, r);

@@ -82,10 +82,8 @@ class Camac::Bushd1Station final : public Station {
 class Camac::Bushd2Station final : public Station {
  public:
   template <class... Args>
-  Bushd2Station(std::string place, int f_start_hz, Args&&... args)
-      : Station(std::move(place)),
-        motors_(std::forward<Args>(args)...),
-        module_({.f_start_hz = f_start_hz}, motors_) {}
+  explicit Bushd2Station(std::string place, Args&&... args)
+      : Station(std::move(place)), motors_(std::forward<Args>(args)...), module_(motors_) {}
   camac::MotionModule& module() override { return module_; }
   // Who does not answer is told by the core: his move ends.
   void step(std::int64_t now_us) override { motors_.step(now_us, module_); }
@@ -112,9 +110,9 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
                                                   installation, interlocks, open_moves.precedence(),
                                                   turn_, tables, travels, outputs, ask);
       } else {
-        station = std::make_unique<Bushd2Station>(kept_as, module.f_start_hz, name, module,
-                                                  installation, interlocks, open_moves.precedence(),
-                                                  turn_, tables, lines, outputs, ask);
+        station = std::make_unique<Bushd2Station>(kept_as, name, module, installation, interlocks,
+                                                  open_moves.precedence(), turn_, tables, lines,
+                                                  outputs, ask);
       }
       crate.crate.insert(module.station, station->module());
       crate.stations.push_back(std::move(station));
@@ -125,7 +123,7 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
 
 Camac::~Camac() = default;
 
-void Camac::request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request) {
+void Camac::request(const api::Asker& asker, const api::Camac& request) {
   const auto crate = std::ranges::find(crates_, request.crate, &Crate::number);
   if (crate == crates_.end()) {
     return asker.answer(api::Refused{"there is no crate " + std::to_string(request.crate) +
@@ -136,7 +134,7 @@ void Camac::request(std::int64_t now_us, const api::Asker& asker, const api::Cam
   }
   asker.answer(api::Accepted{});
   turn_.after_stops = asker.after_stops;
-  api::CamacResult result{.block = camac::transfer(now_us, crate->crate, request.block)};
+  api::CamacResult result{.block = camac::transfer(crate->crate, request.block)};
   result.requests = crate->crate.requests();
   crate->told &= result.requests;  // what is raised again before the next step is told again
   for (const auto& station : crate->stations) station->end_overtaken();

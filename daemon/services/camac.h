@@ -28,7 +28,7 @@ class Camac final : public Service {
         Outputs& outputs, const AskCore& ask);
   ~Camac() override;
 
-  void request(std::int64_t now_us, const api::Asker& asker, const api::Camac& request);
+  void request(const api::Asker& asker, const api::Camac& request);
   // The store is in use: memories are as they were kept.
   void take_kept();
 

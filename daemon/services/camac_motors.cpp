@@ -174,7 +174,7 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
 }
 
 // All but the last one, which comes with the result.
-void CamacMotors::tell_steps(std::int64_t now_us, Bushd2& module) {
+void CamacMotors::tell_steps(Bushd2& module) {
   const std::int64_t moved = installation_[motion_->motor].position_steps() - motion_->from_steps;
   const std::int64_t last = motion_->program.steps - 1;
   const auto made = static_cast<std::uint32_t>(
@@ -182,7 +182,7 @@ void CamacMotors::tell_steps(std::int64_t now_us, Bushd2& module) {
                                std::max<std::int64_t>(last, motion_->told)));
   const std::uint32_t more = made - motion_->told;
   motion_->told = made;
-  if (more > 0) module.answer(now_us, more, {});
+  if (more > 0) module.answer(more, {});
 }
 
 void CamacMotors::follow_move(std::int64_t now_us, Bushd2& module) {
@@ -191,17 +191,17 @@ void CamacMotors::follow_move(std::int64_t now_us, Bushd2& module) {
     ask_(now_us, {.session = stops_, .number = stops_->next_number()},
          api::Stop{{installation_[motion_->motor].name()}});
   }
-  tell_steps(now_us, module);
-  if (const auto reply = session_->last_answer()) end(now_us, module, *reply);
+  tell_steps(module);
+  if (const auto reply = session_->last_answer()) end(module, *reply);
 }
 
-void CamacMotors::end(std::int64_t now_us, Bushd2& module, const api::Reply& reply) {
+void CamacMotors::end(Bushd2& module, const api::Reply& reply) {
   const Motion ended = std::move(*motion_);
   motion_.reset();
   const auto outcome = outcome_of(reply);
   MotorStatus status = limits_of(installation_, ended.motor);
   if (outcome == api::Outcome::kReached) {
-    return module.answer(now_us, ended.program.steps - ended.told, status);
+    return module.answer(ended.program.steps - ended.told, status);
   }
   if (outcome != api::Outcome::kStopped || !ended.stopping) {
     warn(ended.motor, api::reason_of(reply));

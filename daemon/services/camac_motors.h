@@ -82,8 +82,8 @@ class CamacMotors final : public camac::Motors {
   void follow_table(std::int64_t now_us, camac::Bushd2& module);
   void move(std::int64_t now_us, camac::Bushd2& module, const tables::TablePtr& by);
   void follow_move(std::int64_t now_us, camac::Bushd2& module);
-  void tell_steps(std::int64_t now_us, camac::Bushd2& module);
-  void end(std::int64_t now_us, camac::Bushd2& module, const api::Reply& reply);
+  void tell_steps(camac::Bushd2& module);
+  void end(camac::Bushd2& module, const api::Reply& reply);
   void warn(MotorId motor, const std::string& why);
 
   const std::string name_;

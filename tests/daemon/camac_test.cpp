@@ -90,6 +90,34 @@ TEST(CamacMotion, StepsAreWhereTheReportPutsThem) {
   }
 }
 
+// Code 250 is F_start and code 10 is 25 F_start, which are at most 10 % apart from the next code.
+TEST(CamacMotion, FrequenciesGoFromStartTo25Times) {
+  constexpr double kSlotNs = 20'000;
+  for (const int start_hz : {1, 40, 100}) {
+    SCOPED_TRACE(start_hz);
+    std::string toml = lab_with("fine_table");
+    const std::string set = "f_start_hz = 100";
+    toml.replace(toml.find(set), set.size(), "f_start_hz = " + std::to_string(start_hz));
+    StepTimes edges;
+    CamacLab lab(toml, &edges);
+    lab.load(0, 4, {250, 11, 10});
+    lab.permit(kEnabled);
+    ASSERT_TRUE(lab.wait_for_lam());
+    lab.naf(kStation, 0, 10);
+    lab.load(0, 5, {250, 11, 10});
+    lab.permit(kEnabled);
+    ASSERT_TRUE(lab.wait_for_lam());
+    ASSERT_EQ(edges.times_ns.size(), 9u);
+    const auto delay_ns = [&](std::size_t step) {
+      return static_cast<double>(edges.times_ns[step] - edges.times_ns[step - 1]);
+    };
+    // An edge is in the slot of its time, so a delay is off by less than one.
+    EXPECT_NEAR(delay_ns(3), 1e9 / start_hz, kSlotNs) << "code 250";
+    EXPECT_NEAR(delay_ns(6), 1e9 / (25.0 * start_hz), kSlotNs) << "code 10";
+    EXPECT_NEAR(delay_ns(5), 1.1e9 / (25.0 * start_hz), kSlotNs) << "code 11, a tenth slower";
+  }
+}
+
 TEST(CamacMotion, ForbidRampsDownWithoutARequest) {
   CamacLab lab;
   lab.load(0, 60'000, falling_codes());

@@ -96,14 +96,13 @@ class Rig {
     BUSHD_REQUIRE(bushd1_.is_moving() == world_.shutter_moves);
     const std::uint32_t requests = crate_.requests();
     BUSHD_REQUIRE((requests & ~(1U << (kStation2 - 1) | 1U << (kStation1 - 1))) == 0);
-    BUSHD_REQUIRE(crate_.cycle(now_us_, kController, {}).data == requests);
+    BUSHD_REQUIRE(crate_.cycle(kController, {}).data == requests);
   }
 
  private:
   void cycle(int station, int a, int f, std::uint32_t data) {
     const bool lam = station <= camac::kStations && (crate_.requests() >> (station - 1) & 1) != 0;
-    const Response response =
-        crate_.cycle(now_us_, station, {.subaddress = a, .function = f, .data = data});
+    const Response response = crate_.cycle(station, {.subaddress = a, .function = f, .data = data});
     BUSHD_REQUIRE(response.x || (!response.q && response.data == 0));
     BUSHD_REQUIRE(response.data <= 1023 || station == kController);
     BUSHD_REQUIRE(camac::reads(f) || response.data == 0);
@@ -117,7 +116,7 @@ class Rig {
       world_.steps -= std::min(steps, world_.steps);
       world_.moves = world_.steps > 0 && !status.bars(world_.left);
     }
-    bushd2_.answer(now_us_, steps, status);
+    bushd2_.answer(steps, status);
   }
   void follow_shutter(unsigned which, std::uint16_t number) {
     switch (which % 8) {
@@ -149,14 +148,12 @@ class Rig {
         bushd2_.ends(status_of(number));
         break;
       default:
-        now_us_ += number * 16;
-        bushd2_.watch(now_us_);
+        break;
     }
   }
 
-  std::int64_t now_us_ = 0;
   World world_;
-  camac::Bushd2 bushd2_{{}, world_};
+  camac::Bushd2 bushd2_{world_};
   camac::Bushd1 bushd1_{world_};
   camac::Crate crate_;
 };

@@ -10,6 +10,6 @@
 namespace bushd::camac {
 
 // An answer X = 0 ends all but kSingle and kScan, which has to pass empty stations.
-BlockResult transfer(std::int64_t now_us, Crate& crate, const Block& block);
+BlockResult transfer(Crate& crate, const Block& block);
 
 }  // namespace bushd::camac

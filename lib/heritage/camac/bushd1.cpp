@@ -44,7 +44,7 @@ void Bushd1::address_overflows() {
   raise(kOverflow);
 }
 
-void Bushd1::start(std::int64_t) {
+void Bushd1::start() {
   if (is_moving()) return;
   const bool left = is_enabled(kDirection);
   is_enabled(kAutomatic) ? start_travel(left) : start_step(left);

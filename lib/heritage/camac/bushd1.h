@@ -70,7 +70,7 @@ class Bushd1 final : public MotionModule {
   void clear_lam() override { requests_ = 0; }
   void clear_requests() override { requests_ = 0; }
   void address_overflows() override;
-  void start(std::int64_t now_us) override;
+  void start() override;
   void stop() override;
 
   void start_step(bool left);

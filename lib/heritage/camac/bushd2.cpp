@@ -62,7 +62,7 @@ Program Bushd2::program() const {
   return program;
 }
 
-void Bushd2::start(std::int64_t now_us) {
+void Bushd2::start() {
   if (is_moving()) return;
   Exchange exchange{.program = program()};
   status_ = 0;
@@ -78,7 +78,6 @@ void Bushd2::start(std::int64_t now_us) {
   } else if (!motors_.move(exchange.program)) {
     fault_ = true;
   } else {
-    exchange.deadline_us = next_deadline_us(now_us, exchange);
     exchange_ = std::move(exchange);
   }
 }
@@ -98,7 +97,7 @@ void Bushd2::receive(std::uint32_t messages, const MotorStatus& status, bool ste
   received_ = (received_ + messages) & kReceivedMask;
 }
 
-void Bushd2::answer(std::int64_t now_us, std::uint32_t steps, const MotorStatus& status) {
+void Bushd2::answer(std::uint32_t steps, const MotorStatus& status) {
   if (!exchange_) return;
   Exchange& exchange = *exchange_;
   const std::uint32_t made = std::min(steps, exchange.program.steps - exchange.answered);
@@ -109,9 +108,7 @@ void Bushd2::answer(std::int64_t now_us, std::uint32_t steps, const MotorStatus&
     ended_ |= all && !exchange.stopping;
     fault_ |= !all;
     exchange_.reset();
-    return;
   }
-  exchange.deadline_us = next_deadline_us(now_us, exchange);
 }
 
 void Bushd2::ends(const MotorStatus& status) {
@@ -119,23 +116,6 @@ void Bushd2::ends(const MotorStatus& status) {
   if (status.any()) receive(1, status, false);
   fault_ |= !exchange_->stopping || status.bars(exchange_->program.left);
   exchange_.reset();
-}
-
-std::int64_t Bushd2::next_deadline_us(std::int64_t now_us, const Exchange& exchange) const {
-  const std::int64_t code = code_of_step(exchange.program, exchange.answered);
-  const std::int64_t delay_us = code * 1'000'000 / (kCodesPerStartPeriod * setup_.f_start_hz);
-  return now_us + 2 * delay_us + setup_.answer_us;
-}
-
-std::int64_t Bushd2::deadline_us() const {
-  return exchange_ && !exchange_->stopping ? exchange_->deadline_us : kNever;
-}
-
-void Bushd2::watch(std::int64_t now_us) {
-  if (now_us < deadline_us()) return;
-  status_ = kNotConnected;
-  fault_ = true;
-  stop();
 }
 
 }  // namespace bushd::camac

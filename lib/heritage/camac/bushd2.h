@@ -14,7 +14,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 
 #include "heritage/camac/motion_module.h"
@@ -31,27 +30,17 @@ class Bushd2 final : public MotionModule {
   static constexpr int kMotors = 32;
   static constexpr int kMotorsPerPage = 8;
   static constexpr std::int64_t kCodesPerStartPeriod = 250;  // 250 of them last 1 / F_start
-  static constexpr std::int64_t kAnswerUs = 100'000;
-  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 
-  struct Setup {
-    int f_start_hz = 40;                 // 1..100
-    std::int64_t answer_us = kAnswerUs;  // for an answer, beyond twice its delay
-  };
   // `motors` outlive the module.
-  Bushd2(Setup setup, Motors& motors)
-      : MotionModule(kMemoryBytes), setup_(setup), motors_(motors) {}
+  explicit Bushd2(Motors& motors) : MotionModule(kMemoryBytes), motors_(motors) {}
 
   bool lam() const override;
 
   // The motor that moves has told its status after each of so many more steps; 0: without a step.
   // What comes while none moves is ignored, here and below.
-  void answer(std::int64_t now_us, std::uint32_t steps, const MotorStatus& status);
+  void answer(std::uint32_t steps, const MotorStatus& status);
   // It stands although not all steps are made, because it was stopped or for what its status says.
   void ends(const MotorStatus& status);
-  // The motor does not answer: to be called at this time, kNever if none is awaited.
-  std::int64_t deadline_us() const;
-  void watch(std::int64_t now_us);
 
   bool is_moving() const { return exchange_.has_value(); }
 
@@ -60,7 +49,6 @@ class Bushd2 final : public MotionModule {
   struct Exchange {
     Program program;
     std::uint32_t answered = 0;
-    std::int64_t deadline_us = 0;
     bool stopping = false;
   };
 
@@ -68,14 +56,12 @@ class Bushd2 final : public MotionModule {
   void clear_lam() override;
   void clear_requests() override;
   void address_overflows() override { overflow_ = true; }
-  void start(std::int64_t now_us) override;
+  void start() override;
   void stop() override;
 
   Program program() const;
   void receive(std::uint32_t messages, const MotorStatus& status, bool step_done);
-  std::int64_t next_deadline_us(std::int64_t now_us, const Exchange& exchange) const;
 
-  const Setup setup_;
   Motors& motors_;
   std::uint8_t status_ = 0;
   std::uint32_t received_ = 0;

@@ -43,13 +43,13 @@ const Module* Crate::at(int station) const {
   return is_station(station) ? modules_[static_cast<std::size_t>(station - 1)] : nullptr;
 }
 
-Response Crate::cycle(std::int64_t now_us, int station, const Command& command) {
+Response Crate::cycle(int station, const Command& command) {
   if (!is_station(station)) return controller_cycle(station, command);
   Module* module = modules_[static_cast<std::size_t>(station - 1)];
   if (module == nullptr) return {};
   Command seen = command;
   seen.data = writes(command.function) ? command.data & kDataMask : 0;
-  return module->cycle(now_us, seen);
+  return module->cycle(seen);
 }
 
 Response Crate::controller_cycle(int station, const Command& command) {

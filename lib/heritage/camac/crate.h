@@ -25,7 +25,7 @@ class Crate {
   const Module* at(int station) const;
 
   // Any station, subaddress and function; more than 24 bits of data are ignored.
-  Response cycle(std::int64_t now_us, int station, const Command& command);
+  Response cycle(int station, const Command& command);
 
   void initialise();
   void clear();

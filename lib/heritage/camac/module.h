@@ -23,7 +23,7 @@ class Module {
   virtual ~Module() = default;
 
   // The module is addressed.
-  virtual Response cycle(std::int64_t now_us, const Command& command) = 0;
+  virtual Response cycle(const Command& command) = 0;
   // The common controls of the dataway: Z, C, and the level I.
   virtual void initialise() = 0;
   virtual void clear() = 0;

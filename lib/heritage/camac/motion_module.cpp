@@ -9,11 +9,11 @@ enum Register { kMemory, kAddress, kControl, kRequests };
 
 }  // namespace
 
-Response MotionModule::cycle(std::int64_t now_us, const Command& command) {
+Response MotionModule::cycle(const Command& command) {
   if (command.function == kRead) return read(command.subaddress);
   if (command.function == kWrite) return write(command.subaddress, command.data);
   if (command.subaddress != 0) return {};
-  return control_cycle(now_us, command.function);
+  return control_cycle(command.function);
 }
 
 Response MotionModule::read(int register_number) {
@@ -53,7 +53,7 @@ Response MotionModule::write(int register_number, std::uint32_t data) {
   }
 }
 
-Response MotionModule::control_cycle(std::int64_t now_us, int function) {
+Response MotionModule::control_cycle(int function) {
   switch (function) {
     case kTestLam:
       return {.x = true, .q = lam()};
@@ -64,7 +64,7 @@ Response MotionModule::control_cycle(std::int64_t now_us, int function) {
       stop();
       break;
     case kPermit:
-      if (!inhibited_) start(now_us);
+      if (!inhibited_) start();
       break;
     default:
       return {};

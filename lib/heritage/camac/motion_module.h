@@ -22,7 +22,7 @@ namespace bushd::camac {
 
 class MotionModule : public Module {
  public:
-  Response cycle(std::int64_t now_us, const Command& command) final;
+  Response cycle(const Command& command) final;
   void initialise() final;
   void clear() final { clear_requests(); }
   void set_inhibit(bool inhibited) final { inhibited_ = inhibited; }
@@ -45,12 +45,12 @@ class MotionModule : public Module {
   virtual void clear_lam() = 0;       // F10A0
   virtual void clear_requests() = 0;  // Z, C
   virtual void address_overflows() = 0;
-  virtual void start(std::int64_t now_us) = 0;  // F26A0; without effect while it moves
-  virtual void stop() = 0;                      // F24A0, Z
+  virtual void start() = 0;  // F26A0; without effect while it moves
+  virtual void stop() = 0;   // F24A0, Z
 
   Response read(int register_number);
   Response write(int register_number, std::uint32_t data);
-  Response control_cycle(std::int64_t now_us, int function);
+  Response control_cycle(int function);
   void next_address();
 
   CountingMemory memory_;

@@ -61,7 +61,7 @@ class Commands {
   static constexpr int kStation = 5;
 
   Response cycle(int a, int f, std::uint32_t data = 0) {
-    return crate.cycle(now_us, kStation, {.subaddress = a, .function = f, .data = data});
+    return crate.cycle(kStation, {.subaddress = a, .function = f, .data = data});
   }
   Response read() { return cycle(0, 0); }
   std::uint32_t address() { return cycle(1, 0).data; }
@@ -80,7 +80,6 @@ class Commands {
   }
 
   Crate crate;
-  std::int64_t now_us = 0;
 };
 
 }  // namespace bushd::camac

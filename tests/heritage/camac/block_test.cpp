@@ -14,7 +14,7 @@ class Scripted final : public Module {
  public:
   explicit Scripted(std::function<Response(int, const Command&)> answer)
       : answer_(std::move(answer)) {}
-  Response cycle(std::int64_t, const Command& command) override {
+  Response cycle(const Command& command) override {
     written.push_back(command.data);
     return answer_(cycles++, command);
   }
@@ -39,7 +39,7 @@ TEST(Block, SingleMakesEachCycleWhateverItAnswers) {
   Scripted module([](int i, const Command&) { return i == 0 ? Response{} : with_q(7); });
   Crate crate;
   crate.insert(3, module);
-  const BlockResult result = transfer(0, crate, {.cycles = {{3, 0, 0}, {4, 0, 0}, {3, 1, 0}}});
+  const BlockResult result = transfer(crate, {.cycles = {{3, 0, 0}, {4, 0, 0}, {3, 1, 0}}});
   EXPECT_EQ(result.tally, 3U);
   EXPECT_EQ(result.responses, (std::vector<Response>{{}, {}, with_q(7)}));
 }
@@ -49,7 +49,7 @@ TEST(Block, QStopEndsWithAWordThatIsNone) {
   Crate crate;
   crate.insert(3, module);
   const BlockResult result =
-      transfer(0, crate, {.mode = BlockMode::kQStop, .cycles = {{3, 0, 0}}, .count = 10});
+      transfer(crate, {.mode = BlockMode::kQStop, .cycles = {{3, 0, 0}}, .count = 10});
   EXPECT_EQ(result.tally, 3U);
   EXPECT_EQ(module.cycles, 4);
   EXPECT_EQ(result.responses.back(), kNoQ);
@@ -58,14 +58,14 @@ TEST(Block, QStopEndsWithAWordThatIsNone) {
 // As U4 reads it: a transfer of exactly the memory's length moves every byte.
 TEST(Block, QStopReadsAWholeMemory) {
   MotorsBench motors;
-  Bushd2 module({}, motors);
+  Bushd2 module(motors);
   Crate crate;
   crate.insert(5, module);
-  crate.cycle(0, 5, {.subaddress = 2, .function = 16, .data = 0x10});
+  crate.cycle(5, {.subaddress = 2, .function = 16, .data = 0x10});
   Block block{.mode = BlockMode::kQStop};
   for (std::uint32_t i = 0; i < 2000; ++i) block.cycles.push_back({5, 0, 16, i & 0xFF});
   block.count = 2000;
-  EXPECT_EQ(transfer(0, crate, block).tally, 1024U);
+  EXPECT_EQ(transfer(crate, block).tally, 1024U);
 }
 
 TEST(Block, RepeatWaitsForQButNotForEver) {
@@ -74,17 +74,17 @@ TEST(Block, RepeatWaitsForQButNotForEver) {
   crate.insert(3, module);
   const Block block{
       .mode = BlockMode::kRepeat, .cycles = {{3, 0, 16, 8}, {3, 0, 16, 9}}, .count = 2};
-  EXPECT_EQ(transfer(0, crate, block).tally, 2U);
+  EXPECT_EQ(transfer(crate, block).tally, 2U);
   EXPECT_EQ(module.written, (std::vector<std::uint32_t>{8, 8, 8, 8, 8, 9, 9, 9, 9, 9}));
 
   Scripted never([](int, const Command&) { return kNoQ; });
   crate.insert(4, never);
   const BlockResult result =
-      transfer(0, crate, {.mode = BlockMode::kRepeat, .cycles = {{4, 0, 0}}, .count = 5});
+      transfer(crate, {.mode = BlockMode::kRepeat, .cycles = {{4, 0, 0}}, .count = 5});
   EXPECT_EQ(result.tally, 0U);
   EXPECT_EQ(never.cycles, Block::kMostTries);
   const BlockResult empty =
-      transfer(0, crate, {.mode = BlockMode::kRepeat, .cycles = {{9, 0, 0}}, .count = 5});
+      transfer(crate, {.mode = BlockMode::kRepeat, .cycles = {{9, 0, 0}}, .count = 5});
   EXPECT_EQ(empty.responses, std::vector<Response>{{}}) << "X = 0 ends it at once";
 }
 
@@ -97,15 +97,15 @@ TEST(Block, ScanGoesFromSubaddressToStation) {
   crate.insert(3, three);
   crate.insert(5, five);
   Block block{.mode = BlockMode::kScan, .cycles = {{3, 1, 0}}, .count = 100};
-  EXPECT_EQ(transfer(0, crate, block).tally, 2U + 16U);
+  EXPECT_EQ(transfer(crate, block).tally, 2U + 16U);
   EXPECT_EQ(three.cycles, 3);
   block.last_station = 5;
   block.last_subaddress = 1;
-  const BlockResult part = transfer(0, crate, block);
+  const BlockResult part = transfer(crate, block);
   EXPECT_EQ(part.tally, 4U);
   EXPECT_EQ(part.responses.back(), with_q(501));
   block.count = 3;
-  EXPECT_EQ(transfer(0, crate, block).tally, 3U);
+  EXPECT_EQ(transfer(crate, block).tally, 3U);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ constexpr int kTest = 27;
 
 class Probe final : public Module {
  public:
-  Response cycle(std::int64_t, const Command& command) override {
+  Response cycle(const Command& command) override {
     seen = command;
     return {.x = true, .q = true, .data = 0x123456};
   }
@@ -36,7 +36,7 @@ class CrateBench : public ::testing::Test {
     crate.insert(23, last);
   }
   Response cycle(int n, int a, int f, std::uint32_t data = 0) {
-    return crate.cycle(0, n, {.subaddress = a, .function = f, .data = data});
+    return crate.cycle(n, {.subaddress = a, .function = f, .data = data});
   }
 
   Probe first;
@@ -66,15 +66,15 @@ TEST_F(CrateBench, EmptyStationsAnswerNothing) {
 TEST(Crate, TakesModulesSideBySide) {
   MotorsBench motors;
   ShutterBench shutter;
-  Bushd2 two({}, motors);
+  Bushd2 two(motors);
   Bushd1 one(shutter);
   Crate crate;
   crate.insert(5, two);
   crate.insert(6, one);
-  crate.cycle(0, 5, {.subaddress = 1, .function = 16, .data = 1000});
-  crate.cycle(0, 6, {.subaddress = 1, .function = 16, .data = 7});
-  EXPECT_EQ(crate.cycle(0, 5, {.subaddress = 1}).data, 1000U);
-  EXPECT_EQ(crate.cycle(0, 6, {.subaddress = 1}).data, 7U);
+  crate.cycle(5, {.subaddress = 1, .function = 16, .data = 1000});
+  crate.cycle(6, {.subaddress = 1, .function = 16, .data = 7});
+  EXPECT_EQ(crate.cycle(5, {.subaddress = 1}).data, 1000U);
+  EXPECT_EQ(crate.cycle(6, {.subaddress = 1}).data, 7U);
 }
 
 TEST_F(CrateBench, CommonControls) {

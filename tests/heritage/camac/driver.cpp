@@ -82,8 +82,7 @@ class Driver {
       const auto a = static_cast<int>(next());
       const auto f = static_cast<int>(next());
       const auto data = static_cast<std::uint32_t>(next());
-      const Response response =
-          crate_.cycle(now_us_, n, {.subaddress = a, .function = f, .data = data});
+      const Response response = crate_.cycle(n, {.subaddress = a, .function = f, .data = data});
       out << response.x << ' ' << response.q << ' ' << response.data;
     } else {
       follow(what, next);
@@ -103,12 +102,9 @@ class Driver {
       wanted_.accepts = next() != 0;
     } else if (what == "answer") {
       const auto steps = static_cast<std::uint32_t>(next());
-      bushd2_.answer(now_us_, steps, status_of(static_cast<unsigned>(next())));
+      bushd2_.answer(steps, status_of(static_cast<unsigned>(next())));
     } else if (what == "ends") {
       bushd2_.ends(status_of(static_cast<unsigned>(next())));
-    } else if (what == "time") {
-      now_us_ += next();
-      bushd2_.watch(now_us_);
     } else if (what == "limits") {
       const bool right = next() != 0;
       bushd1_.limits(right, next() != 0);
@@ -123,9 +119,8 @@ class Driver {
     }
   }
 
-  std::int64_t now_us_ = 0;
   Wanted wanted_;
-  Bushd2 bushd2_{{.f_start_hz = 40}, wanted_};
+  Bushd2 bushd2_{wanted_};
   Bushd1 bushd1_{wanted_};
   Crate crate_;
 };

@@ -35,7 +35,7 @@ class Station:
         self.control = set()
         self.inhibit = False
 
-    def cycle(self, now_us, a, f, data):
+    def cycle(self, a, f, data):
         """(X, Q, R)"""
         quiet = not self.lam()
         commands = {
@@ -49,7 +49,7 @@ class Station:
             (16, 1): lambda: (True, self.point_to(data)),
             (16, 2): lambda: (True, self.set_control(data)),
             (24, 0): lambda: (False, self.forbid()),
-            (26, 0): lambda: (False, None if self.inhibit else self.permit(now_us)),
+            (26, 0): lambda: (False, None if self.inhibit else self.permit()),
         }
         if (f, a) not in commands:
             return 0, 0, 0
@@ -88,7 +88,6 @@ class Station:
 
 class Bushd2(Station):
     size = 1024
-    f_start = 40
 
     def __init__(self, asked, motors):
         super().__init__(asked, motors)
@@ -121,7 +120,7 @@ class Bushd2(Station):
     def stops(status, direction):
         return bool(status & {3, 4, 1 if direction == RIGHT else 2})
 
-    def permit(self, now_us):
+    def permit(self):
         if self.motion:
             return
         self.status, self.received = set(), 0
@@ -143,20 +142,13 @@ class Bushd2(Station):
             self.flags.add("fault")
             return
         self.motion = {"number": number, "direction": direction, "left": steps, "made": 0, "codes": codes, "stopped": False}
-        self.await_answer(now_us)
-
-    def await_answer(self, now_us):
-        motion = self.motion
-        code = motion["codes"][min(motion["made"], motion["left"] - 1, 237)]
-        # 250 codes are 1 / F_start; twice the delay and 100 ms.
-        motion["until"] = now_us + 2 * (code * 1_000_000 // (250 * self.f_start)) + 100_000
 
     def forbid(self):
         if self.motion and not self.motion["stopped"]:
             self.motion["stopped"] = True
             self.asked.append(f"stop {self.motion['number']}")
 
-    def answer(self, now_us, steps, status):
+    def answer(self, steps, status):
         motion = self.motion
         if not motion:
             return
@@ -172,8 +164,6 @@ class Bushd2(Station):
         elif self.stops(status, motion["direction"]):
             self.flags.add("fault")
             self.motion = None
-        else:
-            self.await_answer(now_us)
 
     def ends(self, status):
         motion = self.motion
@@ -185,12 +175,6 @@ class Bushd2(Station):
         if not motion["stopped"] or self.stops(status, motion["direction"]):
             self.flags.add("fault")
         self.motion = None
-
-    def watch(self, now_us):
-        if self.motion and not self.motion["stopped"] and now_us >= self.motion["until"]:
-            self.status = {4}
-            self.flags.add("fault")
-            self.forbid()
 
 
 class Bushd1(Station):
@@ -222,7 +206,7 @@ class Bushd1(Station):
     def delay(word):
         return min(max(word, 1), 30000)
 
-    def permit(self, _):
+    def permit(self):
         if self.motion:
             return
         direction = LEFT if 4 in self.control else RIGHT
@@ -324,7 +308,6 @@ class Laboratory:
         self.motors = {"accepts": True, "statuses": {}}
         self.two = Bushd2(self.asked, self.motors)
         self.one = Bushd1(self.asked, self.motors)
-        self.now_us = 0
         self.inhibit = False
         self.demand = False
 
@@ -333,7 +316,7 @@ class Laboratory:
 
     def cycle(self, n, a, f, data):
         if n in self.stations:
-            return getattr(self, self.stations[n]).cycle(self.now_us, a, f, data % 2**24)
+            return getattr(self, self.stations[n]).cycle(a, f, data % 2**24)
         if (n, a, f) == (28, 8, 26):
             self.two.initialise()
             self.one.initialise()
@@ -368,12 +351,9 @@ class Laboratory:
         elif what == "accept":
             self.motors["accepts"] = bool(numbers[0])
         elif what == "answer":
-            self.two.answer(self.now_us, numbers[0], bits_of(numbers[1]))
+            self.two.answer(numbers[0], bits_of(numbers[1]))
         elif what == "ends":
             self.two.ends(bits_of(numbers[0]))
-        elif what == "time":
-            self.now_us += numbers[0]
-            self.two.watch(self.now_us)
         else:
             getattr(self.one, what)(*numbers)
         line = " ".join([answer, str(self.graded()), *self.asked])

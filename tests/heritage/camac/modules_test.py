@@ -52,11 +52,11 @@ def program(random_, station):
 
 
 def event(random_):
-    what = weighted(random_, [("answer", 8), ("ends", 1), ("time", 3), ("status", 1), ("accept", 1), ("limits", 5), ("step_done", 2),
+    what = weighted(random_, [("answer", 8), ("ends", 1), ("status", 1), ("accept", 1), ("limits", 5), ("step_done", 2),
                               ("step_not_done", 1), ("run_step_done", 10), ("run_ends", 4), ("stands", 1)])
     bits = weighted(random_, [(0, 20), (1, 1), (2, 1), (4, 1), (8, 1), (random_.randrange(16), 1)])
     arguments = {"answer": [random_.choice([0, 1, 1, 1, 2, 5, 100, 70000]), bits], "ends": [bits],
-                 "time": [random_.choice([1, 1000, 50_000, 100_200, 151_000])], "status": [random_.randrange(32), bits],
+                 "status": [random_.randrange(32), bits],
                  "accept": [int(random_.random() < 0.9)], "limits": random_.choice([[0, 0], [0, 0], [1, 0], [0, 1], [1, 1]])}
     return " ".join(str(word) for word in [what, *arguments.get(what, [])])
 

@@ -31,7 +31,7 @@ class EsoneTest : public ::testing::Test, public Port {
     const std::lock_guard lock(mutex_);
     ++runs_;
     if (crate != 1) return tl::unexpected<Failure>(Failure{kNoCrate, "there is no crate"});
-    const auto result = camac::transfer(now_ms_ * 1000, crate_, block);
+    const auto result = camac::transfer(crate_, block);
     return api::CamacResult{.block = result, .requests = crate_.requests()};
   }
   std::int64_t now_ms() override {
@@ -41,7 +41,7 @@ class EsoneTest : public ::testing::Test, public Port {
   void pause_ms(std::int64_t length_ms) override {
     const std::lock_guard lock(mutex_);
     now_ms_ += length_ms;
-    module_.answer(now_ms_ * 1000, 1, {});
+    module_.answer(1, {});
   }
   static int e(int k) { return k / 4; }
   static std::int32_t ext(int n, int a, int c = 1) {
@@ -69,7 +69,7 @@ class EsoneTest : public ::testing::Test, public Port {
   std::int64_t now_ms_ = 0;
   int runs_ = 0;
   camac::MotorsBench motors_;
-  camac::Bushd2 module_{{}, motors_};
+  camac::Bushd2 module_{motors_};
   camac::Crate crate_;
 };
 
