@@ -8,9 +8,13 @@
 //
 // so its step j falls at s = (j - 1/2) / r(i) + 1/2, that of the longest motor at s = j, and all
 // are within half a step of the line's point at s - 1/2. The reversed line makes the same steps in
-// the opposite order. The order of steps is that of V. M. Ivanov's evaluation function (2023), ties
-// aside, in all quadrants; it begins at half the difference of the increments here, so that the
-// path lies around the line and not on one side of it. A step takes no product and no division.
+// the opposite order. A step takes no product and no division.
+//
+// The idea is that of V. M. Ivanov's evaluation function (2023), the rule is another one. His
+// begins each frame at F = 0, makes a step of one coordinate in each interrupt, and has no leading
+// coordinate, so that its speed is that of single steps along the way and its path lies on one side
+// of the line. Begun at the difference of the increments, it would give this order of steps, ties
+// aside.
 //
 // Between two steps of the run the same rule holds for a broken s, as displacements in 1/256 step
 // need it. Before its first step a motor's position rises twice as fast from 0 as the rule says

@@ -145,11 +145,11 @@ TEST(Line, CrossesAtTheLeastFractionThatItTells) {
 
 // V. M. Ivanov's evaluation function of two coordinates, doubled: 2 F = 2 (a_k b - b_k a) with a_k,
 // b_k the increments of the frame and a, b what is made of them. F > 0: a step along alpha. F < 0:
-// a step along beta. It begins at a_k - b_k, by which both begin half a step behind, so that the
-// path lies around the line and not on one side of it.
-class Ivanov {
+// a step along beta. He begins at F = 0. Here it begins at a_k - b_k, by which both begin half a
+// step behind, so that the path lies around the line and not on one side of it.
+class CentredEvaluation {
  public:
-  Ivanov(int64_t alpha, int64_t beta)
+  CentredEvaluation(int64_t alpha, int64_t beta)
       : increments_{alpha, beta}, value_(std::abs(alpha) - std::abs(beta)) {}
 
   // Whose step is next: of alpha, of beta; nobody's: a tie.
@@ -167,7 +167,7 @@ class Ivanov {
   int64_t value_;
 };
 
-TEST(Line, OrderOfStepsIsThatOfIvanovInAllQuadrants) {
+TEST(Line, OrderOfStepsIsThatOfACentredEvaluationFunctionInAllQuadrants) {
   holds("each step of the run makes what the evaluation function asks for", [] {
     const int64_t increments[2] = {between<int64_t>(-60, 60), between<int64_t>(-60, 60)};
     RC_PRE(increments[0] != 0 && increments[1] != 0);
@@ -176,21 +176,23 @@ TEST(Line, OrderOfStepsIsThatOfIvanovInAllQuadrants) {
     const auto longest = static_cast<uint32_t>(std::abs(increments[leading]));
     bushd_line line;
     bushd_line_start(&line, static_cast<uint32_t>(std::abs(increments[other])), longest);
-    Ivanov ivanov(increments[0], increments[1]);
+    CentredEvaluation evaluation(increments[0], increments[1]);
     for (uint32_t s = 1; s <= longest; ++s) {
       // The step of the run is that of the leading coordinate; the other one has made its own by
       // then. In a tie both are made.
-      const bool other_before = leading == 0 ? !ivanov.alpha_is_next() : !ivanov.beta_is_next();
+      const bool other_before =
+          leading == 0 ? !evaluation.alpha_is_next() : !evaluation.beta_is_next();
       const bool made = bushd_line_follow(&line, 1) != 0;
       RC_ASSERT(made == other_before);
-      if (made) ivanov.step(other);
-      const bool other_again = leading == 0 ? ivanov.beta_is_next() : ivanov.alpha_is_next();
+      if (made) evaluation.step(other);
+      const bool other_again =
+          leading == 0 ? evaluation.beta_is_next() : evaluation.alpha_is_next();
       RC_ASSERT(!other_again);
-      ivanov.step(leading);
+      evaluation.step(leading);
       const int64_t sign = increments[other] < 0 ? -1 : 1;
-      RC_ASSERT(ivanov.at(other) == sign * int64_t{line.made});
+      RC_ASSERT(evaluation.at(other) == sign * int64_t{line.made});
     }
-    RC_ASSERT(ivanov.at(0) == increments[0] && ivanov.at(1) == increments[1]);
+    RC_ASSERT(evaluation.at(0) == increments[0] && evaluation.at(1) == increments[1]);
   });
 }
 
