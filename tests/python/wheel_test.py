@@ -58,7 +58,8 @@ class Wheel(unittest.TestCase):
         version = re.search(r"^project\(bushd VERSION ([0-9.]+)", (TOP / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
         said = email.message_from_string(self.information("METADATA"))
         self.assertEqual((said["Name"], said["Version"], said["Requires-Python"]), ("bushd", version, f">=3.{OLDEST}"))
-        self.assertIsNone(said["Requires-Dist"])
+        for needed in said.get_all("Requires-Dist"):
+            self.assertRegex(needed, r'; extra == ["\']ophyd["\']$', "nobody needs it but who asks for bushd[ophyd]")
         self.assertEqual(self.text("bushd/version.py"), f'__version__ = "{version}"\n')
         self.assertEqual(WHEEL.name, f"bushd-{version}-py3-none-any.whl")
         self.assertIn("Root-Is-Purelib: true\nTag: py3-none-any\n", self.information("WHEEL"))
@@ -117,10 +118,10 @@ class Installed(unittest.TestCase):
 
     def test_it_is_there_and_needs_nothing(self):
         program = ("import bushd, importlib.metadata, pathlib; information = importlib.metadata.distribution('bushd'); "
-                   "print(information.version, bushd.__version__, information.requires, (pathlib.Path(bushd.__file__).parent / 'py.typed').exists())")
+                   "print(information.version, bushd.__version__, all('extra ==' in needed for needed in information.requires), (pathlib.Path(bushd.__file__).parent / 'py.typed').exists())")
         version = WHEEL.name.split("-")[1]
         for _, said in self.in_each(*ISOLATED, "-W", "error", "-c", program):
-            self.assertEqual(said.split(), [version, version, "None", "True"])
+            self.assertEqual(said.split(), [version, version, "True", "True"])
 
     def test_all_modules_are_without_warnings_of_a_newer_python(self):
         program = ("import compileall, bushd, pathlib, sys; "
