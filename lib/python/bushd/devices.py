@@ -21,6 +21,8 @@ QUIET_TURNS = 16
 # Positions that are asked for between two motors (of relative moves) keep a step open, but not without an end.
 READING_KEEPS_OPEN_S = 1.0
 PROGRESS_EVERY_S = 0.1
+# Devices are read one after the other, each with all that the daemon says. So long what it has said counts, unless this program moves something.
+FRESH_S = 0.02
 
 Begin = Callable[[aio.Client], Awaitable[Motion]]
 
@@ -37,7 +39,7 @@ def trusted(motor: model.Motor, uncertain: bool = False) -> model.Motor:
     if motor.trust is Trust.UNCERTAIN and not uncertain:
         why = motor.uncertain_reason or "nobody has said where it stands"
         raise UntrustedPosition(
-            f"{motor.name}: its position is uncertain: {why}. Home it, or say where it stands with set_position() or 'bushctl set'"
+            f"{motor.name}: its position is uncertain: {why}. Home it, or say where it stands ('bushctl set', 'bushctl confirm')"
         )
     if motor.trust is Trust.UNKNOWN:
         raise UntrustedPosition(f"{motor.name}: its position is unknown: MCU {motor.mcu} has not reported since it booted")
@@ -96,6 +98,8 @@ class Daemon:
         self._gathering: Step | None = None
         self._steps: set[Step] = set()
         self._reading = 0
+        self._moved = 0  # so many times something has begun, ended or was stopped
+        self._heard: tuple[float, int, model.Status] | None = None  # when it was asked for, and what had moved by then
         self._progress: tuple[float, asyncio.Task[model.Status]] | None = None
 
     async def client(self) -> aio.Client:
@@ -108,6 +112,7 @@ class Daemon:
                 if self._client is not None:
                     await self._client.close()
                 self._client = None
+                self._moved += 1
                 self._client = await self._opens()
             return self._client
 
@@ -117,12 +122,17 @@ class Daemon:
             self._client = None
 
     async def status(self) -> model.Status:
-        """All motors, as they are now: asked for, not what was heard before."""
+        """All motors as they are now: no older than FRESH_S, and than whatever this program has begun or what has ended since."""
+        now, moved, client = asyncio.get_running_loop().time(), self._moved, await self.client()
+        if self._heard is not None and self._heard[1] == moved and now - self._heard[0] < FRESH_S:
+            return self._heard[2]
         self._reading += 1
         try:
-            return await (await self.client()).status()
+            status = await client.status()
         finally:
             self._reading -= 1
+        self._heard = now, moved, status
+        return status
 
     async def motor(self, name: str) -> model.Motor:
         """Raises UnknownMotor."""
@@ -174,7 +184,7 @@ class Daemon:
         """Ramps these motors down, whoever moves them. Returns once they stand; of motors at rest it is nothing."""
         for step in self._steps:
             step.stopping.update(step.targets.keys() & set(names))
-        await (await self.client()).stop(*names, check=False)
+        await self._stop(names)
 
     async def stop_own(self, *names: str) -> None:
         """Ramps down what this program has begun with one of these motors, all motors of a step at once. No failure for who waits for it."""
@@ -184,9 +194,15 @@ class Daemon:
             step.stopping.update(step.targets)
         moving = {name for step in steps if step.motion is not None for name in step.targets}
         if moving:
-            await (await self.client()).stop(*sorted(moving), check=False)
+            await self._stop(sorted(moving))
         if steps:
             await asyncio.wait([step.task for step in steps])
+
+    async def _stop(self, names: Iterable[str]) -> None:
+        client = await self.client()
+        self._moved += 1
+        await client.stop(*names, check=False)
+        self._moved += 1
 
     def _start(self, step: Step) -> Step:
         step.task = asyncio.create_task(self._carry_out(step))
@@ -196,6 +212,7 @@ class Daemon:
 
     def _over(self, step: Step) -> None:
         self._steps.discard(step)
+        self._moved += 1
         step.accepted.set()
         if not step.task.cancelled():
             step.task.exception()  # it is told to who waits; nobody may
@@ -203,8 +220,7 @@ class Daemon:
     async def _carry_out(self, step: Step) -> model.MoveResult | None:
         await self._until_quiet(step)
         step.closed = True
-        client = await self.client()
-        status = await client.status()
+        client, status = await self.client(), await self.status()
         for name in step.targets:
             step.before[name] = trusted(arguments.find(status, name), name in step.uncertain)
         step.never_began = set(step.targets) if step.begin is not None and step.stopping else set(step.stopping)
@@ -212,6 +228,7 @@ class Daemon:
         if not targets:
             return None
         step.stopping.clear()
+        self._moved += 1
         step.motion = await (client.move(targets, wait=False) if step.begin is None else step.begin(client))
         step.accepted.set()
         if step.stopping:  # meanwhile: what was sent to stop them may have overtaken the move
