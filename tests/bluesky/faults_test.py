@@ -40,7 +40,7 @@ class Faults(BlueskyTest):
         self.assertIsInstance(self.cause_of(bps.mv(b1, FAR)), UntrustedPosition)
         self.wait_until("b1 to rest", lambda: not self.motors()["b1"]["moving"])
         self.command("confirm", "a0", "b1")
-        self.engine(bps.mv(a0, 10, b1, FAR))
+        self.move_after_trouble(bps.mv, a0, 10, b1, FAR)
         self.assertEqual(self.in_loop(b1.read)["b1"]["value"], FAR)
         self.end_programs()
         positions = self.traced_positions()
@@ -66,7 +66,7 @@ class Faults(BlueskyTest):
         self.wait_until_ready()
         found = self.in_loop(b1.read)["b1"]["value"]
         self.assertEqual(found, self.positions()["b1"])
-        self.engine(bps.mv(a0, 10, b1, FAR))
+        self.move_after_trouble(bps.mv, a0, 10, b1, FAR)
         self.assertEqual(self.in_loop(b1.read)["b1"]["value"], FAR)
         self.end_programs()
         positions = self.traced_positions()

@@ -68,10 +68,13 @@ class Step:
     def check(self, name: str) -> None:
         """Of one that is over: raises what has become of this motor, unless it stands at its target."""
         result = self.task.result()
-        outcome = Outcome.STOPPED if result is None or name in self.never_began else result[name].outcome
-        if outcome.succeeded or (outcome is Outcome.STOPPED and self.pardoned):
-            return
-        raise MoveFailed(result or model.MoveResult(outcome, f"{name}: stopped before it began"))
+        if result is None or name in self.never_began:
+            result = model.MoveResult(Outcome.STOPPED, f"{name}: stopped before it began")
+            outcome = result.outcome
+        else:
+            outcome = result[name].outcome
+        if not (outcome.succeeded or (outcome is Outcome.STOPPED and self.pardoned)):
+            raise MoveFailed(result)
 
 
 class Daemon:
