@@ -95,6 +95,11 @@ class Client(Moving):
         """The name by which the daemon knows this client, in results, history and logs."""
         return self._driver.session.client_id
 
+    @property
+    def connected(self) -> bool:
+        """False once the daemon has ended, or this client is closed: each request raises NoDaemon then. Connect anew."""
+        return self._driver.session.ended is None
+
     async def close(self) -> None:
         """Jogs of this client ramp down. Moves that were begun with wait=False go on."""
         self._driver.close()

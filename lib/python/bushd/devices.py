@@ -111,7 +111,7 @@ class Daemon:
         if self._loop is not loop:
             self._loop, self._client, self._connecting = loop, None, asyncio.Lock()
         async with self._connecting:
-            if self._client is None or self._client._driver.session.ended is not None:
+            if self._client is None or not self._client.connected:
                 if self._client is not None:
                     await self._client.close()
                 self._client = None
