@@ -5,7 +5,7 @@ $BUSHD_GRID_SIDE is the number of points of each motor: 3 by default (81 points)
 import os
 import time
 
-from lab import BlueskyTest, main, without_repeats
+from lab import TABLE_RUNS, BlueskyTest, main, without_repeats
 
 SIDE = int(os.environ.get("BUSHD_GRID_SIDE", "3"))
 STEPS = 2  # from point to point
@@ -16,7 +16,7 @@ class Grid(BlueskyTest):
     def test_no_point_of_a_grid_of_four_motors_is_off(self):
         import bluesky.plans as bp
 
-        self.bring_up_lab()
+        self.bring_up_lab(bus_lines=TABLE_RUNS)
         last = STEPS * (SIDE - 1)
         by_motor = [word for motor in self.motors_of(*NAMES) for word in (motor, 0, last, SIDE)]
         values = range(0, last + 1, STEPS)
@@ -24,10 +24,16 @@ class Grid(BlueskyTest):
         alone = [*points[: SIDE**3], points[0]]
         alone_s = self.in_loop(self.moves_alone, alone)
         began_s = time.monotonic()
-        self.engine(bp.grid_scan([], *by_motor))
+        try:
+            self.engine(bp.grid_scan([], *by_motor))
+        finally:
+            # Also where a plan fails, on a PC that was held up: what it has read until then is right.
+            read = self.read(*NAMES)
+            self.assertEqual(read, points[: len(read)])
+            print(f"{len(read)} points were read", flush=True)
         each_s = (time.monotonic() - began_s) / len(points)
 
-        self.assertEqual(self.read(*NAMES), points)
+        self.assertEqual(len(read), len(points))
         self.end_programs()
         self.assertEqual(self.rests_in_trace(*NAMES), without_repeats([*alone, *points]))
         self.assert_started_together()

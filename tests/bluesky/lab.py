@@ -11,7 +11,7 @@ import threading
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
-from rig import TOP, EndToEndTest
+from rig import TABLE_RUNS, TOP, EndToEndTest
 
 PYTHON = pathlib.Path(os.environ.get("BUSHD_BLUESKY_PYTHON", TOP / "build/bluesky/bin/python"))
 WITHOUT = ("no ophyd-async and bluesky: python3 -m venv build/bluesky && build/bluesky/bin/pip install -r tests/bluesky/requirements.txt; "
@@ -54,8 +54,8 @@ precision = 2
 
 @unittest.skipUnless(bluesky_is_there(), WITHOUT)
 class BlueskyTest(EndToEndTest):
-    def bring_up_lab(self, with_units=(), more=""):
-        self.write_config()
+    def bring_up_lab(self, with_units=(), more="", bus_lines=()):
+        self.write_config(bus_lines=bus_lines)
         config = self.file("bushd.toml")
         text = config.read_text()
         for name in with_units:
@@ -174,4 +174,4 @@ def without_repeats(points):
     return [point for number, point in enumerate(points) if number == 0 or point != points[number - 1]]
 
 
-__all__ = ["SLIT", "BlueskyTest", "main", "without_repeats"]
+__all__ = ["SLIT", "TABLE_RUNS", "BlueskyTest", "main", "without_repeats"]

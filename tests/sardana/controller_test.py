@@ -80,7 +80,7 @@ class Controller(EndToEndTest):
         self.assertEqual((self.position(a0), a0.get_state(cache=False)), (120, State.On))
         self.assertEqual(self.position(b1), 0)
         self.assertEqual(self.controller.ctrl.GetAxisExtraPar(1, "Trust"), "known")
-        # Of its table: 100 to 2500 steps/s in 238 steps and 197 ms.
+        # Its table: 100 to 2500 steps/s in 238 steps and 197 ms.
         self.assertEqual(a0.base_rate, 100)
         self.assertEqual(a0.velocity, 2500)
         self.assertAlmostEqual(a0.acceleration, 0.197, places=3)
