@@ -103,6 +103,24 @@ class Flights(BlueskyTest):
 
         self.assertIn("prepare it with a Path", str(self.cause_of(unprepared())))
 
+    def test_pulses_of_a_flight_that_is_not_kicked_off_are_taken_back(self):
+        import bluesky.plan_stubs as bps
+
+        from bushd.ophyd_async import Path, Pulses
+
+        self.bring_up_lab()
+        flyer = self.flyer()
+
+        def plan():
+            yield from bps.stage(flyer, wait=True)
+            yield from bps.prepare(flyer, Path(["a0"], [(0,), (100,)], pulses=Pulses("a0", 50)), wait=True)
+            yield from bps.unstage(flyer, wait=True)
+
+        self.engine(plan())
+        self.command("move", "--wait", "a0", "--to", "100")
+        self.end_programs()
+        self.assertEqual(self.pulses_in_trace(1), 0)
+
     def test_an_aborted_flight_is_stopped(self):
         import bluesky.plan_stubs as bps
         import bluesky.plans as bp

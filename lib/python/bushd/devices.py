@@ -159,10 +159,10 @@ class Daemon:
         """The same for a motion of another kind, on its own. targets: where its motors will stand in the end."""
         return self._start(Step(targets, begin, targets if uncertain else ()))
 
-    async def progress(self, step: Step, name: str, timeout_s: float | None = None) -> AsyncIterator[model.Motor]:
-        """The motor as it moves, until all of its step stand. Raises what has become of it; TimeoutError after a stop.
+    async def progress(self, step: Step, *names: str, timeout_s: float | None = None) -> AsyncIterator[model.Motor]:
+        """The first of these motors as it moves, until all of the step stand. Raises what has become of one of them.
 
-        Cancelled, it ramps the motor down.
+        timeout_s: then they are stopped, and TimeoutError is raised. Cancelled, it ramps them down.
         """
         loop = asyncio.get_running_loop()
         give_up = None if timeout_s is None else loop.time() + timeout_s
@@ -170,18 +170,19 @@ class Daemon:
             while not step.task.done():
                 left = PROGRESS_EVERY_S if give_up is None else min(PROGRESS_EVERY_S, give_up - loop.time())
                 if left <= 0:
-                    await self.stop(name)
-                    raise TimeoutError(f"{name}: not at its target after {timeout_s:g} s, and stopped")
+                    await self.stop(*names)
+                    raise TimeoutError(f"{', '.join(names)}: not at the target after {timeout_s:g} s, and stopped")
                 done, _ = await asyncio.wait({step.task}, timeout=left)
                 if not done and step.motion is not None:
                     try:
-                        yield arguments.find(await self._seen(), name)
+                        yield arguments.find(await self._seen(), names[0])
                     except BushdError:
                         pass  # what has become of the motion is told by its own answer
         except (asyncio.CancelledError, GeneratorExit):
-            await self.stop(name)
+            await self.stop(*names)
             raise
-        step.check(name)
+        for name in names:
+            step.check(name)
 
     async def stop(self, *names: str) -> None:
         """Ramps these motors down, whoever moves them. Returns once they stand; of motors at rest it is nothing."""

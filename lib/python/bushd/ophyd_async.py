@@ -126,7 +126,7 @@ class Motor(Device):
         await (self._daemon.stop_own(self.motor) if success else self._daemon.stop(self.motor))
 
     async def _updates(self, step: Step, target: float, timeout: float | None) -> AsyncIterator[WatcherUpdate[float]]:
-        async for motor in self._daemon.progress(step, self.motor, timeout):
+        async for motor in self._daemon.progress(step, self.motor, timeout_s=timeout):
             before = step.before[self.motor].position
             if motor.position is None or before is None:
                 continue
@@ -205,19 +205,17 @@ class MotorGroup(DeviceMap):
         return {motor: float(target) for motor, target in value.items()}
 
     def _watched(self, step: Step, targets: Mapping[str, float], timeout: float | None) -> WatchableAsyncStatus[float]:
-        """Its progress is that of the motor that has the longest way."""
+        """Its progress is that of the first motor."""
         return WatchableAsyncStatus(self._updates(step, targets, timeout), name=self.name)
 
     async def _updates(
         self, step: Step, targets: Mapping[str, float], timeout: float | None
     ) -> AsyncIterator[WatcherUpdate[float]]:
-        first, *others = targets
-        async for motor in self._daemon.progress(step, first, timeout):
+        first = next(iter(targets))
+        async for motor in self._daemon.progress(step, *targets, timeout_s=timeout):
             before = step.before[first].position
             if motor.position is not None and before is not None:
                 yield WatcherUpdate(motor.position, before, targets[first], name=first, unit=motor.unit, precision=motor.precision)
-        for other in others:
-            step.check(other)
 
 
 class Line(MotorGroup):
@@ -319,6 +317,7 @@ class PathFlyer(Device):
         self._prepared: Path | Trajectory | None = None
         self._path: Path | Trajectory | None = None  # flown last, or under way
         self._flight: Step | None = None
+        self._pulses: Pulses | None = None  # that are set
         self._flown: model.Status | None = None  # when all motors stood at the last point
         super().__init__(name=name, connector=_Connector(daemon, []))
 
@@ -334,6 +333,7 @@ class PathFlyer(Device):
         if isinstance(value, Path):
             await client.plan_path(value.motors, rows[1:], exact=value.exact, speed=value.speed)
         if value.pulses is not None:
+            self._pulses = value.pulses
             await value.pulses.set(client)
         self._prepared = value
 
@@ -360,12 +360,10 @@ class PathFlyer(Device):
             raise RuntimeError(f"{self.name}: it was not kicked off")
         try:
             first = path.motors[0]
-            async for motor in self._daemon.progress(flight, first):
+            async for motor in self._daemon.progress(flight, *path.motors):
                 before = flight.before[first].position
                 if motor.position is not None and before is not None:
                     yield WatcherUpdate(motor.position, before, flight.targets[first], name=first, unit=motor.unit)
-            for name in path.motors:
-                flight.check(name)
             if (await flight.task) is not None and not flight.pardoned:
                 self._flown = await self._daemon.status()
         finally:
@@ -408,17 +406,14 @@ class PathFlyer(Device):
         await self._take_pulses_back()
 
     async def _take_pulses_back(self) -> None:
-        path = self._prepared or self._path
-        if path is not None and path.pulses is not None:
-            await path.pulses.take_back(await self._daemon.client())
+        if self._pulses is not None:
+            await self._pulses.take_back(await self._daemon.client())
+            self._pulses = None
 
 
 async def _over(daemon: Daemon, step: Step) -> None:
-    names = list(step.targets)
-    async for _ in daemon.progress(step, names[0]):
+    async for _ in daemon.progress(step, *step.targets):
         pass
-    for name in names:
-        step.check(name)
 
 
 def _rows(value: Path | Trajectory) -> list[list[float]]:
