@@ -182,6 +182,8 @@ class Motor:
     table: TableRef  # in service, for the next move
     description: str
     steps_per_unit: str  # exact: "320" or "1/3"
+    negative: bool  # position = offset - dial; otherwise offset + dial
+    offset: float  # of the user's scale
     precision: int  # decimals of positions for people
     soft_limits: tuple[float, float] | None  # on the user's scale, low before high
 

@@ -125,5 +125,5 @@ def _motor(state: Any, description: Any, mcu: str) -> model.Motor:
         mcu=mcu,
         table=codec.table_ref(description.table),
         soft_limits=(description.user_low, description.user_high) if description.soft_limits else None,
-        **{name: getattr(description, name) for name in ("unit", "output", "group", "description", "steps_per_unit", "precision")},
+        **{name: getattr(description, name) for name in ("unit", "output", "group", "description", "steps_per_unit", "negative", "offset", "precision")},
     )

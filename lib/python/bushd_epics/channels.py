@@ -1,0 +1,146 @@
+"""Process variables as caproto has them. Their values are those of records; a put goes to whoever owns it, never straight to the value."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import caproto
+from caproto import ChannelType
+from caproto._backend import backend  # what caproto's own channels convert with
+from caproto._dbr import native_type
+from caproto._utils import ConversionDirection
+
+from .fields import Kind, Value
+from .record import Putter
+
+LONG_TEXT = 512
+EVENTS = caproto.SubscriptionType.DBE_VALUE | caproto.SubscriptionType.DBE_LOG | caproto.SubscriptionType.DBE_ALARM
+
+PutFunction = Callable[[Value, Putter], None]
+
+
+class BadPut(Exception):
+    """A put whose value is none of its variable's."""
+
+
+class Channel:
+    """What the classes below have in common; beside one of caproto's."""
+
+    putter: PutFunction | None = None  # None: it is read only
+
+    def get_field(self, field: str) -> Any:
+        """NAME.VAL of a variable that is no record."""
+        if field != "VAL":
+            raise KeyError(field)
+        return self
+
+    def set_value(self: Any, value: Any) -> None:
+        self._data["value"] = value
+        self._data["timestamp"] = caproto.TimeStamp.from_flexible_value(time.time())
+        self._content.clear()
+        if any(specs for syncs in self._queues.values() for types in syncs.values() for specs in types.values()):
+            at_once(self.publish(EVENTS))
+
+    def tell_again(self: Any) -> None:
+        """Its alarm, or what is said of its value, has changed."""
+        self._content.clear()
+        at_once(self.publish(EVENTS))
+
+    def show(self, value: Value) -> None:
+        self.set_value(value)
+
+    def read_put(self: Any, command: Any) -> Value:
+        """The value that a client puts. Raises BadPut."""
+        source = native_type(command.data_type)
+        if source is ChannelType.ENUM:
+            source = ChannelType.INT  # 16 bits as well; the number of the word
+        text = source in (ChannelType.STRING, ChannelType.CHAR) and not (source is ChannelType.CHAR and self.data_type is not ChannelType.STRING)
+        to = ChannelType.STRING if text else ChannelType.DOUBLE
+        try:
+            values = backend.convert_values(
+                values=command.data,
+                from_dtype=source,
+                to_dtype=to,
+                string_encoding="latin-1",
+                direction=ConversionDirection.FROM_WIRE,
+            )
+            value = values if isinstance(values, (str, bytes)) else values[0]
+            if isinstance(value, bytes):
+                value = value.decode("latin-1")
+            return self.to_value(value if text else float(value))
+        except (LookupError, ValueError, TypeError, OverflowError, caproto.CaprotoError) as error:
+            raise BadPut(f"no value of this field: {error}") from None
+
+    def to_value(self, value: str | float) -> Value:
+        return float(value)
+
+
+class Double(Channel, caproto.ChannelDouble):
+    def describe(self, unit: str, precision: int, low: float, high: float) -> None:
+        """`low`, `high`: limits of puts; both 0: there are none."""
+        limits = {f"{end}_{kind}_limit": value for kind in ("ctrl", "disp") for end, value in (("lower", low), ("upper", high))}
+        now = {"units": unit[:8], "precision": precision, **limits}
+        if any(self._data.get(key) != value for key, value in now.items()):
+            self._data.update(now)
+            self.tell_again()
+
+
+class Long(Channel, caproto.ChannelInteger):
+    def to_value(self, value: str | float) -> Value:
+        return _whole(value, 2**31)
+
+
+class Short(Channel, caproto.ChannelShort):
+    def to_value(self, value: str | float) -> Value:
+        return _whole(value, 2**15)
+
+
+class Enum(Channel, caproto.ChannelEnum):
+    def show(self, value: Value) -> None:
+        self.set_value(self.enum_strings[int(value)])
+
+    def to_value(self, value: str | float) -> Value:
+        if isinstance(value, str) and value in self.enum_strings:
+            return list(self.enum_strings).index(value)
+        number = _whole(value, 16)
+        if not 0 <= number < len(self.enum_strings):
+            raise ValueError(f"{number}; allowed: {', '.join(self.enum_strings)}")
+        return number
+
+
+class Text(Channel, caproto.ChannelString):
+    def to_value(self, value: str | float) -> Value:
+        return str(value)
+
+
+def _whole(value: str | float, limit: int) -> int:
+    number = float(value)
+    if number != int(number) or not -limit <= number < limit:
+        raise ValueError(f"{value} is no whole number that it holds")
+    return int(number)
+
+
+def make(kind: Kind, value: Value, words: tuple[str, ...], alarm: Any, record_type: str) -> Any:
+    how = {"alarm": alarm, "reported_record_type": record_type}
+    match kind:
+        case Kind.DOUBLE:
+            return Double(value=float(value), precision=0, units="", **how)
+        case Kind.LONG:
+            return Long(value=int(value), **how)
+        case Kind.SHORT:
+            return Short(value=int(value), **how)
+        case Kind.ENUM:
+            return Enum(value=words[int(value)], enum_strings=list(words), **how)
+    return Text(value=str(value), long_string_max_length=LONG_TEXT, **how)
+
+
+def at_once(coroutine: Coroutine[Any, Any, Any]) -> None:
+    """Nothing that a channel publishes waits: its queue has no bound. So what is told in one order is heard in that order."""
+    try:
+        coroutine.send(None)
+    except StopIteration:
+        return
+    coroutine.close()
+    raise RuntimeError("a channel has waited while it was published")

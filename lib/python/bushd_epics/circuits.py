@@ -1,0 +1,141 @@
+"""Channel Access circuits: puts go to records, and their answers wait their turn behind the values that were told before.
+
+caproto answers a put as soon as it is over, while monitors wait in queues: a client would hear that a move is done before it hears of
+the last position. Here both take the same way. A client that does not read is let go, before what waits for it holds others back.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+from typing import Any
+
+import caproto
+from caproto.asyncio import server as caproto_server
+from caproto.server.common import DisconnectedCircuit
+
+from .channels import BadPut
+from .record import Putter
+
+AT_ONCE = 256  # of what waits, in one packet
+MOST_WAITING = 8000
+
+
+class Answer:
+    """To a put."""
+
+    def __init__(self, circuit: Circuit, command: Any) -> None:
+        self.circuit = circuit
+        self.command = command
+
+
+class Circuit(caproto_server.VirtualCircuit):
+    context: Any
+
+    @property
+    def host(self) -> str:
+        return str(self.circuit.address[0])
+
+    @property
+    def who(self) -> str:
+        """As it says itself; for history and logs, not for rights."""
+        words = (self.client_username or "unknown", self.client_hostname or self.host)
+        return ":".join("".join(c if 33 <= ord(c) < 127 and c != ":" else "_" for c in word)[:20] for word in words)
+
+    async def _process_command(self, command: Any) -> Any:
+        if isinstance(command, (caproto.WriteRequest, caproto.WriteNotifyRequest)):
+            self._put(command)
+            return []
+        response = await super()._process_command(command)
+        if isinstance(command, caproto.CreateChanRequest):
+            return [self._rights(command, one) if isinstance(one, caproto.AccessRightsResponse) else one for one in response]
+        return response
+
+    def _rights(self, command: Any, response: Any) -> Any:
+        rights = caproto.AccessRights.READ
+        if self.context[command.name].putter is not None and self.context.access.may_put(self.host):
+            rights |= caproto.AccessRights.WRITE
+        return caproto.AccessRightsResponse(cid=command.cid, access_rights=rights)
+
+    def _put(self, command: Any) -> None:
+        channel, entry = self._get_db_entry_from_command(command)
+        answer = functools.partial(self._answer, command, channel)
+        if entry.putter is None:
+            return answer("it cannot be put")
+        if not self.context.access.may_put(self.host):
+            self.context.tell_refused(self, channel.name)
+            return answer(f"{self.host} may not put: names.toml [allow]")
+        try:
+            value = entry.read_put(command)
+        except BadPut as error:
+            return answer(str(error))
+        entry.putter(value, Putter(who=self.who, circuit=self, token=answer))
+
+    def _answer(self, command: Any, channel: Any, error: str) -> None:
+        if isinstance(command, caproto.WriteNotifyRequest):
+            status = caproto.CAStatus.ECA_PUTFAIL if error else caproto.CAStatus.ECA_NORMAL
+            response = channel.write(
+                ioid=command.ioid, data_type=command.data_type, data_count=command.data_count, status=status.value.code_with_severity
+            )
+        elif error:
+            response = caproto.ErrorResponse(command, channel.cid, status=caproto.CAStatus.ECA_PUTFAIL, error_message=error[:250])
+        else:
+            return
+        self.context.subscription_queue.put_nowait(Answer(self, response))
+
+    async def subscription_queue_loop(self) -> None:
+        """All that waits, in its order, as one packet."""
+        self.events_on.set()
+        try:
+            while True:
+                waiting = [await self.subscription_queue.get()]
+                while not self.subscription_queue.empty() and len(waiting) < AT_ONCE:
+                    waiting.append(self.subscription_queue.get_nowait())
+                subscribed = {sub.subscriptionid for subs in self.subscriptions.values() for sub in subs}
+                commands = [command for command in map(_command, waiting) if _is_wanted(command, subscribed)]
+                if commands:
+                    await self.send(*commands)
+        except asyncio.CancelledError:
+            return
+        except DisconnectedCircuit:
+            await self._on_disconnect()
+            self.circuit.disconnect()
+            await self.context.circuit_disconnected(self)
+
+    async def command_queue_loop(self) -> None:
+        try:
+            await super().command_queue_loop()
+        finally:
+            self.context.client_gone(self)
+
+
+def _command(waiting: Any) -> Any:
+    """Values that were overtaken by too many newer ones are gone."""
+    return waiting.command if isinstance(waiting, Answer) else waiting()
+
+
+def _is_wanted(command: Any, subscribed: set[int]) -> bool:
+    if isinstance(command, caproto.EventAddResponse):
+        return command.subscriptionid in subscribed
+    return command is not None
+
+
+class Context(caproto_server.Context):
+    CircuitClass = Circuit
+
+    async def subscription_queue_loop(self) -> None:
+        while True:
+            update = await self.subscription_queue.get()
+            if isinstance(update, Answer):
+                if update.circuit.connected:
+                    await update.circuit.subscription_queue.put(update)
+            else:
+                await self._subscription_queue_iteration(*update)
+
+    async def _subscription_queue_send(self, sub_spec: Any, sub: Any, **update: Any) -> None:
+        circuit = sub.circuit
+        if circuit.subscription_queue.qsize() >= MOST_WAITING:
+            self.log.warning("%s does not read what it has subscribed to, and is let go", circuit.host)
+            circuit.client.close()
+            return
+        await super()._subscription_queue_send(sub_spec, sub, **update)

@@ -1,0 +1,96 @@
+"""The program bushd-epics."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import logging
+import re
+import signal
+import sys
+
+from . import names as names_file
+
+LOG = logging.getLogger("bushd-epics")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options = _parse(arguments)
+    logging.basicConfig(format="%(name)s: %(message)s", level=logging.INFO)
+    logging.getLogger("caproto").setLevel(logging.WARNING)
+    # Beacons are for clients that wait for a server to appear; that nobody listens to them is no fault.
+    logging.getLogger("caproto.ctx").addFilter(lambda record: "beacon" not in str(record.msg))
+    try:
+        names = names_file.read(options.names) if options.names else names_file.NONE
+    except (OSError, names_file.BadNames) as error:
+        print(f"bushd-epics: {error}", file=sys.stderr)
+        return 2
+    try:
+        return asyncio.run(_run(options, names))
+    except ImportError as error:
+        print(f"bushd-epics: {error}: it needs caproto (pip install caproto)", file=sys.stderr)
+        return 2
+
+
+def _parse(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="bushd-epics", description="Motor records of EPICS, by Channel Access, for the motors of bushd.")
+    parser.add_argument("--prefix", required=True, help="what all names begin with, such as LAB:")
+    parser.add_argument(
+        "--daemon", action="append", metavar="[NAME=]SOCKET", default=[],
+        help="control socket of a daemon; may be repeated. With NAME its motors are PREFIX NAME: MOTOR. Default: that of this PC",
+    )
+    parser.add_argument("--names", metavar="FILE", help="names.toml: other names of motors, and which hosts may put")
+    parser.add_argument("--read-only", action="store_true", help="nobody may put")
+    parser.add_argument("--interface", action="append", metavar="ADDRESS", help="to listen at; may be repeated. Default: all")
+    parser.add_argument("--list", action="store_true", help="print the names of all variables, and end")
+    options = parser.parse_args(arguments)
+    if not re.fullmatch(r"[A-Za-z0-9_\-+:\[\]<>;]+", options.prefix):
+        parser.error(f"--prefix {options.prefix}: letters, digits and _-+:[]<>; are allowed")
+    return options
+
+
+async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
+    from .access import Access
+    from .daemon import Daemon
+    from .server import Server
+
+    server = Server(options.prefix, Access(names.hosts, options.read_only), options.interface)
+    daemons = []
+    for given in options.daemon or [""]:
+        name, equals, socket = given.rpartition("=") if re.match(r"[A-Za-z0-9_\-]+=", given) else ("", "", given)
+        begins = f"{options.prefix}{name}:" if equals else options.prefix
+
+        def record_name(motor: str, begins: str = begins) -> str:
+            shown = names.of(motor)
+            return f"{begins}{shown}" if shown else ""
+
+        daemons.append(Daemon(socket or None, record_name, server))
+        server.add_daemon(daemons[-1])
+    server.make_common()
+    following = [asyncio.create_task(daemon.run()) for daemon in daemons]
+    try:
+        # Names are those of motors: until one daemon has told them there is nothing to be shown.
+        appearing = [asyncio.create_task(daemon.appeared.wait()) for daemon in daemons]
+        await asyncio.wait([*appearing, *following], return_when=asyncio.FIRST_COMPLETED)
+        if options.list:
+            await asyncio.gather(*appearing)
+            print("\n".join(server.names()))
+            return 0
+        await _serve(server)
+        return 0
+    finally:
+        for task in following:
+            task.cancel()
+        await asyncio.gather(*following, return_exceptions=True)
+
+
+async def _serve(server: object) -> None:
+    """Until a signal ends it."""
+    serving = asyncio.create_task(server.run())  # type: ignore[attr-defined]
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, serving.cancel)
+    LOG.info("ready")
+    with contextlib.suppress(asyncio.CancelledError):
+        await serving

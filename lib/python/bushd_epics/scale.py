@@ -1,0 +1,33 @@
+"""Steps, dial and user's scale of a motor: user = offset + dial, or offset - dial; dial = steps x resolution."""
+
+from __future__ import annotations
+
+import dataclasses
+import fractions
+
+
+@dataclasses.dataclass(frozen=True)
+class Scale:
+    resolution: float = 1.0  # of a step, in the unit: MRES
+    negative: bool = False
+    offset: float = 0.0
+
+    @property
+    def sign(self) -> float:
+        return -1.0 if self.negative else 1.0
+
+    def user(self, dial: float) -> float:
+        return self.offset + self.sign * dial
+
+    def dial(self, user: float) -> float:
+        return self.sign * (user - self.offset)
+
+    def steps(self, dial: float) -> int:
+        return round(dial / self.resolution)
+
+
+def resolution(steps_per_unit: str) -> float:
+    """Of a motor with so many steps in a unit, as bushd tells it: "320", "12.5" or "1/3"; "" of one whose unit is steps."""
+    parts = [fractions.Fraction(part) for part in (steps_per_unit or "1").split("/")]
+    value = parts[0] / (parts[1] if len(parts) > 1 else 1)
+    return float(1 / value) if value > 0 else 1.0

@@ -1,0 +1,215 @@
+"""What is shown by Channel Access: the fields of records, made when somebody asks for them, and what belongs to all motors."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import caproto
+
+from . import channels, events
+from .access import Access
+from .circuits import Circuit, Context
+from .daemon import Daemon
+from .fields import FIELDS, Kind, Value
+from .record import Putter, Record
+
+LOG = logging.getLogger("bushd-epics")
+
+ABLE = ("Enable", "Disable")
+
+
+class Pages:
+    """The variables of one record."""
+
+    def __init__(self, record: Record, deliver: Callable[[Record], None]) -> None:
+        self.record = record
+        self._deliver = deliver
+        self._alarm = caproto.ChannelAlarm(
+            status=int(record.alarm.status), severity=int(record.alarm.severity), alarm_string=record.alarm.reason
+        )
+        self._fields: dict[str, Any] = {}
+        self._able: Any = None
+        self._held = False
+
+    def field(self, name: str) -> Any:
+        """Raises KeyError where a motor record has none of this name."""
+        channel = self._fields.get(name)
+        if channel is None:
+            spec = FIELDS[name]
+            channel = channels.make(spec.kind, self.record.values[name], spec.words, self._alarm, "motor")
+            channel.putter = lambda value, by: self._put(name, value, by)
+            self._fields[name] = channel
+            if spec.is_position and isinstance(channel, channels.Double):
+                self._describe(name, channel)
+        return channel
+
+    def able(self) -> Any:
+        """`NAME_able`: 1, Disable, of a motor that is held."""
+        if self._able is None:
+            self._able = channels.make(Kind.ENUM, int(self._held), ABLE, self._alarm, "bo")
+            self._able.putter = self._put_able
+        return self._able
+
+    def post(self, event: events.Post) -> None:
+        channel = self._fields.get(event.field)
+        if channel is not None:
+            channel.show(event.value)
+        if event.field in ("EGU", "PREC", "HLM", "LLM"):
+            for name, described in self._fields.items():
+                if FIELDS[name].is_position and isinstance(described, channels.Double):
+                    self._describe(name, described)
+
+    def alarm(self, event: events.Raise) -> None:
+        alarm = event.alarm
+        self._alarm._data.update(
+            status=caproto.AlarmStatus(int(alarm.status)), severity=caproto.AlarmSeverity(int(alarm.severity)), alarm_string=alarm.reason[:39]
+        )
+        for channel in self._fields.values():
+            channel._content.clear()  # what is read from now on has it; who watches VAL and RBV is told by the posts that follow
+
+    def held(self, held: bool) -> None:
+        if held != self._held:
+            self._held = held
+            if self._able is not None:
+                self._able.show(int(held))
+
+    def _describe(self, name: str, channel: channels.Double) -> None:
+        values = self.record.values
+        dial = name in ("DVAL", "DRBV", "DHLM", "DLLM")
+        low, high = ("DLLM", "DHLM") if dial else ("LLM", "HLM")
+        limited = name in ("VAL", "RBV", "DVAL", "DRBV")
+        channel.describe(
+            str(values["EGU"]), int(values["PREC"]), float(values[low]) if limited else 0.0, float(values[high]) if limited else 0.0
+        )
+
+    def _put(self, name: str, value: Value, by: Putter) -> None:
+        self.record.put(name, value, by, _now())
+        self._deliver(self.record)
+
+    def _put_able(self, value: Value, by: Putter) -> None:
+        self.record.hold(bool(value), by)
+        self._deliver(self.record)
+
+
+class Server(Context):
+    """All variables, by name; also what daemons show their records on."""
+
+    def __init__(self, prefix: str, access: Access, interfaces: list[str] | None = None) -> None:
+        super().__init__({}, interfaces)
+        self.prefix = prefix
+        self.access = access
+        self._daemons: dict[Record, Daemon] = {}
+        self._pages: dict[str, Pages] = {}
+        self._of: dict[Record, Pages] = {}
+        self._common: dict[str, Any] = {}
+        self._refused: set[str] = set()
+        self._work: set[asyncio.Task[None]] = set()
+
+    def add_daemon(self, daemon: Daemon) -> None:
+        self._all = [*getattr(self, "_all", []), daemon]
+
+    def make_common(self) -> None:
+        """Of all motors."""
+        stop = channels.make(Kind.SHORT, 0, (), caproto.ChannelAlarm(), "bo")
+        stop.putter = self._put_all_stop
+        defer = channels.make(Kind.SHORT, 0, (), caproto.ChannelAlarm(), "bo")
+        defer.putter = self._put_defer
+        self._common = {f"{self.prefix}allstop": stop, f"{self.prefix}deferMoves": defer}
+
+    def names(self) -> list[str]:
+        """All of them."""
+        records = [f"{name}.{field}" for name in sorted(self._pages) for field in FIELDS]
+        return [*records, *(f"{name}_able" for name in sorted(self._pages)), *self._common]
+
+    # -- for caproto
+
+    def __getitem__(self, name: str) -> Any:
+        try:
+            return self.pvdb[name]
+        except KeyError:
+            channel = self.pvdb[name] = self._find(name)
+            return channel
+
+    def _find(self, name: str) -> Any:
+        """Raises CaprotoKeyError."""
+        try:
+            parsed = caproto.parse_record_field(name)
+            record, field = parsed.record, parsed.field or "VAL"
+            if record in self._pages:
+                channel = self._pages[record].field(field)
+            elif record.endswith("_able") and record.removesuffix("_able") in self._pages:
+                channel = self._pages[record.removesuffix("_able")].able().get_field(field)
+            else:
+                channel = self._common[record].get_field(field)
+        except (KeyError, ValueError):
+            raise caproto.CaprotoKeyError(f"no such variable: {name}") from None
+        if caproto.RecordModifiers.long_string in (parsed.modifiers or {}) and not isinstance(channel, channels.Text):
+            raise caproto.CaprotoKeyError(f"no text: {name}")
+        return channel
+
+    def client_gone(self, circuit: Circuit) -> None:
+        for record, daemon in self._daemons.items():
+            record.client_gone(circuit, _now())
+            daemon.deliver(record)
+
+    def tell_refused(self, circuit: Circuit, name: str) -> None:
+        """Once for each host."""
+        if circuit.host not in self._refused and len(self._refused) < 1000:
+            self._refused.add(circuit.host)
+            LOG.warning("%s at %s may not put (%s): names.toml [allow], or --read-only", circuit.who, circuit.host, name)
+
+    # -- for daemons
+
+    def appear(self, record: Record) -> None:
+        daemon = next(one for one in self._all if record in one.records.values())
+        if record.name in self._pages:
+            LOG.error("%s is the name of two motors: the second one is not shown", record.name)
+        else:
+            self._pages[record.name] = Pages(record, daemon.deliver)
+        self._daemons[record] = daemon
+        self._of[record] = self._pages[record.name]
+
+    def post(self, record: Record, event: events.Post) -> None:
+        if self._of[record].record is record:
+            self._of[record].post(event)
+
+    def alarm(self, record: Record, event: events.Raise) -> None:
+        if self._of[record].record is record:
+            self._of[record].alarm(event)
+
+    def held(self, record: Record, held: bool) -> None:
+        if self._of[record].record is record:
+            self._of[record].held(held)
+
+    # -- of all motors
+
+    def _put_all_stop(self, value: Value, by: Putter) -> None:
+        if not value:
+            return by.token("")
+        self._start(self._stop_all(by))
+
+    async def _stop_all(self, by: Putter) -> None:
+        ended = await asyncio.gather(*(daemon.stop_all(str(by.who)) for daemon in self._all), return_exceptions=True)
+        failed = [str(error) for error in ended if isinstance(error, BaseException)]
+        for error in failed:
+            LOG.error("allstop: %s", error)
+        self._common[f"{self.prefix}allstop"].show(0)
+        by.token("; ".join(failed))
+
+    def _put_defer(self, value: Value, by: Putter) -> None:
+        self._common[f"{self.prefix}deferMoves"].show(int(bool(value)))
+        for daemon in self._all:
+            daemon.defer(bool(value))
+        by.token("")
+
+    def _start(self, coroutine: Any) -> None:
+        task = asyncio.get_running_loop().create_task(coroutine)
+        self._work.add(task)
+        task.add_done_callback(self._work.discard)
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
