@@ -31,7 +31,9 @@ class Version(unittest.TestCase):
         self.assertIn(project_version(), said)
 
 
-class Layout(unittest.TestCase):
+class Installation(unittest.TestCase):
+    """What `cmake --install` puts below a prefix."""
+
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
@@ -41,6 +43,8 @@ class Layout(unittest.TestCase):
         subprocess.run(command, capture_output=True, check=True)
         cls.files = {str(path.relative_to(cls.prefix)) for path in cls.prefix.rglob("*") if not path.is_dir()}
 
+
+class Layout(Installation):
     def packaged(self):
         """What the packages take, below a prefix; the images come from builds of their own."""
         for file in sorted((SOURCE / "debian").glob("*.install")):
@@ -67,7 +71,7 @@ class Layout(unittest.TestCase):
     def test_units_start_programs_of_this_prefix(self):
         programs = [command for unit in self.prefix.rglob("*.service")
                     for command in re.findall(r"^Exec(?:Start|Stop)=(\S+)", unit.read_text(), re.MULTILINE)]
-        self.assertEqual(len(programs), 4)
+        self.assertEqual(len(programs), 5)
         for program in programs:
             with self.subTest(program):
                 self.assertTrue(pathlib.Path(program).is_relative_to(self.prefix))
@@ -103,6 +107,71 @@ class Layout(unittest.TestCase):
             with self.subTest(page.name):
                 ran = subprocess.run(["groff", "-man", "-t", "-ww", "-Tutf8", page], capture_output=True, text=True, check=False)
                 self.assertEqual((ran.returncode, ran.stderr), (0, ""))
+
+
+class Epics(Installation):
+    """bushd-epics as it is installed; without caproto, which packages have beside it."""
+
+    def ran(self, *arguments):
+        environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        return subprocess.run([self.prefix / "bin/bushd-epics", *arguments], capture_output=True, text=True, env=environment, check=False)
+
+    def test_page_and_help_tell_of_the_same_options(self):
+        page = (SOURCE / "docs/man/bushd-epics.1").read_text().replace(r"\-", "-")
+        options = set(re.findall(r"^\.TP\n\\fB(--[a-z-]+)", page, re.MULTILINE))
+        said = set(re.findall(r"^  (--[a-z-]+)", self.ran("--help").stdout, re.MULTILINE))
+        self.assertEqual(options, said)
+
+    def test_without_caproto_it_is_one_sentence(self):
+        ran = self.ran("--prefix", "LAB:", "--list")
+        self.assertEqual((ran.returncode, ran.stdout, len(ran.stderr.splitlines())), (2, "", 1))
+        self.assertIn("caproto", ran.stderr)
+
+    def test_the_unit_waits_for_the_file_that_it_reads(self):
+        unit = next(self.prefix.rglob("bushd-epics.service")).read_text()
+        (needed,) = re.findall("^ConditionPathExists=(.*)$", unit, re.MULTILINE)
+        self.assertEqual(re.findall("^EnvironmentFile=(.*)$", unit, re.MULTILINE), [needed])
+        postrm = (SOURCE / "debian/bushd-epics.postrm").read_text()
+        self.assertRegex(postrm, rf"rm -f .*{re.escape(needed)}\b", "purge leaves it")
+
+    def test_the_user_of_the_unit_is_made_and_removed(self):
+        unit = next(self.prefix.rglob("bushd-epics.service")).read_text()
+        (user,) = re.findall("^User=(.*)$", unit, re.MULTILINE)
+        made = (self.prefix / "lib/sysusers.d/bushd-epics.conf").read_text()
+        self.assertRegex(made, rf"(?m)^u {user} -")
+        self.assertRegex(made, rf"(?m)^m {user} bushd$")
+        postrm = (SOURCE / "debian/bushd-epics.postrm").read_text()
+        for command in ("userdel", "groupdel"):
+            self.assertIn(f"{command} {user} ", postrm)
+
+
+class Vendored(unittest.TestCase):
+    """What packages contain of others."""
+
+    def test_a_missing_file_is_one_sentence_without_a_network(self):
+        """As tools/package fetches it: pip is not there, and neither is the file."""
+        script = (SOURCE / "tools/package").read_text()
+        fetch = re.search(r"^fetch\(\) \{\n.*?^\}\n", script, re.DOTALL | re.MULTILINE)[0]
+        with tempfile.TemporaryDirectory() as folder:
+            python = pathlib.Path(folder) / "python3"
+            python.write_text("#!/bin/sh\necho 'No route to host'\nexit 1\n")
+            python.chmod(0o755)
+            for content in (None, b"something else"):
+                downloads = pathlib.Path(folder) / "downloads"
+                downloads.mkdir(exist_ok=True)
+                if content:
+                    (downloads / "caproto-1.3.0-py3-none-any.whl").write_bytes(content)
+                run = f'set -eu; downloads={downloads}; fail() {{ echo "package: $1" >&2; exit 1; }}\n{fetch}fetch'
+                ran = subprocess.run(["sh", "-c", run], cwd=SOURCE, env={"PATH": f"{folder}:/usr/bin:/bin"}, capture_output=True, text=True, check=False)
+                self.assertEqual(ran.returncode, 1)
+                self.assertIn("No route to host", ran.stderr)
+                self.assertRegex(ran.stderr, r"package: caproto-\S+\.whl could not be downloaded .* into build/downloads \(sha256 [0-9a-f]{64}\)\n\Z")
+
+    def test_each_has_a_licence_in_the_copyright_file(self):
+        copyrights = (SOURCE / "debian/copyright").read_text()
+        for line in (SOURCE / "debian/vendored.sha256").read_text().splitlines():
+            self.assertRegex(line, r"^[0-9a-f]{64}  \S+-py3-none-any\.whl$", "sha256sum reads it, and it is for any machine")
+            self.assertIn(f"Files: debian/vendored/{line.split()[1].split('-')[0]}-*\n", copyrights)
 
 
 class Flash(unittest.TestCase):

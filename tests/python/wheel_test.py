@@ -22,6 +22,7 @@ TOP = HERE.parents[1]
 BUILD = pathlib.Path(os.environ["BUSHD_BUILD_DIR"])
 WHEEL = pathlib.Path(os.environ["BUSHD_WHEEL"])
 OLDEST, NEWEST = 11, 30  # Python 3.x: of requires-python, and farther than there are any
+EXTRA = r'; extra == ["\']\w+["\']$'
 ISOLATED = ["-I", "-B"]  # nothing but what is installed
 
 
@@ -59,18 +60,27 @@ class Wheel(unittest.TestCase):
         said = email.message_from_string(self.information("METADATA"))
         self.assertEqual((said["Name"], said["Version"], said["Requires-Python"]), ("bushd", version, f">=3.{OLDEST}"))
         for needed in said.get_all("Requires-Dist"):
-            self.assertRegex(needed, r'; extra == ["\']ophyd["\']$', "nobody needs it but who asks for bushd[ophyd]")
+            self.assertRegex(needed, EXTRA, "nobody needs it but who asks for an extra")
         self.assertEqual(self.text("bushd/version.py"), f'__version__ = "{version}"\n')
         self.assertEqual(WHEEL.name, f"bushd-{version}-py3-none-any.whl")
         self.assertIn("Root-Is-Purelib: true\nTag: py3-none-any\n", self.information("WHEEL"))
 
     def test_it_has_what_was_built_and_nothing_else(self):
-        package = BUILD / "lib/python/bushd"
-        built = {f"bushd/{path.relative_to(package)}" for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+        folder = BUILD / "lib/python"
+        paths = [path for package in ("bushd", "bushd_epics") for path in (folder / package).rglob("*") if path.is_file()]
+        built = {str(path.relative_to(folder)) for path in paths if "__pycache__" not in path.parts}
         self.assertEqual({file for file in self.files if ".dist-info/" not in file}, built)
         for file in built:
-            self.assertEqual(self.archive.read(file), (package.parent / file).read_bytes(), file)
-        self.assertIn("bushd/py.typed", built)
+            self.assertEqual(self.archive.read(file), (folder / file).read_bytes(), file)
+        self.assertLessEqual({"bushd/py.typed", "bushd_epics/main.py"}, built)
+
+    def test_the_extra_is_what_packages_contain(self):
+        """One version of caproto, whichever way somebody gets it."""
+        name, version = re.search(r" (caproto)-([0-9.]+)-", (TOP / "debian/vendored.sha256").read_text()).groups()
+        said = email.message_from_string(self.information("METADATA"))
+        self.assertEqual(said.get_all("Provides-Extra"), ["epics"])
+        self.assertEqual([re.sub(r"[ ()]", "", re.sub(EXTRA, "", needed)) for needed in said.get_all("Requires-Dist")], [f"{name}=={version}"])
+        self.assertIn("bushd-epics = bushd_epics.main:main", self.information("entry_points.txt"))
 
     def test_what_it_records_is_what_it_has(self):
         for line in self.information("RECORD").splitlines():
@@ -86,7 +96,8 @@ class Wheel(unittest.TestCase):
 
     def test_it_is_the_same_however_it_is_packed(self):
         with tempfile.TemporaryDirectory() as folder:
-            command = [TOP / "lib/python/make_wheel", BUILD / "lib/python/pyproject.toml", TOP / "LICENSE", BUILD / "lib/python/bushd", folder]
+            command = [TOP / "lib/python/make_wheel", BUILD / "lib/python/pyproject.toml", TOP / "LICENSE", folder,
+                       BUILD / "lib/python/bushd", BUILD / "lib/python/bushd_epics"]
             subprocess.run(command, check=True, capture_output=True, umask=0o077, env={**os.environ, "TZ": "Pacific/Auckland", "LC_ALL": "C"})
             self.assertEqual((pathlib.Path(folder) / WHEEL.name).read_bytes(), WHEEL.read_bytes())
 
@@ -123,9 +134,19 @@ class Installed(unittest.TestCase):
         for _, said in self.in_each(*ISOLATED, "-W", "error", "-c", program):
             self.assertEqual(said.split(), [version, version, "True", "True"])
 
+    def test_what_has_no_caproto_is_told_to_install_it(self):
+        program = "import sys; from bushd_epics.main import main; sys.exit(main(['--prefix', 'LAB:', '--list']))"
+        environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        for version, python in self.environments.items():
+            with self.subTest(python=version):
+                ran = subprocess.run([python, *ISOLATED, "-c", program], env=environment, capture_output=True, text=True, check=False)
+                self.assertEqual((ran.returncode, ran.stdout), (2, ""))
+                self.assertIn("caproto", ran.stderr)
+                self.assertEqual(len(ran.stderr.splitlines()), 1)
+
     def test_all_modules_are_without_warnings_of_a_newer_python(self):
-        program = ("import compileall, bushd, pathlib, sys; "
-                   "sys.exit(not compileall.compile_dir(pathlib.Path(bushd.__file__).parent, quiet=1, force=True))")
+        program = ("import compileall, bushd, bushd_epics, pathlib, sys; folders = [pathlib.Path(one.__file__).parent for one in (bushd, bushd_epics)]; "
+                   "sys.exit(not all(compileall.compile_dir(folder, quiet=1, force=True) for folder in folders))")
         for _, said in self.in_each("-I", "-W", "error", "-c", program):
             self.assertEqual(said, "")
 
