@@ -1,4 +1,5 @@
-# bushd-epics: motor records of EPICS. It needs caproto, which Debian does not have; nothing else of bushd needs it. In the build tree beside the client, for tests; installed in a folder of its own, where packages have caproto as well.
+# bushd-epics: motor records of EPICS. It needs caproto, which Debian does not have; nothing else of bushd needs it. In the build tree it is
+# beside the client, for tests; installed it has a folder of its own, where packages have caproto as well.
 set(epics_package ${CMAKE_CURRENT_BINARY_DIR}/bushd_epics)
 file(GLOB epics_modules CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/bushd_epics/*.py)
 set(epics_copies)

@@ -167,6 +167,15 @@ class Vendored(unittest.TestCase):
                 self.assertIn("No route to host", ran.stderr)
                 self.assertRegex(ran.stderr, r"package: caproto-\S+\.whl could not be downloaded .* into build/downloads \(sha256 [0-9a-f]{64}\)\n\Z")
 
+    def test_laboratories_programs_are_tried_with_the_same_file(self):
+        tried = (SOURCE / "tests/lab_clients/requirements.txt").read_text()
+        for line in (SOURCE / "debian/vendored.sha256").read_text().splitlines():
+            digest, file = line.split()
+            name, version = file.split("-")[:2]
+            listed = re.search(rf"^{name}==(\S+)((?:.*\\\n)*.*)$", tried, re.MULTILINE)
+            self.assertEqual(listed[1], version)
+            self.assertIn(f"--hash=sha256:{digest}", listed[2])
+
     def test_each_has_a_licence_in_the_copyright_file(self):
         copyrights = (SOURCE / "debian/copyright").read_text()
         for line in (SOURCE / "debian/vendored.sha256").read_text().splitlines():
