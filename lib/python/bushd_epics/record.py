@@ -32,6 +32,7 @@ class Record(Motions):
     def __init__(self, name: str, is_axis: bool = False, set_times_out_s: float = SET_TIMES_OUT_S) -> None:
         super().__init__(name, is_axis)
         self._asked: dict[int, list[Any]] = {}  # puts that wait for what is no motion
+        self._limits_asked: tuple[int, tuple[float, ...]] | None = None
         self._set_times_out_s = set_times_out_s
         self._set_until: float | None = None
         self._set_by: Any = None
@@ -123,12 +124,13 @@ class Record(Motions):
 
     def _put_target(self, field: str, value: float, by: Putter, now: float) -> None:
         target = self._user_target(field, value)
+        if self.values["SET"] != 1:
+            self.fall()
         self.post(field, value, always=field in ("RLV", "TWF", "TWR"))
         if field in ("RLV", "TWF", "TWR"):
             self.post(field, 0.0 if field == "RLV" else 0)
         if self.values["SET"] == 1:
             return self._set_position(field, target, by, now)
-        self.fall()
         reason = self._why_not(target)
         if reason:
             return self.refuse(by.token, reason, now)
@@ -316,15 +318,19 @@ class Record(Motions):
         self._configure({"direction": "negative" if int(value) else "positive"}, by)
 
     def _put_limit(self, field: str, value: Value, by: Putter, now: float) -> None:
-        """bushd has them on the dial; both at 0 are none."""
+        """bushd has them on the dial; both at 0 are none. One that is put while another is still on its way leaves that as it was put."""
         scale = self.seen.scale
-        limits = {name: self.number(name) for name in ("LLM", "HLM", "DLLM", "DHLM")} | {field: float(value)}
-        user, dial = (limits["LLM"], limits["HLM"]), (limits["DLLM"], limits["DHLM"])
-        if field in ("HLM", "LLM"):
-            dial = (0.0, 0.0) if user == (0.0, 0.0) else tuple(sorted(map(scale.dial, user)))
-        if dial[0] > dial[1] or user[0] > user[1]:
+        dial = list(self._limits_asked[1] if self._limits_asked is not None else (self.number("DLLM"), self.number("DHLM")))
+        is_high = field in ("HLM", "DHLM")
+        bound = float(value) if field.startswith("D") else scale.dial(float(value))
+        if field in ("HLM", "LLM") and dial == [0.0, 0.0]:  # none: the other one is 0 on the user's scale, as it is shown
+            dial = [scale.dial(0.0), scale.dial(0.0)]
+        dial[is_high if field.startswith("D") else is_high != scale.negative] = bound
+        if dial[0] > dial[1]:
             return self._reject(field, by, "the low limit would be above the high one")
-        self._configure({"soft_limits": None if dial == (0.0, 0.0) else dial}, by)
+        none = dial == [0.0, 0.0] or [scale.user(one) for one in dial] == [0.0, 0.0]
+        number = self._configure({"soft_limits": None if none else tuple(dial)}, by)
+        self._limits_asked = (number, tuple(dial))
 
     def _put_enable(self, field: str, value: Value, by: Putter, now: float) -> None:
         number = self.next_number()
@@ -337,14 +343,16 @@ class Record(Motions):
         self._asked[number] = [by.token]
         self.ask(events.Hold(number, by.who, on))
 
-    def _configure(self, changes: dict[str, Any], by: Putter) -> None:
+    def _configure(self, changes: dict[str, Any], by: Putter) -> int:
         number = self.next_number()
         self._asked[number] = [by.token]
-        self.ask(events.Configure(number, by.who, tuple(changes.items())))
+        return self.ask(events.Configure(number, by.who, tuple(changes.items())))
 
     # -- answers
 
     def _answer(self, number: int, error: str) -> None:
+        if self._limits_asked is not None and self._limits_asked[0] == number:
+            self._limits_asked = None
         tokens = self._asked.pop(number, None)
         if tokens is not None:
             self.done(tokens, error)
