@@ -73,6 +73,8 @@ class Circuit(caproto_server.VirtualCircuit):
 
     def _answer(self, command: Any, channel: Any, error: str) -> None:
         if isinstance(command, caproto.WriteNotifyRequest):
+            if error and not self.context.answers_failed_moves and caproto.parse_record_field(channel.name).field in (None, "", "VAL"):
+                return
             status = caproto.CAStatus.ECA_PUTFAIL if error else caproto.CAStatus.ECA_NORMAL
             response = channel.write(
                 ioid=command.ioid, data_type=command.data_type, data_count=command.data_count, status=status.value.code_with_severity

@@ -42,6 +42,10 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--names", metavar="FILE", help="names.toml: other names of motors, and which hosts may put")
     parser.add_argument("--read-only", action="store_true", help="nobody may put")
+    parser.add_argument(
+        "--leave-failed-moves-unanswered", action="store_true",
+        help="for ophyd-async 0.21, which takes a failed put for a good one: it runs into its timeout instead",
+    )
     parser.add_argument("--interface", action="append", metavar="ADDRESS", help="to listen at; may be repeated. Default: all")
     parser.add_argument("--list", action="store_true", help="print the names of all variables, and end")
     options = parser.parse_args(arguments)
@@ -56,6 +60,7 @@ async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
     from .server import Server
 
     server = Server(options.prefix, Access(names.hosts, options.read_only), options.interface)
+    server.answers_failed_moves = not options.leave_failed_moves_unanswered
     daemons = []
     for given in options.daemon or [""]:
         name, equals, socket = given.rpartition("=") if re.match(r"[A-Za-z0-9_\-]+=", given) else ("", "", given)

@@ -101,6 +101,8 @@ class Server(Context):
         super().__init__({}, interfaces)
         self.prefix = prefix
         self.access = access
+        self.answers_failed_moves = True
+        self._all: list[Daemon] = []
         self._daemons: dict[Record, Daemon] = {}
         self._pages: dict[str, Pages] = {}
         self._of: dict[Record, Pages] = {}
@@ -109,7 +111,7 @@ class Server(Context):
         self._work: set[asyncio.Task[None]] = set()
 
     def add_daemon(self, daemon: Daemon) -> None:
-        self._all = [*getattr(self, "_all", []), daemon]
+        self._all.append(daemon)
 
     def make_common(self) -> None:
         """Of all motors."""
