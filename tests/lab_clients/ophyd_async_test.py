@@ -2,6 +2,7 @@
 """ophyd-async's Motor and aioca, which is below it, against the real programs."""
 
 import asyncio
+import concurrent.futures
 import unittest
 
 from lab import LabTest
@@ -9,7 +10,9 @@ from lab import LabTest
 
 class OphydAsync(LabTest):
     def run_async(self, work):
-        return asyncio.run(asyncio.wait_for(work(), 100))
+        """In a thread of its own: libca has one context in each, and pyepics has that of the main one."""
+        with concurrent.futures.ThreadPoolExecutor(1) as thread:
+            return thread.submit(lambda: asyncio.run(asyncio.wait_for(work(), 100))).result()
 
     async def motor(self, name):
         from ophyd_async.core import init_devices
