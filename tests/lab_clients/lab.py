@@ -18,7 +18,6 @@ os.environ.update(
 )
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 
-import epics
 from caproto.sync import client as caproto_client
 from rig import GIVE_UP_S, EndToEndTest, Trace
 
@@ -38,6 +37,13 @@ def configuration(folder, theta=""):
         lines += [f'unit = "deg"\nsteps_per_unit = {STEPS}\nsoft_limits = [-500, 500]']
         lines += [theta] if name == "theta" else []
     return "\n".join(lines) + "\n"
+
+
+def pyepics():
+    """Imported when it is used: where it is, ophyd-async shares its context of libca, which has one for each thread."""
+    import epics
+
+    return epics
 
 
 class LabTest(EndToEndTest):
@@ -61,12 +67,12 @@ class LabTest(EndToEndTest):
     # -- what clients see
 
     def get(self, name, **how):
-        value = epics.caget(f"LAB:{name}", timeout=10, **how)
+        value = pyepics().caget(f"LAB:{name}", timeout=10, **how)
         self.assertIsNotNone(value, name)
         return value
 
     def put(self, name, value, wait=True):
-        self.assertIsNotNone(epics.caput(f"LAB:{name}", value, wait=wait, timeout=GIVE_UP_S), name)
+        self.assertIsNotNone(pyepics().caput(f"LAB:{name}", value, wait=wait, timeout=GIVE_UP_S), name)
 
     def put_fails(self, name, value):
         """By caproto, which tells how a put has been answered."""
@@ -101,9 +107,9 @@ class Heard:
         self._heard = []
         self._connected = set()
         self._names = names
-        self._variables = [
-            epics.PV(f"LAB:{name}", auto_monitor=epics.dbr.DBE_VALUE | epics.dbr.DBE_ALARM, callback=self._hear, form="time") for name in names
-        ]
+        epics = pyepics()
+        events = epics.dbr.DBE_VALUE | epics.dbr.DBE_ALARM
+        self._variables = [epics.PV(f"LAB:{name}", auto_monitor=events, callback=self._hear, form="time") for name in names]
 
     def _hear(self, pvname, value, severity, **_):
         name = pvname.removeprefix("LAB:")

@@ -2,7 +2,6 @@
 """ophyd-async's Motor and aioca, which is below it, against the real programs."""
 
 import asyncio
-import concurrent.futures
 import unittest
 
 from lab import LabTest
@@ -10,9 +9,7 @@ from lab import LabTest
 
 class OphydAsync(LabTest):
     def run_async(self, work):
-        """In a thread of its own: libca has one context in each, and pyepics has that of the main one."""
-        with concurrent.futures.ThreadPoolExecutor(1) as thread:
-            return thread.submit(lambda: asyncio.run(asyncio.wait_for(work(), 100))).result()
+        return asyncio.run(asyncio.wait_for(work(), 100))
 
     async def motor(self, name):
         from ophyd_async.core import init_devices
