@@ -52,8 +52,11 @@ class Ophyd(LabTest):
         theta.set_current_position(10.0)
         self.wait_until("the position", lambda: theta.position == 10.0)
         self.assertEqual(self.get("theta.OFF"), 10.0)
+        heard = self.watch("theta.LLM", "theta.HLM")
         theta.set_lim(-5, 15)
-        self.wait_until("the limits", lambda: theta.limits == (-5.0, 15.0))
+        self.wait_until("the limits", lambda: (heard.values("LLM"), heard.values("HLM")) == ([-5.0], [15.0]))
+        control = theta.user_setpoint._read_pv.get_ctrlvars()
+        self.assertEqual((control["lower_ctrl_limit"], control["upper_ctrl_limit"]), (-5.0, 15.0))
         with self.assertRaises(Exception):
             theta.move(16.0)
         self.end_all()
