@@ -10,7 +10,7 @@ from lab import LabTest
 class Faults(LabTest):
     def test_the_bridge_is_killed_and_comes_back(self):
         self.bring_up_lab()
-        self.put("theta.VAL", 60.0, wait=False)
+        self.put("theta.VAL", 400.0, wait=False)
         self.wait_for("theta.RBV", lambda rbv: rbv > 2)
         self.bridge.send(signal.SIGKILL)
         self.bridge.process.wait()
@@ -18,10 +18,10 @@ class Faults(LabTest):
         # The daemon has gone on with the move: it is shown as one that goes on.
         self.assertEqual(self.get("theta.DMOV"), 0)
         self.wait_for("theta.DMOV", lambda dmov: dmov == 1)
-        self.assertEqual((self.get("theta.RBV"), self.get("theta.VAL"), self.get("theta.SEVR")), (60.0, 60.0, 0))
-        self.put("theta.VAL", 61.0)
+        self.assertEqual((self.get("theta.RBV"), self.get("theta.VAL"), self.get("theta.SEVR")), (400.0, 400.0, 0))
+        self.put("theta.VAL", 401.0)
         self.end_all()
-        self.assertEqual(self.steps_made("theta"), 6100)
+        self.assertEqual(self.steps_made("theta"), 40100)
 
     def test_the_daemon_is_killed_at_rest(self):
         self.bring_up_lab()
