@@ -190,7 +190,8 @@ class Server(Context):
 
     def _put_all_stop(self, value: Value, by: Putter) -> None:
         if not value:
-            return by.token("")
+            by.token("")
+            return
         self._start(self._stop_all(by))
 
     async def _stop_all(self, by: Putter) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 from . import alarms
@@ -183,6 +182,3 @@ def _long(value: int) -> int:
     """As much as the 32 bits of Channel Access hold."""
     return max(-(2**31), min(2**31 - 1, value))
 
-
-def changed(seen: Seen, **values: object) -> Seen:
-    return dataclasses.replace(seen, **values)  # type: ignore[arg-type]
