@@ -76,7 +76,7 @@ class LabTest(EndToEndTest):
 
     def put_fails(self, name, value):
         """By caproto, which tells how a put has been answered."""
-        response = caproto_client.write(f"LAB:{name}", value, notify=True, timeout=GIVE_UP_S)
+        response = caproto_client.write(f"LAB:{name}", value, notify=True, timeout=GIVE_UP_S, repeater=False)
         return response.status.name != "ECA_NORMAL"
 
     def wait_for(self, name, holds):
