@@ -222,11 +222,11 @@ class Blocking(PythonTest):
             seen = []
             for status in client.watch(every_s=0.01):
                 seen.append(status["a0"].position_steps)
-                if seen[-1] == before + 1000 and not status["a0"].moving:
+                if seen[-1] != before and not status["a0"].moving:
                     break
             self.assertEqual(seen, sorted(seen))
             self.assertGreater(len(set(seen)), 3)
-            motion.wait()
+            self.assertEqual(seen[-1], before + 1000, motion.wait(check=False))
 
     def test_emergency_stop_and_drivers(self):
         self.bring_up()
