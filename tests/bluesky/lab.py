@@ -1,6 +1,7 @@
 """What the tests with Bluesky share: the real programs, a RunEngine as it comes, and what the simulator's trace says of where motors stood.
 
-They need an environment with requirements.txt. $BUSHD_BLUESKY_PYTHON is its Python; else it is in build/bluesky. Without one they are skipped.
+They need the environment that tools/setup --lab-clients makes; $BUSHD_BLUESKY_PYTHON is the Python of another one. Without one they are
+skipped.
 """
 
 import asyncio
@@ -13,9 +14,9 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 from rig import TABLE_RUNS, TOP, EndToEndTest
 
-PYTHON = pathlib.Path(os.environ.get("BUSHD_BLUESKY_PYTHON", TOP / "build/bluesky/bin/python"))
-WITHOUT = ("no ophyd-async and bluesky: python3 -m venv build/bluesky && build/bluesky/bin/pip install -r tests/bluesky/requirements.txt; "
-           "the Python of another environment is named in $BUSHD_BLUESKY_PYTHON")
+PYTHON = pathlib.Path(os.environ.get("BUSHD_BLUESKY_PYTHON", TOP / "build/lab-clients/bin/python"))
+WITHOUT = ("no ophyd-async and bluesky: run tools/setup --lab-clients, or name the Python of another environment in "
+           "$BUSHD_BLUESKY_PYTHON")
 
 # The longest delay between steps of the tables is 10 ms, and a move begins no sooner than 20 ms after it was asked for.
 REST_NS = 15_000_000

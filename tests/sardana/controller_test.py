@@ -1,8 +1,8 @@
 """tools/examples/sardana/BushdCtrl.py in the pool of Sardana, against the real daemon.
 
 The pool is Sardana's own, with its motions and states, within this process: no Tango database and no Tango server are needed, and none of
-what they add (attributes, events, macros) is tested here. $BUSHD_SARDANA_PYTHON is the Python of an environment with requirements.txt; else
-it is in build/sardana. Without one the tests are skipped."""
+what they add (attributes, events, macros) is tested here. It needs the environment that tools/setup --lab-clients makes;
+$BUSHD_SARDANA_PYTHON is the Python of another one. Without one the tests are skipped."""
 
 import logging
 import os
@@ -15,8 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 from rig import TOP, EndToEndTest
 
 PYTHON = pathlib.Path(os.environ.get("BUSHD_SARDANA_PYTHON", TOP / "build/sardana/bin/python"))
-WITHOUT = ("no Sardana: python3 -m venv build/sardana && build/sardana/bin/pip install -r tests/sardana/requirements.txt; "
-           "the Python of another environment is named in $BUSHD_SARDANA_PYTHON")
+WITHOUT = "no Sardana: run tools/setup --lab-clients, or name the Python of another environment in $BUSHD_SARDANA_PYTHON"
 NAMES = ("a0", "b1", "a3")
 FAR = 3000
 
