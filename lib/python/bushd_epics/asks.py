@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 import bushd
@@ -16,9 +16,12 @@ from .deferred import Waiting
 from .events import End
 from .people import People
 from .record import Record
+from .turns import Turn, Turns
 
 LOG = logging.getLogger("bushd-epics")
 JOG_IS_LOOKED_AT_S = 0.02
+NEVER_BEGAN = "stopped before it began"
+MOTIONS = (events.Home, events.Jog, events.Resume)  # beside moves
 
 _ENDS = {
     model.Outcome.DONE: End.REACHED,
@@ -39,63 +42,95 @@ class Asks:
         self._people = people
         self._names = names
         self._deliver = deliver
+        self._turns = Turns()
         self._tasks: set[asyncio.Task[None]] = set()
-        self._jogs: dict[int, bushd.aio.Jog] = {}
+        self._jogs: dict[int, bushd.aio.Jog] = {}  # that the daemon has accepted
+        self._open_jogs: set[int] = set()  # that were asked for
+        self._let_go: set[int] = set()  # of these, those that were ended before they were accepted
 
     def start(self, record: Record, ask: events.Ask) -> None:
-        """In the order in which they are asked for: each is sent before its task first waits."""
-        if isinstance(ask, events.Move):
-            self.start_group([(record, ask)])
-        else:
-            self._spawn(self._carry_out(record, ask))
+        """For each record in the order in which it is called; a stop overtakes what has not been sent."""
+        match ask:
+            case events.Move():
+                self.start_group([(record, ask)])
+            case events.Stop():
+                self._spawn(self._stop_one(record, ask, self._stop([record], _who(ask), lambda client: self._stop_and_look(client, record))))
+            case events.EndJog():
+                self._spawn(self._end_jog(record, ask))
+            case _:
+                if isinstance(ask, events.Jog):
+                    self._open_jogs.add(ask.number)
+                self._spawn(self._carry_out(self._turns.take(_who(ask), [record]), record, ask))
 
     def start_group(self, group: list[Waiting]) -> None:
-        self._spawn(self._move(group))
+        """Moves that are asked for as one."""
+        self._spawn(self._move(self._turns.take(_who(group[0][1]), [record for record, _ in group]), group))
+
+    def stop_all(self, who: str) -> asyncio.Task[None]:
+        """Raises BushdError when it is awaited."""
+
+        async def stop(client: bushd.aio.Client) -> None:
+            await client.stop()
+
+        return self._spawn(self._stop(list(self._names), who, stop))
 
     async def finish(self) -> None:
         """Once nothing is under way any more."""
         if self._tasks:
             await asyncio.wait(set(self._tasks))
 
-    def _spawn(self, coroutine: Any) -> None:
+    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.get_running_loop().create_task(coroutine)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        return task
 
     # -- moves
 
-    async def _move(self, group: list[Waiting]) -> None:
+    async def _move(self, turn: Turn, group: list[Waiting]) -> None:
         who = _who(group[0][1])
         self._people.begin(who)
         try:
-            await self._ask_move(who, group)
-        finally:
-            self._people.end(who)
-
-    async def _ask_move(self, who: str, group: list[Waiting]) -> None:
-        targets = {self._names[record]: ask.to for record, ask in group}
-        sent = False
-        try:
-            client = await self._people.client(who)
-            sent = True
-            motion = await client.move(targets, speed=group[0][1].speed, wait=False)
+            await self._ask_move(turn, who, group)
         except bushd.BushdError as error:
             for record, ask in group:
-                self._failed(record, ask, error, sent)
-            return
+                self._failed(record, ask, error, turn.was_sent)
         except (TypeError, ValueError) as error:
             for record, ask in group:
                 self._tell(record, record.refused, ask.number, str(error))
+        except Exception as error:
+            LOG.exception("a move is given up")
+            for record, ask in group:
+                self._tell(record, record.lost, ask.number, f"bushd-epics has failed: {error}")
+        finally:
+            turn.taken()
+            self._people.end(who)
+
+    async def _ask_move(self, turn: Turn, who: str, group: list[Waiting]) -> None:
+        await turn.come()
+        client = await self._people.client(who)
+        for record, ask in [one for one in group if one[0] in turn.stopped]:
+            group.remove((record, ask))
+            self._tell(record, record.refused, ask.number, NEVER_BEGAN)
+        if not group:
             return
+        turn.stopped.clear()
+        turn.sent()
+        targets = {self._names[record]: ask.to for record, ask in group}
+        motion = await client.move(targets, speed=group[0][1].speed, wait=False)
         for record, ask in group:
             self._tell(record, record.accepted, ask.number)
-        try:
-            result = await motion.wait(check=False)
-        except bushd.BushdError as error:
-            for record, ask in group:
-                self._failed(record, ask, error, True)
-            return
+        await self._stop_again(turn, client)
+        turn.taken()
+        result = await motion.wait(check=False)
         await self._move_ended(client, group, result)
+
+    async def _stop_again(self, turn: Turn, client: bushd.aio.Client) -> None:
+        """What was sent meanwhile to stop it may have overtaken it."""
+        again: set[Any] = set()
+        while late := turn.stopped - again:
+            again |= late
+            await client.stop(*sorted(self._names[record] for record in late), wait=False, check=False)
 
     async def _move_ended(self, client: bushd.aio.Client, group: list[Waiting], result: model.MoveResult) -> None:
         status = None
@@ -109,42 +144,99 @@ class Asks:
                 self._observe(record, status)
             self._tell(record, record.ended, ask.number, _ENDS[one.outcome], "" if one.outcome.succeeded else result.reason)
 
-    # -- all else
+    # -- what ends motions
 
-    async def _carry_out(self, record: Record, ask: events.Ask) -> None:
-        who = _who(ask)
-        self._people.begin(who)
-        sent = False
+    def _stop(self, records: list[Record], who: str, send: Callable[[bushd.aio.Client], Awaitable[None]]) -> Coroutine[Any, Any, None]:
+        """Over a connection that is ready, whosever: one that has to be made first would let motors go on meanwhile."""
+        client, own = self._people.ready(who)
+        if client is not None and not own:
+            LOG.info("stopped by %s, over another connection", who)
+        by = who if own or client is None else None
+        self._turns.stop(records, by)
+        turn = self._turns.take(by, records)
+
+        async def goes() -> None:
+            self._people.begin(who)
+            try:
+                over = client or await self._people.client(who)
+                turn.sent()
+                await send(over)
+            finally:
+                turn.taken()
+                self._people.end(who)
+
+        return goes()
+
+    async def _stop_one(self, record: Record, ask: events.Ask, stopping: Coroutine[Any, Any, None]) -> None:
         try:
-            client = await self._people.client(who)
-            sent = True
-            outcome, reason = await self._ask(client, record, ask)
-            self._observe(record, await _status(client))
-            self._tell(record, record.ended, ask.number, outcome, reason)
+            await stopping
+            self._tell(record, record.ended, ask.number, End.REACHED, "")
         except bushd.RequestFailed as error:
-            self._observe(record, await _status(client))
             self._tell(record, record.ended, ask.number, _ENDS[error.result.outcome], error.result.reason)
         except bushd.BushdError as error:
-            self._failed(record, ask, error, sent)
+            self._failed(record, ask, error, False)
+
+    async def _stop_and_look(self, client: bushd.aio.Client, record: Record) -> None:
+        await client.stop(self._names[record])
+        self._observe(record, await _status(client))
+
+    async def _end_jog(self, record: Record, ask: events.EndJog) -> None:
+        """A jog whose beginning is not answered yet ends as soon as it is, or never begins."""
+        try:
+            jog = self._jogs.get(ask.jog)
+            if jog is not None:
+                await jog.end()
+            elif ask.jog in self._open_jogs:
+                self._let_go.add(ask.jog)
+            self._tell(record, record.ended, ask.number, End.REACHED, "")
+        except bushd.BushdError as error:
+            self._failed(record, ask, error, True)
+
+    # -- all else
+
+    async def _carry_out(self, turn: Turn, record: Record, ask: events.Ask) -> None:
+        who = _who(ask)
+        self._people.begin(who)
+        try:
+            await turn.come()
+            client = await self._people.client(who)
+            if isinstance(ask, MOTIONS) and record in turn.stopped:
+                return self._tell(record, record.refused, ask.number, NEVER_BEGAN)
+            if ask.number in self._let_go:
+                return self._tell(record, record.ended, ask.number, End.STOPPED, "")
+            turn.stopped.clear()
+            turn.sent()
+            try:
+                outcome, reason = await self._ask(turn, client, record, ask)
+            except bushd.RequestFailed as error:
+                outcome, reason = _ENDS[error.result.outcome], error.result.reason
+            turn.taken()
+            self._observe(record, await _status(client))
+            self._tell(record, record.ended, ask.number, outcome, reason)
+        except bushd.BushdError as error:
+            self._failed(record, ask, error, turn.was_sent)
         except (TypeError, ValueError) as error:
             self._tell(record, record.refused, ask.number, str(error))
+        except Exception as error:
+            LOG.exception("%s: what was asked for is given up", record.name)
+            self._tell(record, record.lost, ask.number, f"bushd-epics has failed: {error}")
         finally:
+            self._open_jogs.discard(ask.number)
+            self._let_go.discard(ask.number)
+            turn.taken()
             self._people.end(who)
 
-    async def _ask(self, client: bushd.aio.Client, record: Record, ask: events.Ask) -> tuple[str, str]:
+    async def _ask(self, turn: Turn, client: bushd.aio.Client, record: Record, ask: events.Ask) -> tuple[str, str]:
         name = self._names[record]
         match ask:
             case events.Jog():
-                return await self._jog(client, record, name, ask)
-            case events.EndJog():
-                if ask.jog in self._jogs:
-                    await self._jogs[ask.jog].end()
+                return await self._jog(turn, client, record, name, ask)
             case events.Home():
                 motion = await client.home(name, speed=ask.speed, wait=False)
                 self._tell(record, record.accepted, ask.number)
+                await self._stop_again(turn, client)
+                turn.taken()
                 return _end_of(await motion.wait(check=False), name)
-            case events.Stop():
-                await client.stop(name)
             case events.Pause():
                 await client.pause(name)
             case events.Resume():
@@ -159,12 +251,15 @@ class Asks:
                 await (client.hold(name) if ask.on else client.release(name))
         return End.REACHED, ""
 
-    async def _jog(self, client: bushd.aio.Client, record: Record, name: str, ask: events.Jog) -> tuple[str, str]:
+    async def _jog(self, turn: Turn, client: bushd.aio.Client, record: Record, name: str, ask: events.Jog) -> tuple[str, str]:
         """Its signs of life are this process's; `EndJog` comes when the client has gone."""
         jog = await client.jog(name, ask.speed, check=False).begin()
         self._jogs[ask.number] = jog
         try:
             self._tell(record, record.accepted, ask.number)
+            if turn.stopped or ask.number in self._let_go:
+                await jog.end()
+            turn.taken()
             while not jog.done:
                 await asyncio.sleep(JOG_IS_LOOKED_AT_S)
             return _end_of(jog.result, name)

@@ -22,6 +22,7 @@ LOG = logging.getLogger("bushd-epics")
 
 TELLS_EVERY_S = 0.1  # 10 Hz a field
 AGAIN_AFTER_S = 0.25
+GONE = "not in bushd.toml any more"
 SILENT_AFTER_S = 2.0  # at rest states come twice a second
 LOOKS_AT_SPEEDS_EVERY_S = 10.0
 
@@ -41,7 +42,7 @@ class Daemon:
         self._socket = socket
         self._record_name = record_name
         self._shown = shown
-        self._people = People(socket)
+        self._people = People(lambda program: connect(socket, program))
         self.records: dict[str, Record] = {}  # by motor
         self._names: dict[Record, str] = {}
         self._last: dict[str, model.Motor] = {}
@@ -51,44 +52,55 @@ class Daemon:
         self.deferred = Deferred()
         self._heard_at = 0.0
         self._silent = False
-        self.appeared = asyncio.Event()
+        self.appeared = asyncio.Event()  # all motors, with their speeds
+        self.told = asyncio.Event()  # that, or why not
+        self.why = ""  # nothing is heard of it; "": it is
 
     async def run(self) -> None:
         """Until it is cancelled."""
         watching = asyncio.create_task(self._watch_silence())
-        why = ""
         try:
             while True:
                 try:
                     await self._follow()
+                    self.why = ""
                 except bushd.BushdError as error:
-                    if str(error) != why:
-                        why = str(error)
-                        LOG.warning("%s", why)
-                    self._fall_silent(why)
-                    await self._people.close()
-                else:
-                    why = ""
+                    if str(error) != self.why:
+                        LOG.warning("%s", error)
+                    await self._lose(str(error))
+                except Exception as error:
+                    LOG.exception("what bushd has told cannot be shown")
+                    await self._lose(f"bushd-epics has failed: {error}")
                 await asyncio.sleep(AGAIN_AFTER_S)
         finally:
             watching.cancel()
             await self._people.close()
 
+    async def _lose(self, why: str) -> None:
+        self.why = why
+        self._fall_silent(why)
+        self.told.set()
+        await self._people.close()
+
     async def _follow(self) -> None:
         client = await connect(self._socket, "bushd-epics")
+        looking: asyncio.Task[None] | None = None
         async with client:
+            self._people.spare = client
             self._speeds_of.clear()
-            looked_at = float("-inf")
-            async for status in client.watch(TELLS_EVERY_S):
-                now = _now()
-                self._heard_at = now
-                self._take(status, now)
-                if now >= looked_at + LOOKS_AT_SPEEDS_EVERY_S:
-                    looked_at = now
-                    await self._look_at_speeds(client, status)
-                if not self.appeared.is_set():
-                    LOG.info("%d motors and axes", len(self.records))
-                    self.appeared.set()
+            look_at = float("-inf")
+            try:
+                async for status in client.watch(TELLS_EVERY_S):
+                    now = _now()
+                    self._heard_at = now
+                    self._take(status, now)
+                    if now >= look_at and (looking is None or looking.done()):
+                        look_at = now + LOOKS_AT_SPEEDS_EVERY_S
+                        looking = asyncio.create_task(self._look_at_speeds(client, status))
+            finally:
+                self._people.spare = None
+                if looking is not None:
+                    looking.cancel()
 
     def _take(self, status: model.Status, now: float) -> None:
         self._silent = False
@@ -103,6 +115,9 @@ class Daemon:
                 record.observe(motor.seen(told), now)
                 self._shown.held(record, told.held)
                 self.deliver(record)
+        for name in self.records.keys() - status.motors.keys():
+            self._last.pop(name, None)
+            self._silence(self.records[name], GONE)
 
     def _add(self, name: str, is_axis: bool) -> Record | None:
         shown_as = self._record_name(name)
@@ -125,14 +140,32 @@ class Daemon:
     def _fall_silent(self, why: str) -> None:
         self._silent = True
         for record in self.records.values():
+            self._silence(record, why)
+
+    def _silence(self, record: Record, why: str) -> None:
+        if record.silent != why:
             record.fall_silent(why, _now())
             self.deliver(record)
 
     # -- speeds
 
     async def _look_at_speeds(self, client: bushd.aio.Client, status: model.Status) -> None:
+        """Beside the states: many motors have many tables, and positions do not wait for these."""
+        try:
+            await self._ask_speeds(client, status)
+        except bushd.BushdError as error:
+            LOG.warning("how fast motors go is not known: %s", error)
+        except Exception:
+            LOG.exception("how fast motors go is not known")
+        if not self.appeared.is_set():
+            LOG.info("%d motors and axes", len(self.records))
+            self.appeared.set()
+            self.told.set()
+
+    async def _ask_speeds(self, client: bushd.aio.Client, status: model.Status) -> None:
         """Tables and settings of motors; of axes what a move of them would be."""
         configuration = await client.config()
+        entries = await client.tables.list()
         settings = {(one.motor, one.key): one.value for one in configuration.settings}
         for name, record in self.records.items():
             told = status.motors.get(name)
@@ -143,7 +176,10 @@ class Daemon:
             if self._speeds_of.get(name) == key:
                 continue
             try:
-                speeds = await self._axis_speeds(client, told) if record.is_axis else await self._motor_speeds(client, told, limit, share)
+                if record.is_axis:
+                    speeds = await self._axis_speeds(client, told)
+                else:
+                    speeds = await self._motor_speeds(client, told, entries, limit, share)
             except bushd.BushdError as error:
                 LOG.warning("%s: how fast it goes is not known: %s", record.name, error)
                 continue
@@ -151,10 +187,12 @@ class Daemon:
             record.speeds(speeds)
             self.deliver(record)
 
-    async def _motor_speeds(self, client: bushd.aio.Client, told: model.Motor, limit: str, share: str) -> Speeds:
+    @staticmethod
+    async def _motor_speeds(
+        client: bushd.aio.Client, told: model.Motor, entries: tuple[model.TableEntry, ...], limit: str, share: str
+    ) -> Speeds:
         name = f"{told.table.name}@{told.table.revision}" if told.table.revision else told.table.name
         table = await client.tables.get(name)
-        entries = await client.tables.list()
         entry = next(one for one in entries if one.name == table.name)
         step = motor.seen(told).scale.resolution
         return motor.speeds(table, entry, step, None if limit == "none" else float(limit), float(share or 1))
@@ -201,7 +239,7 @@ class Daemon:
     def _drop_deferred(self, record: Record) -> None:
         dropped = self.deferred.drop(record)
         if dropped is not None:
-            record.ended(dropped.number, End.STOPPED, "stopped before the deferred moves began", _now())
+            record.refused(dropped.number, "stopped before the deferred moves began", _now())
 
     def defer(self, on: bool) -> None:
         self.deferred.on = on
@@ -210,11 +248,13 @@ class Daemon:
                 self._asks.start_group(group)
 
     async def stop_all(self, who: str) -> None:
-        client = await self._people.client(who)
+        """The daemon first; then what records still have in mind."""
+        stopping = self._asks.stop_all(who)
         for record in self.records.values():
             self._drop_deferred(record)
+            record.halt(who, _now())
             self.deliver(record)
-        await client.stop()
+        await stopping
 
     def _set_timer(self, record: Record) -> None:
         timer = self._timers.pop(record, None)
@@ -229,7 +269,6 @@ class Daemon:
         self._timers.pop(record, None)
         record.tick(_now())
         self.deliver(record)
-
 
 
 def _now() -> float:
