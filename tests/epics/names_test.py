@@ -91,5 +91,25 @@ class Package(unittest.TestCase):
         self.assertNotIn("caproto", sys.modules)
 
 
+class Lookups(unittest.TestCase):
+    def test_a_name_that_was_not_found_may_put_once_it_is(self):
+        known = {}
+
+        def look_up(name):
+            if name not in known:
+                raise OSError("Name or service not known")
+            return known[name]
+
+        with self.assertLogs("bushd-epics", "WARNING") as log:
+            access = Access(["console1", "10.0.0.1"], look_up=look_up)
+        self.assertIn("write its address", log.output[0])
+        self.assertEqual((access.unknown, access.may_put("10.0.0.7"), access.may_put("10.0.0.1")), (["console1"], False, True))
+        with self.assertNoLogs("bushd-epics"):
+            self.assertFalse(access.look_up())
+        known["console1"] = ["10.0.0.7"]
+        self.assertTrue(access.look_up())
+        self.assertEqual((access.unknown, access.may_put("10.0.0.7")), ([], True))
+
+
 if __name__ == "__main__":
     unittest.main()

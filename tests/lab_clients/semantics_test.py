@@ -7,7 +7,7 @@ import sys
 import time
 import unittest
 
-from lab import LabTest
+from lab import LabTest, pyepics
 
 
 class Edges(LabTest):
@@ -163,6 +163,51 @@ class Clients(LabTest):
         stands = self.get("theta.RBV")
         self.end_all()
         self.assertEqual(self.steps_made("theta"), round(stands * 100))
+
+    def test_a_jog_ends_unless_it_is_put_again(self):
+        self.bring_up_lab(bridge=["--longest-jog-s", "2"])
+        heard = self.watch("theta.DMOV")
+        begins = time.monotonic()
+        self.put("theta.JOGF", 1)
+        time.sleep(1.2)
+        self.put("theta.JOGF", 1)
+        self.wait_for("theta.DMOV", lambda dmov: dmov == 1)
+        self.assertGreater(time.monotonic() - begins, 3.1)
+        self.assertEqual((heard.values("DMOV"), self.get("theta.SEVR")), ([0, 1], 0))
+        self.assertIn("--longest-jog-s", self.bridge.said())
+
+    def test_filters_are_not_served(self):
+        self.bring_up_lab()
+        filtered = pyepics().PV('LAB:theta.VAL{"arr":{"s":0}}')
+        self.assertFalse(filtered.wait_for_connection(2))
+        self.assertEqual(self.get("theta.VAL"), 0.0)
+
+    def test_a_target_and_the_stop_of_another_user_are_both_answered(self):
+        self.bring_up_lab()
+        puts = "import epics, os, sys; os.environ['USER'] = sys.argv[1]; p = epics.PV('LAB:theta.' + sys.argv[2]); p.wait_for_connection(10)\n"
+        puts += "print('there', flush=True); sys.stdin.readline(); done = p.put(int(sys.argv[3]), wait=True, timeout=20); print('done', done, flush=True)"
+        users = [
+            subprocess.Popen([sys.executable, "-B", "-c", puts, *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+            for words in (("a", "VAL", "400"), ("b", "STOP", "1"))
+        ]
+        for user in users:
+            self.addCleanup(user.kill)
+            self.assertEqual(user.stdout.readline(), "there\n")
+        for user in users:
+            user.stdin.write("\n")
+            user.stdin.flush()
+        for user in users:
+            self.assertRegex(user.communicate(timeout=60)[0], "done ")
+        self.wait_for("theta.DMOV", lambda dmov: dmov == 1)
+        stands = self.get("theta.RBV")
+        self.end_all()
+        self.assertEqual(self.steps_made("theta"), round(stands * 100))
+
+    def test_the_names_of_a_daemon_that_is_not_there(self):
+        command = [sys.executable, "-B", "-m", "bushd_epics", "--prefix", "LAB:", "--daemon", self.file("control"), "--list"]
+        listed = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        self.assertEqual((listed.returncode, listed.stdout), (1, ""))
+        self.assertIn("bushd is not running", listed.stderr)
 
     def test_set_does_not_outlive_its_client(self):
         self.bring_up_lab()

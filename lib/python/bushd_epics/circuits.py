@@ -7,7 +7,11 @@ the last position. Here both take the same way. A client that does not read is l
 from __future__ import annotations
 
 import asyncio
+import fcntl
 import functools
+import socket
+import struct
+import termios
 from typing import Any
 
 import caproto
@@ -19,6 +23,13 @@ from .record import Putter
 
 AT_ONCE = 256  # of what waits, in one packet
 MOST_WAITING = 8000
+ALIVE = (
+    (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 1),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3),
+    (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 3000),  # milliseconds
+)
 
 
 class Answer:
@@ -31,6 +42,33 @@ class Answer:
 
 class Circuit(caproto_server.VirtualCircuit):
     context: Any
+
+    def __init__(self, circuit: Any, client: Any, context: Any) -> None:
+        super().__init__(circuit, client, context)
+        # A PC that is gone is noticed within seconds: jogs of its programs end with the connection.
+        for level, option, value in ALIVE:
+            self._socket.setsockopt(level, option, value)
+
+    @property
+    def _socket(self) -> Any:
+        return self.client.writer.get_extra_info("socket")
+
+    def waiting_bytes(self) -> int:
+        """That the client's PC has not acknowledged, or that wait here. A frozen program of a PC that runs has none until its buffer is full."""
+        try:
+            unsent = struct.unpack("i", fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, b"\0\0\0\0"))[0]
+        except (OSError, ValueError):
+            return 0  # it is closed: its end is told
+        return unsent + self.client.writer.transport.get_write_buffer_size()
+
+    def show_life(self) -> None:
+        """An answer to an echo that nobody has asked for: clients take it, and nothing follows."""
+        self.context.subscription_queue.put_nowait(Answer(self, caproto.EchoResponse()))
+
+    def tell_rights(self) -> None:
+        for channel in self.circuit.channels_sid.values():
+            rights = caproto.AccessRightsResponse(cid=channel.cid, access_rights=self._rights_of(channel.name))
+            self.context.subscription_queue.put_nowait(Answer(self, rights))
 
     @property
     def host(self) -> str:
@@ -52,10 +90,13 @@ class Circuit(caproto_server.VirtualCircuit):
         return response
 
     def _rights(self, command: Any, response: Any) -> Any:
+        return caproto.AccessRightsResponse(cid=command.cid, access_rights=self._rights_of(command.name))
+
+    def _rights_of(self, name: str) -> Any:
         rights = caproto.AccessRights.READ
-        if self.context[command.name].putter is not None and self.context.access.may_put(self.host):
+        if self.context[name].putter is not None and self.context.access.may_put(self.host):
             rights |= caproto.AccessRights.WRITE
-        return caproto.AccessRightsResponse(cid=command.cid, access_rights=rights)
+        return rights
 
     def _put(self, command: Any) -> None:
         channel, entry = self._get_db_entry_from_command(command)
@@ -129,15 +170,19 @@ class Context(caproto_server.Context):
         while True:
             update = await self.subscription_queue.get()
             if isinstance(update, Answer):
-                if update.circuit.connected:
+                if update.circuit.connected and self._reads(update.circuit):
                     await update.circuit.subscription_queue.put(update)
             else:
                 await self._subscription_queue_iteration(*update)
 
     async def _subscription_queue_send(self, sub_spec: Any, sub: Any, **update: Any) -> None:
-        circuit = sub.circuit
-        if circuit.subscription_queue.qsize() >= MOST_WAITING:
-            self.log.warning("%s does not read what it has subscribed to, and is let go", circuit.host)
-            circuit.client.close()
-            return
-        await super()._subscription_queue_send(sub_spec, sub, **update)
+        if self._reads(sub.circuit):
+            await super()._subscription_queue_send(sub_spec, sub, **update)
+
+    def _reads(self, circuit: Any) -> bool:
+        """One that does not is let go."""
+        if circuit.subscription_queue.qsize() < MOST_WAITING:
+            return True
+        self.log.warning("%s does not read what it is sent, and is let go", circuit.host)
+        circuit.client.close()
+        return False

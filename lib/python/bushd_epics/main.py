@@ -9,15 +9,21 @@ import logging
 import re
 import signal
 import sys
+from typing import TYPE_CHECKING
 
 from . import names as names_file
 
+if TYPE_CHECKING:  # they need caproto
+    from .daemon import Daemon
+    from .server import Server
+
+REMEDY = "connect(PATH) ($BUSHD_CONTROL), or connect(lcm=True)"  # of programs in Python
 LOG = logging.getLogger("bushd-epics")
 
 
 def main(arguments: list[str] | None = None) -> int:
     options = _parse(arguments)
-    logging.basicConfig(format="%(name)s: %(message)s", level=logging.INFO)
+    logging.basicConfig(format="%(name)s: %(message)s", level=logging.ERROR if options.list else logging.INFO)
     logging.getLogger("caproto").setLevel(logging.WARNING)
     # Beacons are for clients that wait for a server to appear; that nobody listens to them is no fault.
     logging.getLogger("caproto.ctx").addFilter(lambda record: "beacon" not in str(record.msg))
@@ -47,10 +53,16 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
         help="for ophyd-async 0.21, which takes a failed put for a good one: it runs into its timeout instead",
     )
     parser.add_argument("--interface", action="append", metavar="ADDRESS", help="to listen at; may be repeated. Default: all")
+    parser.add_argument(
+        "--longest-jog-s", type=float, default=60.0, metavar="SECONDS",
+        help="a jog ends so long after JOGF or JOGR was put to 1 last. Default: 60",
+    )
     parser.add_argument("--list", action="store_true", help="print the names of all variables, and end")
     options = parser.parse_args(arguments)
     if not re.fullmatch(r"[A-Za-z0-9_\-+:\[\]<>;]+", options.prefix):
         parser.error(f"--prefix {options.prefix}: letters, digits and _-+:[]<>; are allowed")
+    if not 0 < options.longest_jog_s <= 86400:
+        parser.error(f"--longest-jog-s {options.longest_jog_s:g}: above 0, up to 86400")
     return options
 
 
@@ -60,6 +72,7 @@ async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
     from .server import Server
 
     server = Server(options.prefix, Access(names.hosts, options.read_only), options.interface)
+    server.jogs.longest_s = options.longest_jog_s
     server.answers_failed_moves = not options.leave_failed_moves_unanswered
     daemons = []
     for given in options.daemon or [""]:
@@ -75,27 +88,42 @@ async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
     server.make_common()
     following = [asyncio.create_task(daemon.run()) for daemon in daemons]
     try:
+        if options.list:
+            return await _list(server, daemons)
         # Names are those of motors: until one daemon has told them there is nothing to be shown.
         appearing = [asyncio.create_task(daemon.appeared.wait()) for daemon in daemons]
         await asyncio.wait([*appearing, *following], return_when=asyncio.FIRST_COMPLETED)
-        if options.list:
-            await asyncio.gather(*appearing)
-            print("\n".join(server.names()))
-            return 0
-        await _serve(server)
-        return 0
+        return await _serve(server, following)
     finally:
         for task in following:
             task.cancel()
         await asyncio.gather(*following, return_exceptions=True)
 
 
-async def _serve(server: object) -> None:
-    """Until a signal ends it."""
-    serving = asyncio.create_task(server.run())  # type: ignore[attr-defined]
+async def _list(server: Server, daemons: list[Daemon]) -> int:
+    await asyncio.gather(*(daemon.told.wait() for daemon in daemons))
+    failed = [daemon.why.replace(REMEDY, "--daemon PATH") for daemon in daemons if daemon.why]
+    for why in failed:
+        print(f"bushd-epics: {why}", file=sys.stderr)
+    if not failed:
+        print("\n".join(server.names()))
+    return 1 if failed else 0
+
+
+async def _serve(server: Server, following: list[asyncio.Task[None]]) -> int:
+    """Until a signal ends it, or a part of it that must not end."""
+    serving = asyncio.create_task(server.run())
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, serving.cancel)
     LOG.info("ready")
+    others = [*following, asyncio.create_task(server.look_up_names()), asyncio.create_task(server.watch_jogs())]
+    await asyncio.wait([serving, *others], return_when=asyncio.FIRST_COMPLETED)
+    broken = [task for task in others if task.done()]
+    for task in broken:
+        LOG.error("a part of it has ended, so all of it does", exc_info=task.exception())
+    for task in (serving, *others):
+        task.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await serving
+    return 1 if broken else 0

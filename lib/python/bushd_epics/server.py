@@ -14,18 +14,22 @@ from .access import Access
 from .circuits import Circuit, Context
 from .daemon import Daemon
 from .fields import FIELDS, Kind, Value
+from .jogs import Jogs
 from .record import Putter, Record
 
 LOG = logging.getLogger("bushd-epics")
 
+LOOK_UP_EVERY_S = 10.0
+JOGS_ARE_LOOKED_AT_S = 0.25
 ABLE = ("Enable", "Disable")
 
 
 class Pages:
     """The variables of one record."""
 
-    def __init__(self, record: Record, deliver: Callable[[Record], None]) -> None:
+    def __init__(self, record: Record, deliver: Callable[[Record], None], jogs: Jogs) -> None:
         self.record = record
+        self._jogs = jogs
         self._deliver = deliver
         self._alarm = caproto.ChannelAlarm(
             status=int(record.alarm.status), severity=int(record.alarm.severity), alarm_string=record.alarm.reason
@@ -86,6 +90,8 @@ class Pages:
         )
 
     def _put(self, name: str, value: Value, by: Putter) -> None:
+        if name in ("JOGF", "JOGR") and value and self._jogs.renew(self.record, name, by.circuit, _now()):
+            return by.token("")
         self.record.put(name, value, by, _now())
         self._deliver(self.record)
 
@@ -102,6 +108,7 @@ class Server(Context):
         self.prefix = prefix
         self.access = access
         self.answers_failed_moves = True
+        self.jogs = Jogs()
         self._all: list[Daemon] = []
         self._daemons: dict[Record, Daemon] = {}
         self._pages: dict[str, Pages] = {}
@@ -129,28 +136,45 @@ class Server(Context):
     # -- for caproto
 
     def __getitem__(self, name: str) -> Any:
-        try:
-            return self.pvdb[name]
-        except KeyError:
-            channel = self.pvdb[name] = self._find(name)
-            return channel
-
-    def _find(self, name: str) -> Any:
-        """Raises CaprotoKeyError."""
+        """Raises CaprotoKeyError. A name has many spellings, so none is kept."""
         try:
             parsed = caproto.parse_record_field(name)
-            record, field = parsed.record, parsed.field or "VAL"
-            if record in self._pages:
-                channel = self._pages[record].field(field)
-            elif record.endswith("_able") and record.removesuffix("_able") in self._pages:
-                channel = self._pages[record.removesuffix("_able")].able().get_field(field)
-            else:
-                channel = self._common[record].get_field(field)
+            if parsed.modifiers is not None and parsed.modifiers.filter_ is not None:
+                raise ValueError("filters are not served")
+            channel = self._find(parsed.record, parsed.field or "VAL")
         except (KeyError, ValueError):
             raise caproto.CaprotoKeyError(f"no such variable: {name}") from None
         if caproto.RecordModifiers.long_string in (parsed.modifiers or {}) and not isinstance(channel, channels.Text):
             raise caproto.CaprotoKeyError(f"no text: {name}")
         return channel
+
+    def _find(self, record: str, field: str) -> Any:
+        """Raises KeyError."""
+        if record in self._pages:
+            return self._pages[record].field(field)
+        if record.endswith("_able") and record.removesuffix("_able") in self._pages:
+            return self._pages[record.removesuffix("_able")].able().get_field(field)
+        return self._common[record].get_field(field)
+
+    async def look_up_names(self) -> None:
+        """Of hosts that may put, as long as some were not found: at boot the network may not be there yet."""
+        while True:
+            await asyncio.sleep(LOOK_UP_EVERY_S)
+            if self.access.unknown and await asyncio.to_thread(self.access.look_up):
+                for circuit in self.circuits:
+                    circuit.tell_rights()
+
+    async def watch_jogs(self) -> None:
+        while True:
+            await asyncio.sleep(JOGS_ARE_LOOKED_AT_S)
+            records = list(self._daemons)
+            for record, circuit, why in self.jogs.look(records, Circuit.waiting_bytes, _now()):
+                LOG.warning("%s: its jog ends: %s", record.name, why)
+                record.client_gone(circuit, _now())
+                self._daemons[record].deliver(record)
+            # Something has to be on the way to a PC that is gone, for its silence to be seen.
+            for circuit in {job.circuit for record in records for job in self.jogs.of(record)}:
+                circuit.show_life()
 
     def client_gone(self, circuit: Circuit) -> None:
         for record, daemon in self._daemons.items():
@@ -170,7 +194,7 @@ class Server(Context):
         if record.name in self._pages:
             LOG.error("%s is the name of two motors: the second one is not shown", record.name)
         else:
-            self._pages[record.name] = Pages(record, daemon.deliver)
+            self._pages[record.name] = Pages(record, daemon.deliver, self.jogs)
         self._daemons[record] = daemon
         self._of[record] = self._pages[record.name]
 
