@@ -59,6 +59,32 @@ class Failures(unittest.TestCase):
         bench.ask(events.Stop)
         self.assertTrue(bench["MIP"] & 0x200)
 
+    def test_a_stop_is_answered_when_the_daemon_has_answered(self):
+        for field, value in (("STOP", 1), ("SPMG", 0)):
+            with self.subTest(field=field):
+                bench = Bench()
+                under_way(bench)
+                token = bench.put(field, value)
+                stop = bench.ask(events.Stop)
+                self.assertNotIn(token, bench.answers)
+                bench.end(stop, End.REACHED)
+                self.assertEqual(bench.answers[token], "")
+                token = bench.put(field, value)
+                bench.refuse(bench.ask(events.Stop), "no control socket")
+                self.assertEqual(bench.answers[token], "no control socket")
+
+    def test_a_stop_that_nobody_hears_has_failed_at_once(self):
+        bench = Bench()
+        _, ask = under_way(bench)
+        bench.silent("bushd has ended")
+        token = bench.put("STOP", 1)
+        bench.ask(events.Stop)
+        self.assertEqual(bench.answers[token], "bushd has ended")
+        bench.lose(ask, "bushd has ended")
+        token = bench.put("STOP", 1)
+        bench.ask(events.Stop)
+        self.assertEqual(bench.answers[token], "bushd has ended")
+
 
 class Links(unittest.TestCase):
     def test_a_link_that_is_lost_fails_the_put_at_once_and_dmov_waits_for_the_motor(self):
@@ -94,8 +120,30 @@ class Links(unittest.TestCase):
         bench = Bench()
         bench.silent("bushd has ended")
         token = bench.put("VAL", 3.0)
-        bench.refuse(bench.ask(events.Move), "no control socket")
-        self.assertEqual((bench.answers[token], bench.values("DMOV"), bench.severity), ("no control socket", [0, 1], "INVALID"))
+        self.assertEqual((bench.asks(), bench.answers[token]), ([], "bushd has ended"))
+        self.assertEqual((bench.values("DMOV"), bench.severity), ([0, 1], "INVALID"))
+        for field in ("JOGF", "HOMF"):
+            token = bench.put(field, 1)
+            self.assertEqual((bench.asks(), bench.answers[token]), ([], "bushd has ended"))
+
+    def test_a_motor_that_is_seen_moving_after_a_loss_is_not_done_at_the_deadline(self):
+        bench = Bench()
+        token, ask = under_way(bench)
+        bench.lose(ask, "the connection has ended")
+        bench.at(6.0, moving=True, busy=True)
+        bench.wait(60)
+        self.assertEqual((bench["DMOV"], bench["MIP"], bench.answers[token]), (0, 0x8000, "the connection has ended"))
+        bench.at(20.0)
+        self.assertEqual((bench.values("DMOV"), bench.severity, bench["STAT"]), ([0, 1], "MAJOR", "COMM"))
+
+    def test_it_is_not_done_where_the_last_state_says_that_it_moves(self):
+        bench = Bench()
+        _, ask = under_way(bench)
+        bench.lose(ask, "the connection has ended")
+        bench.wait(60)
+        self.assertEqual(bench["DMOV"], 0)
+        bench.at(20.0)
+        self.assertEqual(bench.values("DMOV"), [0, 1])
 
 
 class Trust(unittest.TestCase):

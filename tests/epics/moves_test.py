@@ -5,6 +5,7 @@ import unittest
 
 from bench import Bench
 from bushd_epics import events
+from bushd_epics.deferred import Deferred
 from bushd_epics.events import End
 from bushd_epics.scale import Scale
 
@@ -139,6 +140,55 @@ class Delay(unittest.TestCase):
         bench.wait(5)
         self.assertEqual(bench.values("DMOV"), [0, 1])
 
+    def test_a_move_of_others_in_the_delay_keeps_dmov_at_0(self):
+        bench = Bench()
+        token = self.begin(bench)
+        bench.at(1.5, moving=True, busy=True)
+        bench.wait(5)
+        self.assertEqual((bench["DMOV"], bench["MIP"], bench.answers[token]), (0, 0x8000, ""))
+        bench.at(4.0)
+        self.assertEqual((bench.values("DMOV"), bench["VAL"], bench.severity), ([0, 1], 4.0, "NO_ALARM"))
+
+
+class DeferredMoves(unittest.TestCase):
+    def gather(self, *places):
+        deferred, benches = Deferred(), []
+        for number, (to, velo) in enumerate(places):
+            bench = Bench()
+            bench.put("VELO", velo)
+            token = bench.put("VAL", to, circuit=f"client {number}")
+            ask = bench.ask(events.Move)
+            self.assertIsNone(deferred.take(bench.record, ask))
+            benches.append((bench, token, ask))
+        return deferred, benches
+
+    def test_those_of_one_speed_are_one_request(self):
+        deferred, (one, two, three) = self.gather((2.0, 25.0), (3.0, 4.0), (4.0, 25.0))
+        groups = [[ask for _, ask in group] for group in deferred.let_go()]
+        self.assertEqual(groups, [[one[2], three[2]], [two[2]]])
+        self.assertEqual(deferred.let_go(), [])
+
+    def test_a_target_is_dropped_with_its_client_in_silence_and_by_a_stop(self):
+        for what in (
+            lambda bench: bench.gone("client 0"),
+            lambda bench: bench.silent("bushd has ended"),
+            lambda bench: bench.put("STOP", 1),
+            lambda bench: bench.put("SPMG", 0),
+        ):
+            deferred, ((bench, token, _), (_, _, other)) = self.gather((2.0, 25.0), (3.0, 25.0))
+            bench.gone("client 1")
+            self.assertEqual(bench["DMOV"], 0)
+            what(bench)
+            self.assertEqual((bench.asks(), bench.values("DMOV"), bench["VAL"]), ([], [0, 1], 0.0))
+            self.assertNotEqual(bench.answers[token], "")
+            self.assertEqual([[ask for _, ask in group] for group in deferred.let_go()], [[other]])
+
+    def test_once_let_go_it_outlives_its_client(self):
+        deferred, ((bench, _, _),) = self.gather((2.0, 25.0))
+        deferred.let_go()
+        bench.gone("client 0")
+        self.assertEqual((bench["DMOV"], bench.asks()), (0, []))
+
 
 class Backlash(unittest.TestCase):
     def legs(self, start, to, backlash=0.5):
@@ -206,6 +256,57 @@ class Backlash(unittest.TestCase):
         bench.at(10.0)
         bench.end(move, End.STOPPED, "stopped on request")
         self.assertEqual((bench.asks(), bench["DMOV"]), ([], 1))
+
+    def against(self):
+        bench = Bench()
+        bench.put("BDST", 0.5)
+        token = bench.put("VAL", -30.0)
+        move = bench.ask(events.Move)
+        bench.accept(move)
+        bench.at(-8.0, moving=True, busy=True)
+        return bench, token, move
+
+    def test_nothing_is_made_up_for_while_spmg_is_stop(self):
+        bench, token, move = self.against()
+        bench.put("SPMG", 0)
+        bench.end(bench.ask(events.Stop), End.REACHED)
+        bench.at(-10.0)
+        bench.end(move, End.STOPPED, "stopped on request")
+        self.assertEqual((bench.asks(), bench.values("DMOV"), bench.answers[token]), ([], [0, 1], "stopped on request"))
+
+    def test_nothing_is_made_up_for_while_spmg_is_pause(self):
+        bench, _, move = self.against()
+        bench.put("SPMG", 1)
+        bench.end(bench.ask(events.Pause), End.REACHED)
+        bench.at(-10.0, busy=True)
+        bench.put("STOP", 1)
+        bench.end(bench.ask(events.Stop), End.REACHED)
+        bench.at(-10.0)
+        bench.end(move, End.STOPPED, "stopped on request")
+        self.assertEqual((bench.asks(), bench.values("DMOV")), ([], [0, 1]))
+
+    def test_the_approach_waits_for_go(self):
+        bench, _, move = self.against()
+        bench.put("SPMG", 1)
+        bench.end(bench.ask(events.Pause), End.REACHED)
+        bench.at(-30.5)
+        bench.end(move, End.REACHED)
+        self.assertEqual((bench.asks(), bench["DMOV"]), ([], 0))
+        bench.put("SPMG", 3)
+        self.assertEqual(bench.ask(events.Move).to, -30.0)
+
+    def test_a_stop_when_the_first_leg_just_ends_is_a_stop(self):
+        bench = Bench()
+        bench.put("BDST", 0.5)
+        token = bench.put("VAL", 30.0)
+        move = bench.ask(events.Move)
+        bench.accept(move)
+        bench.put("STOP", 1)
+        bench.asks()
+        bench.at(29.5)
+        bench.end(move, End.REACHED)
+        self.assertEqual((bench.asks(), bench["DMOV"], bench.severity), ([], 1, "MAJOR"))
+        self.assertEqual((bench.answers[token], bench["AMSG"]), ("stopped before its target",) * 2)
 
 
 if __name__ == "__main__":

@@ -20,14 +20,43 @@ class Spmg(unittest.TestCase):
         ask = bench.ask(events.Move)
         bench.accept(ask)
         bench.put("SPMG", self.PAUSE)
-        bench.ask(events.Pause)
+        pause = bench.ask(events.Pause)
+        self.assertEqual(bench["SPMG"], self.GO)
+        bench.end(pause, End.REACHED)
+        self.assertEqual((bench["SPMG"], bench["LSPG"]), (self.PAUSE, self.GO))
         bench.at(5.0, busy=True)
         self.assertEqual((bench["DMOV"], bench["VAL"]), (0, 20.0))
         bench.put("SPMG", self.GO)
-        bench.ask(events.Resume)
+        bench.end(bench.ask(events.Resume), End.REACHED)
+        self.assertEqual(bench["SPMG"], self.GO)
         bench.at(20.0)
         bench.end(ask, End.REACHED)
         self.assertEqual((bench.values("DMOV"), bench.answers[token]), ([0, 1], ""))
+
+    def test_a_pause_that_is_refused_leaves_spmg_as_it_was(self):
+        bench = Bench()
+        bench.put("VAL", 20.0)
+        bench.accept(bench.ask(events.Move))
+        token = bench.put("SPMG", self.PAUSE)
+        pause = bench.ask(events.Pause)
+        self.assertNotIn(token, bench.answers)
+        meanwhile = bench.put("VAL", 10.0)
+        self.assertEqual(bench.asks(), [])
+        bench.refuse(pause, "theta follows a trajectory")
+        self.assertEqual((bench["SPMG"], bench.answers), (self.GO, {token: "theta follows a trajectory"}))
+        self.assertEqual(bench.ask(events.Move).to, 10.0)
+        self.assertNotIn(meanwhile, bench.answers)
+
+    def test_an_older_word_that_is_answered_later_does_not_count(self):
+        bench = Bench()
+        bench.put("VAL", 20.0)
+        bench.accept(bench.ask(events.Move))
+        first = bench.put("SPMG", self.PAUSE)
+        pause = bench.ask(events.Pause)
+        bench.put("SPMG", self.STOP)
+        bench.ask(events.Stop)
+        bench.end(pause, End.REACHED)
+        self.assertEqual((bench["SPMG"], bench.answers), (self.STOP, {first: ""}))
 
     def test_a_target_that_is_put_in_a_pause_waits(self):
         bench = Bench()
@@ -134,6 +163,16 @@ class Speeds(unittest.TestCase):
         bench.put("VAL", 1.0)
         self.assertEqual(bench.ask(events.Move).speed, 4.0)
 
+    def test_slower_than_a_step_an_hour_is_refused_and_the_log_says_who_puts(self):
+        bench = Bench()
+        bench.hear()
+        token = bench.put("VELO", 0.01 / 3601)
+        self.assertEqual(bench["VELO"], 25.0)
+        self.assertRegex(bench.answers[token], "^a speed of .* 2.77778e-06$")
+        (log,) = [event.text for event in bench.hear() if isinstance(event, events.Log)]
+        self.assertIn("a put to VELO by me:pc is refused", log)
+        self.assertEqual(bench.answers[bench.put("VELO", 0.01 / 3600)], "")
+
     def test_none_is_refused(self):
         for value in (0.0, -1.0):
             bench = Bench()
@@ -158,13 +197,14 @@ class Set(unittest.TestCase):
                 bench.end(ask, End.REACHED)
                 self.assertEqual(bench.answers[token], "")
 
-    def test_a_client_that_dies_does_not_leave_it(self):
+    def test_two_programs_one_after_the_other_set_and_nothing_moves(self):
         bench = Bench()
-        bench.put("SET", 1, circuit="mine")
-        bench.gone("another")
+        bench.put("SET", 1, circuit="first")
+        bench.gone("first")
+        bench.put("VAL", 42.0, circuit="second")
+        self.assertEqual(bench.ask(events.SetPosition).to, 42.0)
+        bench.gone("second")
         self.assertEqual(bench["SET"], 1)
-        bench.gone("mine")
-        self.assertEqual(bench["SET"], 0)
 
     def test_it_times_out(self):
         bench = Bench()
@@ -173,8 +213,38 @@ class Set(unittest.TestCase):
         self.assertEqual(bench["SET"], 1)
         bench.wait(0.2)
         self.assertEqual(bench["SET"], 0)
+
+    def lapsed(self):
+        bench = Bench()
+        bench.put("SET", 1)
+        bench.wait(31)
+        bench.hear()
+        return bench
+
+    def test_a_target_after_the_time_out_is_refused_once(self):
+        for field in ("VAL", "DVAL", "RVAL", "RLV", "TWF"):
+            with self.subTest(field=field):
+                bench = self.lapsed()
+                bench.wait(599 - 1)
+                token = bench.put(field, 1)
+                self.assertEqual((bench.asks(), bench.values("DMOV")), ([], [0, 1]))
+                self.assertRegex(bench.answers[token], "^SET has ended .* put SET 1 again or put the target once more$")
+                bench.put(field, 1)
+                bench.ask(events.Move)
+
+    def test_it_is_forgotten_after_ten_minutes_or_when_set_is_put(self):
+        bench = self.lapsed()
+        bench.wait(600)
         bench.put("VAL", 1.0)
         bench.ask(events.Move)
+        bench = self.lapsed()
+        bench.put("SET", 0)
+        bench.put("VAL", 1.0)
+        bench.ask(events.Move)
+        bench = self.lapsed()
+        bench.put("SET", 1)
+        bench.put("VAL", 1.0)
+        bench.ask(events.SetPosition)
 
 
 class Limits(unittest.TestCase):

@@ -19,6 +19,7 @@ class Deferred:
         """Returns what it takes the place of."""
         before = self._waiting.pop(record, None)
         self._waiting[record] = ask
+        record.jobs[ask.number].deferred = True
         return before
 
     def drop(self, record: Record) -> events.Move | None:
@@ -26,7 +27,10 @@ class Deferred:
 
     def let_go(self) -> list[list[Waiting]]:
         """Groups that can be asked for as one: a request has one speed, in the unit of each motor."""
-        waiting, self._waiting = list(self._waiting.items()), {}
+        waiting = [one for one in self._waiting.items() if one[1].number in one[0].jobs]  # a record has dropped the others
+        self._waiting = {}
+        for record, ask in waiting:
+            record.jobs[ask.number].deferred = False
 
         def speed(one: Waiting) -> float:
             return one[1].speed or 0.0

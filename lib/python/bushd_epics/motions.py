@@ -47,6 +47,7 @@ class Job:
     number: int = 0  # of what is asked for; 0: nothing yet
     accepted: bool = False
     stopping: bool = False
+    deferred: bool = False  # gathered, and not sent yet
     failure: Alarm = alarms.NONE  # told at the end, whatever comes: it makes up for backlash after a stop
 
 
@@ -68,6 +69,8 @@ class Motions(View):
         self.settling: Ending | None = None
         self.lost_motion: Ending | None = None
         self.external = False
+        self._left: Alarm = alarms.NONE  # told at the end of what is shown as external: a motion of this record went on in it
+        self.pausing = False  # the daemon has not answered yet
         self._late_until: float | None = None
 
     @property
@@ -96,7 +99,7 @@ class Motions(View):
             self.post("LVIO", 0)
         self.post("MIP", job.mip)
         self.show_status()
-        if self.values["SPMG"] == PAUSE and job.kind == "move":
+        if (self.values["SPMG"] == PAUSE or self.pausing) and job.kind == "move":
             self.waiting = job
         else:
             self.issue(job)
@@ -118,18 +121,26 @@ class Motions(View):
         """A motion that is not asked for. DMOV has fallen: where nothing moves it rises, with an alarm, as after any move that fails."""
         self._ended_badly([token], Alarm(Status.STATE, Severity.MAJOR, reason), reason, now)
 
-    def halt(self, who: Any, now: float) -> None:
-        """STOP: of a motor at rest nothing."""
+    def drop_deferred(self, why: str, now: float, circuit: Any = None) -> None:
+        """Targets that wait for others to begin with; `circuit`: those of this client only."""
+        for job in list(self.jobs.values()):
+            if job.deferred and circuit in (None, job.circuit):
+                del self.jobs[job.number]
+                self._ended_badly(job.tokens, Alarm(Status.STATE, Severity.MAJOR, why), why, now)
+
+    def halt(self, who: Any, now: float) -> int | None:
+        """STOP: the number of what is asked for. Of a motor at rest nothing."""
+        self.drop_deferred("stopped before the deferred moves began", now)
         self._end_settling_now(now)
         if self.waiting is not None:
             job, self.waiting = self.waiting, None
             self._ended_badly(job.tokens, self._stopped(), "stopped before it had begun", now)
-        if not (self.jobs or self.external):
-            return
+        if not (self.jobs or self.external or self.lost_motion):
+            return None
         for job in self.jobs.values():
             job.stopping = True
         self.post("MIP", int(self.number("MIP")) | Mip.STOP)
-        self.ask(events.Stop(self.next_number(), who))
+        return self.ask(events.Stop(self.next_number(), who))
 
     # -- what the shell tells
 
@@ -162,7 +173,12 @@ class Motions(View):
             return self._wait_for_link(job.tokens, reason, now)
         if outcome == End.REACHED and job.legs and not job.stopping:
             self.post("MIP", job.mip | Mip.MOVE_BL)
+            if self.values["SPMG"] == PAUSE:
+                self.waiting = job
+                return
             return self.issue(job)
+        if outcome == End.REACHED and job.legs:  # the end of its first leg: it was stopped there
+            outcome, reason = End.STOPPED, self._stopped().reason
         if outcome == End.REACHED and not job.legs:
             return self._conclude(job.tokens, job.failure, job.failure.reason, now)
         if job.kind == "jog" and outcome in (End.STOPPED, End.REACHED):
@@ -189,6 +205,8 @@ class Motions(View):
         if self.lost_motion is not None:
             if rests and not self.silent:
                 self._end_lost()
+            elif moves and not self.silent:
+                self._become_external(self.lost_motion)
             return
         if self.jobs or self.waiting or self.settling:
             return
@@ -199,7 +217,7 @@ class Motions(View):
             self.post("MIP", Mip.EXTERNAL)
         elif self.external and rests:
             self.external = False
-            self._finish([], alarms.NONE, "")
+            self._finish([], self._left, self._left.reason)
         elif self.external and not self.seen.live:
             self.external = False
             self._wait_for_link([], "its MCU is offline", now)
@@ -228,7 +246,10 @@ class Motions(View):
         if self.settling is not None and now >= self.settling.until:
             self._end_settling_now(now)
         if self.lost_motion is not None and now >= self.lost_motion.until:
-            self._end_lost()
+            if self._is_seen_moving():
+                self._become_external(self.lost_motion)
+            else:
+                self._end_lost()
 
     # -- ends
 
@@ -243,6 +264,17 @@ class Motions(View):
             job, self.waiting = self.waiting, None
             self.done(job.tokens, SUPERSEDED)
         self.external = False
+        self._left = alarms.NONE
+
+    def _is_seen_moving(self) -> bool:
+        return not self.silent and self.seen.live and (self.seen.moving or self.seen.busy)
+
+    def _become_external(self, ending: Ending) -> None:
+        """It is over for who has asked for it, and the motor moves: DMOV rises when it is at rest."""
+        self.settling = self.lost_motion = None
+        self.external, self._left = True, ending.failure
+        self.post("MIP", Mip.EXTERNAL)
+        self.done(ending.tokens, ending.error)
 
     def _clear_failure(self) -> None:
         self.failure = alarms.NONE
@@ -254,7 +286,9 @@ class Motions(View):
         return Alarm(Status.STATE, Severity.MAJOR, "stopped before its target")
 
     def _makes_up(self, job: Job, outcome: str, reason: str) -> bool:
-        """After a stop that this record has asked for: the load lies at the wrong flank if it went against the backlash."""
+        """After a STOP that this record has asked for: the load lies at the wrong flank if it went against the backlash."""
+        if self.values["SPMG"] in (STOP, PAUSE):
+            return False
         backlash, here = self.number("BDST"), self.seen.dial
         if not (job.kind == "move" and job.stopping and outcome == End.STOPPED) or here is None:
             return False
@@ -309,6 +343,8 @@ class Motions(View):
     def _end_settling_now(self, now: float) -> None:
         if self.settling is not None:
             ending, self.settling = self.settling, None
+            if self._is_seen_moving():  # another client's move has begun meanwhile
+                return self._become_external(ending)
             self._finish(ending.tokens, ending.failure, ending.error, now)
 
     def _end_lost(self) -> None:
@@ -318,7 +354,7 @@ class Motions(View):
 
     def _finish(self, tokens: list[Any], failure: Alarm, error: str, now: float | None = None) -> None:
         """The only place where DMOV rises."""
-        self.failure = failure
+        self.failure, self._left = failure, alarms.NONE
         if failure.severity is not Severity.NO_ALARM:
             self.place_target()
         self._follow_target()

@@ -17,6 +17,7 @@ from .motions import GO, MOVE_ONCE, PAUSE, STOP, Job, Mip, Motions
 
 TARGETS = ("VAL", "DVAL", "RVAL", "RLV", "TWF", "TWR")  # a put to these makes DMOV fall
 SET_TIMES_OUT_S = 30.0
+SET_IS_REMEMBERED_S = 600.0  # so long after its time-out a target is taken for one that was meant for SET
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +36,8 @@ class Record(Motions):
         self._limits_asked: tuple[int, tuple[float, ...]] | None = None
         self._set_times_out_s = set_times_out_s
         self._set_until: float | None = None
-        self._set_by: Any = None
+        self._set_lapsed_until: float | None = None
+        self._spmg_asked: tuple[int, int] | None = None  # a pause or its end that the daemon has not answered, and the word it is for
         self._setters = {
             "STOP": self._put_stop, "SPMG": self._put_spmg, "SYNC": self._put_sync, "STUP": self._put_stup, "PROC": self._put_nothing,
             "JOGF": self._put_jog, "JOGR": self._put_jog, "HOMF": self._put_home, "HOMR": self._put_home, "CNEN": self._put_enable,
@@ -60,12 +62,11 @@ class Record(Motions):
             self._setters[field](field, value, by, now)
 
     def client_gone(self, circuit: Any, now: float) -> None:
-        """What its client alone keeps up ends with it: jogs, and SET."""
+        """What its client alone keeps up ends with it: jogs, and targets that are deferred."""
         for job in list(self.jobs.values()):
             if job.kind == "jog" and job.circuit is circuit:
                 self._end_jog(job)
-        if self._set_until is not None and self._set_by is circuit:
-            self._leave_set("its client has gone")
+        self.drop_deferred("its client has gone before the deferred moves began", now, circuit)
 
     # -- the daemon
 
@@ -80,6 +81,7 @@ class Record(Motions):
     def fall_silent(self, why: str, now: float) -> None:
         """Nothing is heard of the motor any more; what was asked for is told by `lost` and `refused`."""
         self.silent = why
+        self.drop_deferred(why, now)
         if self.external:
             self.external = False
             self._wait_for_link([], why, now)
@@ -92,6 +94,7 @@ class Record(Motions):
             if job.target is not None and not self.within_limits(job.target):
                 self.post("LVIO", 1)
             self.motion_refused(job, reason, now)
+        self._spmg_answered(number, reason)
         self._answer(number, reason)
 
     def ended(self, number: int, outcome: str, reason: str, now: float) -> None:
@@ -100,12 +103,15 @@ class Record(Motions):
             if job.kind == "jog" and outcome == events.End.LIMIT and not (self.seen.plus_limit or self.seen.minus_limit):
                 self.post("LVIO", 1)
             self.motion_ended(job, outcome, reason, now)
-        self._answer(number, "" if outcome == events.End.REACHED else reason or outcome)
+        error = "" if outcome == events.End.REACHED else reason or outcome
+        self._spmg_answered(number, error)
+        self._answer(number, error)
 
     def lost(self, number: int, reason: str, now: float) -> None:
         job = self.jobs.get(number)
         if job is not None:
             self.motion_lost(job, reason, now)
+        self._spmg_answered(number, reason)
         self._answer(number, reason)
 
     # -- the clock
@@ -118,7 +124,7 @@ class Record(Motions):
     def tick(self, now: float) -> None:
         self.motion_tick(now)
         if self._set_until is not None and now >= self._set_until:
-            self._leave_set(f"nobody has used it for {self._set_times_out_s:g} s")
+            self._leave_set(now)
 
     # -- targets
 
@@ -131,14 +137,17 @@ class Record(Motions):
             self.post(field, 0.0 if field == "RLV" else 0)
         if self.values["SET"] == 1:
             return self._set_position(field, target, by, now)
-        reason = self._why_not(target)
+        reason = self._set_has_ended(now) or self._why_not(target)
         if reason:
+            self._log_refused(field, by, reason)
             return self.refuse(by.token, reason, now)
         legs = self._legs(target)
         outside = [to for to, _ in legs if not self.within_limits(to)]
         if outside and self.within_limits(target):
             self.post("LVIO", 1)
-            return self.refuse(by.token, f"it would begin its approach at {outside[0]:g}, beyond its soft limits (BDST)", now)
+            reason = f"it would begin its approach at {outside[0]:g}, beyond its soft limits (BDST)"
+            self._log_refused(field, by, reason)
+            return self.refuse(by.token, reason, now)
         self.begin(Job("move", [by.token], by.who, by.circuit, Mip.MOVE, target, legs), now)
 
     def _user_target(self, field: str, value: float) -> float:
@@ -153,7 +162,16 @@ class Record(Motions):
             return val + self.number("TWV") * (1 if field == "TWF" else -1)
         return value
 
+    def _set_has_ended(self, now: float) -> str:
+        """Who has put SET and waited too long means to say where the motor stands: the next target is not to move it."""
+        lapsed_until, self._set_lapsed_until = self._set_lapsed_until, None
+        if lapsed_until is None or now >= lapsed_until:
+            return ""
+        return f"SET has ended after {self._set_times_out_s:g} s without use: put SET 1 again or put the target once more"
+
     def _why_not(self, target: float) -> str:
+        if self.silent:
+            return self.silent
         if not math.isfinite(target):
             return "nobody knows where the motor stands"
         if self.values["SPMG"] == STOP:
@@ -177,6 +195,8 @@ class Record(Motions):
     def _set_position(self, field: str, target: float, by: Putter, now: float) -> None:
         """SET is 1: nothing moves. The dial is set by DVAL and RVAL, and by VAL where the offset is frozen."""
         self._set_until = now + self._set_times_out_s
+        if self.silent:
+            return self._reject(field, by, self.silent)
         if self.in_motion:
             self.place_target()
             return self._reject(field, by, "it moves: its position is set at rest")
@@ -190,34 +210,69 @@ class Record(Motions):
 
     def _put_stop(self, field: str, value: Value, by: Putter, now: float) -> None:
         if value:
-            self.halt(by.who, now)
-        self.done([by.token])
+            self._stop(by, now)
+        else:
+            self.done([by.token])
+
+    def _stop(self, by: Putter, now: float) -> None:
+        """Its put is over when the daemon has answered. Where nobody answers it is sent nevertheless, and has failed at once."""
+        number = self.halt(by.who, now)
+        if self.silent:
+            self.done([by.token], self.silent)
+        elif number is None:
+            self.done([by.token])
+        else:
+            self._asked[number] = [by.token]
 
     def _put_spmg(self, field: str, value: Value, by: Putter, now: float) -> None:
-        word, was = int(value), self.values["SPMG"]
-        self.post("LSPG", was)
-        self.post("SPMG", word)
+        """A pause, and its end, is shown when the daemon has carried it out: a refusal leaves SPMG as it was."""
+        word, paused = int(value), self.values["SPMG"] == PAUSE or self.pausing
+        self._spmg_asked, self.pausing = None, False
         if word == STOP:
-            self.halt(by.who, now)
-        elif word == PAUSE and was != PAUSE:
-            self._pause(by)
-        elif word in (GO, MOVE_ONCE) and was == PAUSE:
-            self._go_on(by)
+            self._show_spmg(word)
+            return self._stop(by, now)
+        if word == PAUSE:
+            for job in self.jobs.values():
+                if job.kind == "jog":
+                    self._end_jog(job)
+            if self.values["SPMG"] != PAUSE and self._daemon_has_motion():
+                self.pausing = True
+                return self._ask_spmg(events.Pause(self.next_number(), by.who), word, by)
+        elif paused and self.waiting is None and self._daemon_has_motion():
+            return self._ask_spmg(events.Resume(self.next_number(), by.who), word, by)
+        self._show_spmg(word)
+        if word != PAUSE:
+            self._begin_waiting()
         self.done([by.token])
 
-    def _pause(self, by: Putter) -> None:
-        for job in self.jobs.values():
-            if job.kind == "jog":
-                self._end_jog(job)
-            else:
-                self.ask(events.Pause(self.next_number(), by.who))
+    def _daemon_has_motion(self) -> bool:
+        return any(job.kind != "jog" and not job.deferred for job in self.jobs.values())
 
-    def _go_on(self, by: Putter) -> None:
+    def _ask_spmg(self, ask: events.Ask, word: int, by: Putter) -> None:
+        self._spmg_asked = (self.ask(ask), word)
+        self._asked[ask.number] = [by.token]
+
+    def _spmg_answered(self, number: int, error: str) -> None:
+        if self._spmg_asked is None or self._spmg_asked[0] != number:
+            return  # another word has been put since
+        word = self._spmg_asked[1]
+        self._spmg_asked, self.pausing = None, False
+        if error:
+            self.log(f"a put to SPMG is refused: {error}")
+            self.post("SPMG", self.values["SPMG"], always=True)
+        else:
+            self._show_spmg(word)
+        if self.values["SPMG"] in (GO, MOVE_ONCE):
+            self._begin_waiting()
+
+    def _show_spmg(self, word: int) -> None:
+        self.post("LSPG", self.values["SPMG"])
+        self.post("SPMG", word)
+
+    def _begin_waiting(self) -> None:
         if self.waiting is not None:
             job, self.waiting = self.waiting, None
             self.issue(job)
-        elif self.jobs:
-            self.ask(events.Resume(self.next_number(), by.who))
 
     def _put_jog(self, field: str, value: Value, by: Putter, now: float) -> None:
         if not value:
@@ -282,6 +337,9 @@ class Record(Motions):
         speed = float(value)
         if speed <= 0:
             return self._reject(field, by, f"a speed of {speed:g}: it is to be above 0")
+        least = 0.0 if self.is_axis else self.seen.scale.least_speed
+        if speed < least:
+            return self._reject(field, by, f"a speed of {speed:g}: allowed is down to a step an hour, which is {least:.6g}")
         if speed > self.top:
             self.log(f"{field} {speed:g} is above VMAX: it is {self.top:g}")
         self.post(field, min(speed, self.top), always=True)
@@ -301,12 +359,13 @@ class Record(Motions):
             return self._reject(field, by, "a pseudo-axis is computed: set its motors")
         self.post("SET", word)
         self._set_until = now + self._set_times_out_s if word else None
-        self._set_by = by.circuit
+        self._set_lapsed_until = None
         self.done([by.token])
 
-    def _leave_set(self, why: str) -> None:
+    def _leave_set(self, now: float) -> None:
         self._set_until = None
-        self.log(f"SET is Use again: {why}")
+        self._set_lapsed_until = now + SET_IS_REMEMBERED_S
+        self.log(f"SET is Use again: nobody has used it for {self._set_times_out_s:g} s")
         self.post("SET", 0)
 
     # -- settings of the motor
@@ -359,6 +418,9 @@ class Record(Motions):
 
     def _reject(self, field: str, by: Putter, reason: str) -> None:
         """A put that nothing comes of; clients that show the field get it as it is."""
-        self.log(f"a put to {field} is refused: {reason}")
+        self._log_refused(field, by, reason)
         self.post(field, self.values[field], always=True)
         self.done([by.token], reason)
+
+    def _log_refused(self, field: str, by: Putter, reason: str) -> None:
+        self.log(f"a put to {field} by {by.who} is refused: {reason}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import fractions
 
+LONGEST_STEP_S = 3600.0
+
 
 @dataclasses.dataclass(frozen=True)
 class Scale:
@@ -21,6 +23,11 @@ class Scale:
 
     def dial(self, user: float) -> float:
         return self.sign * (user - self.offset)
+
+    @property
+    def least_speed(self) -> float:
+        """A step an hour: nothing slower is taken by bushd. The last digit is left to it."""
+        return abs(self.resolution) / LONGEST_STEP_S * (1 - 1e-12)
 
     def steps(self, dial: float) -> int:
         return round(dial / self.resolution)
