@@ -11,13 +11,15 @@ from lab import LabTest, pyepics
 
 
 class Edges(LabTest):
-    def assert_one_edge(self, heard, end):
-        """DMOV 0, then 1; the last position before that, with its alarm; nothing of DMOV after it."""
+    def assert_one_edge(self, heard, end, moved=True):
+        """DMOV 0, then 1; the last position before that, with its alarm; nothing of DMOV after it. `moved`: it was not there already."""
         self.wait_until("the move to be done", lambda: heard.values("DMOV")[-1:] == [1])
         told = heard.take()
         self.assertEqual([value for field, value, _ in told if field == "DMOV"], [0, 1])
         before = told[: [index for index, (field, value, _) in enumerate(told) if (field, value) == ("DMOV", 1)][0]]
         positions = [value for field, value, _ in before if field == "RBV"]
+        if moved:
+            self.assertTrue(positions, told)
         if positions:
             self.assertAlmostEqual(positions[-1], end)
         return told
@@ -33,7 +35,7 @@ class Edges(LabTest):
             self.put(f"theta.{field}", value)
             # It has fallen, risen, and been heard before the put was answered.
             self.assertEqual(heard.values("DMOV"), [0, 1], field)
-            self.assert_one_edge(heard, to)
+            self.assert_one_edge(heard, to, moved=to != where)
             self.assertAlmostEqual(self.get("theta.RBV"), to)
             where = to
         self.end_all()
@@ -209,13 +211,15 @@ class Clients(LabTest):
         self.assertEqual((listed.returncode, listed.stdout), (1, ""))
         self.assertIn("bushd is not running", listed.stderr)
 
-    def test_set_does_not_outlive_its_client(self):
+    def test_set_and_val_by_two_programs_move_nothing(self):
         self.bring_up_lab()
-        sets = "import epics; epics.caput('LAB:theta.SET', 1, wait=True)"
-        subprocess.run([sys.executable, "-B", "-c", sets], check=True, timeout=60)
-        self.wait_for("theta.SET", lambda word: word == 0)
-        self.put("theta.VAL", 1.0)
-        self.assertEqual((self.get("theta.RBV"), self.get("theta.OFF")), (1.0, 0.0))
+        for field, value in (("SET", 1), ("VAL", 42)):
+            puts = f"import epics; epics.caput('LAB:theta.{field}', {value}, wait=True)"
+            subprocess.run([sys.executable, "-B", "-c", puts], check=True, timeout=60)
+        self.assertEqual((self.get("theta.RBV"), self.get("theta.OFF"), self.get("theta.SET")), (42.0, 42.0, 1))
+        self.put("theta.SET", 0)
+        self.end_all()
+        self.assertEqual(self.steps_made("theta"), 0)
 
     def test_what_is_above_vmax_is_vmax(self):
         self.bring_up_lab()
