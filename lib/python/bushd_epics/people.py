@@ -21,7 +21,7 @@ class People:
         self.spare: bushd.aio.Client | None = None  # the bridge's own
         self._clients: dict[str, bushd.aio.Client] = {}
         self._at_work: dict[str, int] = {}
-        # Of each user whose connection is being made: a second one would never be closed.
+        # Held while the connection of a user is made: a second one would never be closed.
         self._connecting: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
 
     async def client(self, who: str) -> bushd.aio.Client:
