@@ -252,6 +252,7 @@ class Clients(LabTest):
     def test_allstop_stops_all(self):
         self.bring_up_lab()
         for name in ("theta", "phi", "chi"):
+            self.put(f"{name}.VELO", 1.0)  # so that none of them arrives before all are seen to move
             self.put(f"{name}.VAL", 300.0, wait=False)
             self.wait_for(f"{name}.MOVN", lambda movn: movn == 1)
         self.put("allstop", 1)
