@@ -255,6 +255,39 @@ class Order(unittest.IsolatedAsyncioTestCase):
         self.assertTrue(self.world.answers["hold"])
 
 
+class Faults(unittest.IsolatedAsyncioTestCase):
+    """Of the bridge itself: a put is answered nevertheless."""
+
+    async def asyncSetUp(self):
+        self.world = World()
+
+    async def test_a_stop_that_fails_by_a_fault_of_the_bridge_fails_as_a_put(self):
+        async def stop(*names, wait=True, check=True):
+            raise KeyError("unforeseen")
+
+        self.world.put("theta", "VAL", 1.0, "a")
+        await settle()
+        self.world.made[0].stop = stop
+        with self.assertLogs("bushd-epics", "ERROR"):
+            self.world.put("theta", "STOP", 1, "a", "stop")
+            await settle()
+        self.assertIn("unforeseen", self.world.answers["stop"])
+
+    async def test_the_end_of_a_jog_that_fails_by_one_is_logged(self):
+        async def end(jog):
+            jog.done = True
+            raise KeyError("unforeseen")
+
+        before, Jog.end = Jog.end, end
+        self.addCleanup(setattr, Jog, "end", before)
+        self.world.put("theta", "JOGF", 1, "a")
+        await settle()
+        with self.assertLogs("bushd-epics", "ERROR"):
+            self.world.put("theta", "JOGF", 0, "a", "end")
+            await settle()
+        await self.world.asks.finish()
+
+
 class Connections(unittest.IsolatedAsyncioTestCase):
     async def asyncSetUp(self):
         self.world = World()

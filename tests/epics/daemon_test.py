@@ -65,6 +65,21 @@ class Records(unittest.IsolatedAsyncioTestCase):
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
 
+    async def test_it_ends_when_nobody_looks_any_more_whether_it_is_silent(self):
+        async def follow():
+            await asyncio.Event().wait()
+
+        async def fails():
+            raise KeyError("unforeseen")
+
+        self.daemon._follow = follow
+        self.daemon._watch_silence = fails
+        running = asyncio.create_task(self.daemon.run())
+        for _ in range(20):
+            await asyncio.sleep(0)
+        self.assertTrue(running.done(), "positions would stay as they are, and valid")
+        self.assertIsNotNone(running.exception())
+
     async def test_the_daemon_is_asked_to_stop_all_before_records_are(self):
         self.daemon._take(told("theta"), 0.0)
         order = []

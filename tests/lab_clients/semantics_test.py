@@ -166,15 +166,11 @@ class Clients(LabTest):
         self.end_all()
         self.assertEqual(self.steps_made("theta"), round(stands * 100))
 
-    def test_a_jog_ends_unless_it_is_put_again(self):
+    def test_a_jog_ends_that_is_not_put_again(self):
         self.bring_up_lab(bridge=["--longest-jog-s", "2"])
         heard = self.watch("theta.DMOV")
-        begins = time.monotonic()
-        self.put("theta.JOGF", 1)
-        time.sleep(1.2)
         self.put("theta.JOGF", 1)
         self.wait_for("theta.DMOV", lambda dmov: dmov == 1)
-        self.assertGreater(time.monotonic() - begins, 3.1)
         self.assertEqual((heard.values("DMOV"), self.get("theta.SEVR")), ([0, 1], 0))
         self.assertIn("--longest-jog-s", self.bridge.said())
 
@@ -184,22 +180,22 @@ class Clients(LabTest):
         self.assertFalse(filtered.wait_for_connection(2))
         self.assertEqual(self.get("theta.VAL"), 0.0)
 
-    def test_a_target_and_the_stop_of_another_user_are_both_answered(self):
+    def test_a_target_and_the_stop_of_another_program_are_both_answered(self):
         self.bring_up_lab()
-        puts = "import epics, os, sys; os.environ['USER'] = sys.argv[1]; p = epics.PV('LAB:theta.' + sys.argv[2]); p.wait_for_connection(10)\n"
-        puts += "print('there', flush=True); sys.stdin.readline(); done = p.put(int(sys.argv[3]), wait=True, timeout=20); print('done', done, flush=True)"
-        users = [
+        puts = "import epics, sys; p = epics.PV('LAB:theta.' + sys.argv[1]); p.wait_for_connection(10); print('there', flush=True)\n"
+        puts += "sys.stdin.readline(); print('answered', p.put(int(sys.argv[2]), wait=True, timeout=20), flush=True)"
+        programs = [
             subprocess.Popen([sys.executable, "-B", "-c", puts, *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-            for words in (("a", "VAL", "400"), ("b", "STOP", "1"))
+            for words in (("VAL", "400"), ("STOP", "1"))
         ]
-        for user in users:
-            self.addCleanup(user.kill)
-            self.assertEqual(user.stdout.readline(), "there\n")
-        for user in users:
-            user.stdin.write("\n")
-            user.stdin.flush()
-        for user in users:
-            self.assertRegex(user.communicate(timeout=60)[0], "done ")
+        for program in programs:
+            self.addCleanup(program.kill)
+            self.assertEqual(program.stdout.readline(), "there\n")
+        for program in programs:
+            program.stdin.write("\n")
+            program.stdin.flush()
+        for program in programs:
+            self.assertEqual(program.communicate(timeout=60)[0], "answered 1\n", "-1: not within 20 s")
         self.wait_for("theta.DMOV", lambda dmov: dmov == 1)
         stands = self.get("theta.RBV")
         self.end_all()

@@ -99,9 +99,8 @@ class Asks:
             for record, ask in group:
                 self._tell(record, record.refused, ask.number, str(error))
         except Exception as error:
-            LOG.exception("a move is given up")
             for record, ask in group:
-                self._tell(record, record.lost, ask.number, f"bushd-epics has failed: {error}")
+                self._fails_itself(record, ask, error)
         finally:
             turn.taken()
             self._people.end(who)
@@ -175,6 +174,8 @@ class Asks:
             self._tell(record, record.ended, ask.number, _ENDS[error.result.outcome], error.result.reason)
         except bushd.BushdError as error:
             self._failed(record, ask, error, False)
+        except Exception as error:
+            self._fails_itself(record, ask, error)
 
     async def _stop_and_look(self, client: bushd.aio.Client, record: Record) -> None:
         await client.stop(self._names[record])
@@ -191,6 +192,8 @@ class Asks:
             self._tell(record, record.ended, ask.number, End.REACHED, "")
         except bushd.BushdError as error:
             self._failed(record, ask, error, True)
+        except Exception as error:
+            self._fails_itself(record, ask, error)
 
     # -- all else
 
@@ -218,8 +221,7 @@ class Asks:
         except (TypeError, ValueError) as error:
             self._tell(record, record.refused, ask.number, str(error))
         except Exception as error:
-            LOG.exception("%s: what was asked for is given up", record.name)
-            self._tell(record, record.lost, ask.number, f"bushd-epics has failed: {error}")
+            self._fails_itself(record, ask, error)
         finally:
             self._open_jogs.discard(ask.number)
             self._let_go.discard(ask.number)
@@ -273,6 +275,11 @@ class Asks:
         lost = sent and not isinstance(error, bushd.Refused)
         LOG.warning("%s: %s", record.name, error)
         self._tell(record, record.lost if lost else record.refused, ask.number, str(error))
+
+    def _fails_itself(self, record: Record, ask: events.Ask, error: Exception) -> None:
+        """A fault of the bridge: who has put is answered nevertheless."""
+        LOG.error("%s: what was asked for is given up", record.name, exc_info=error)
+        self._tell(record, record.lost, ask.number, f"bushd-epics has failed: {error}")
 
     def _observe(self, record: Record, status: model.Status | None) -> None:
         name = self._names[record]

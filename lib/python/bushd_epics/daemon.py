@@ -57,24 +57,27 @@ class Daemon:
         self.why = ""  # nothing is heard of it; "": it is
 
     async def run(self) -> None:
-        """Until it is cancelled."""
-        watching = asyncio.create_task(self._watch_silence())
+        """Until it is cancelled, or a part of it has ended: then positions that are shown may be old."""
         try:
-            while True:
-                try:
-                    await self._follow()
-                    self.why = ""
-                except bushd.BushdError as error:
-                    if str(error) != self.why:
-                        LOG.warning("%s", error)
-                    await self._lose(str(error))
-                except Exception as error:
-                    LOG.exception("what bushd has told cannot be shown")
-                    await self._lose(f"bushd-epics has failed: {error}")
-                await asyncio.sleep(AGAIN_AFTER_S)
+            async with asyncio.TaskGroup() as parts:
+                parts.create_task(self._watch_silence())
+                parts.create_task(self._keep_following())
         finally:
-            watching.cancel()
             await self._people.close()
+
+    async def _keep_following(self) -> None:
+        while True:
+            try:
+                await self._follow()
+                self.why = ""
+            except bushd.BushdError as error:
+                if str(error) != self.why:
+                    LOG.warning("%s", error)
+                await self._lose(str(error))
+            except Exception as error:
+                LOG.exception("what bushd has told cannot be shown")
+                await self._lose(f"bushd-epics has failed: {error}")
+            await asyncio.sleep(AGAIN_AFTER_S)
 
     async def _lose(self, why: str) -> None:
         self.why = why
