@@ -2,16 +2,7 @@
 # beside the client, for tests; installed it has a folder of its own, where packages have caproto as well.
 set(epics_package ${CMAKE_CURRENT_BINARY_DIR}/bushd_epics)
 file(GLOB epics_modules CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/bushd_epics/*.py)
-set(epics_copies)
-foreach(file IN LISTS epics_modules)
-  get_filename_component(name ${file} NAME)
-  add_custom_command(
-    OUTPUT ${epics_package}/${name}
-    COMMAND ${CMAKE_COMMAND} -E copy ${file} ${epics_package}/${name}
-    DEPENDS ${file}
-    VERBATIM)
-  list(APPEND epics_copies ${epics_package}/${name})
-endforeach()
+bushd_copies(epics_copies ${epics_package} ${epics_modules})
 add_custom_target(bushd_epics ALL DEPENDS ${epics_copies})
 add_dependencies(bushd_epics bushd_python)
 

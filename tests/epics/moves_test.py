@@ -224,12 +224,7 @@ class Backlash(unittest.TestCase):
         self.assertIn("-50.3", bench.answers[token])
 
     def test_after_a_stop_it_is_made_up_for_and_the_move_has_failed_nevertheless(self):
-        bench = Bench()
-        bench.put("BDST", 0.5)
-        token = bench.put("VAL", -30.0)
-        move = bench.ask(events.Move)
-        bench.accept(move)
-        bench.at(-8.0, moving=True, busy=True)
+        bench, token, move = self.against()
         bench.put("STOP", 1)
         bench.end(bench.ask(events.Stop), End.REACHED)
         bench.at(-10.0)
