@@ -21,6 +21,11 @@ class Names(unittest.TestCase):
         self.assertEqual((read.of("theta"), read.of("spare"), read.of("phi"), read.hosts), ("m1", "", "phi", ("10.0.0.0/8",)))
         self.assertEqual(names.parse({}).hosts, ("127.0.0.1",))
 
+    def test_profiles_list_motors_as_bushd_has_them(self):
+        read = names.parse({"names": {"theta": "m1"}, "profiles": {"pm1": ["theta", "phi"], "pm2": ["chi"]}})
+        self.assertEqual(read.profiles, {"pm1": ("theta", "phi"), "pm2": ("chi",)})
+        self.assertEqual(names.NONE.profiles, {})
+
     def test_a_fault_names_its_key(self):
         for content, key in (
             ({"name": {}}, "name: unknown key"),
@@ -31,6 +36,12 @@ class Names(unittest.TestCase):
             ({"allow": {"hosts": "all"}}, "allow.hosts"),
             ({"allow": {"hosts": [""]}}, "allow.hosts"),
             ({"names": []}, "tables"),
+            ({"profiles": []}, "profiles is a table"),
+            ({"profiles": {"p 1": ["theta"]}}, "profiles.p 1"),
+            ({"profiles": {"pm1": "theta"}}, "profiles.pm1"),
+            ({"profiles": {"pm1": []}}, "profiles.pm1"),
+            ({"profiles": {"pm1": ["theta", "theta"]}}, "each once"),
+            ({"profiles": {"pm1": [str(number) for number in range(17)]}}, "1 to 16 motors"),
         ):
             with self.subTest(content=content), self.assertRaisesRegex(names.BadNames, key):
                 names.parse(content)

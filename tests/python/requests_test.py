@@ -144,6 +144,9 @@ class Requests(unittest.TestCase):
         self.assertEqual(asked(lambda c: c.follow(["m"], [0, 1], [[0], [4]], cubic=True, stretch=2)), [
             ("FOLLOW", {**motors, "part": kind.LAST_ROWS, "time_s": [0, 1], "positions": [0, 4]}),
             ("FOLLOW", {**motors, "part": kind.RUN})])
+        # To check it is the same without the part that begins it.
+        self.assertEqual(asked(lambda c: c.check_follow(["m"], [0, 1], [[0], [4]], cubic=True, stretch=2)), [
+            ("FOLLOW", {**motors, "part": kind.LAST_ROWS, "time_s": [0, 1], "positions": [0, 4]})])
 
     def test_a_jog_begins_changes_and_ends(self):
         async def jog(client):

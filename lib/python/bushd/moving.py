@@ -197,6 +197,18 @@ class Moving(Asking):
         parts = requests.follow(names, time_s, positions, array=self._trajectories, cubic=cubic, stretch=stretch)
         return await self._moved(parts, names, wait, check)
 
+    async def check_follow(
+        self, motors: Names, time_s: Iterable[float], positions: Rows, *, cubic: bool = False, stretch: float = 1.0
+    ) -> None:
+        """Whether such a `follow()` would be accepted, from wherever the motors stand then. Nothing moves.
+
+        Raises RequestFailed for what cannot be followed, and Refused, both as `follow()`.
+        """
+        self._trajectories += 1
+        array = self._trajectories
+        for part in requests.follow(list(motors), time_s, positions, array=array, cubic=cubic, stretch=stretch)[:-1]:
+            await self._ask(part)
+
     @overload
     async def home(self, *names: str, all: bool = False, speed: float | None = None, unit: str | None = None,
                    wait: Literal[True] = True, check: bool = True) -> model.MoveResult: ...

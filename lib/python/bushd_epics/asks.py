@@ -23,7 +23,7 @@ JOG_IS_LOOKED_AT_S = 0.02
 NEVER_BEGAN = "stopped before it began"
 MOTIONS = (events.Home, events.Jog, events.Resume)  # beside moves
 
-_ENDS = {
+ENDS = {
     model.Outcome.DONE: End.REACHED,
     model.Outcome.REACHED: End.REACHED,
     model.Outcome.STOPPED: End.STOPPED,
@@ -141,7 +141,7 @@ class Asks:
                 record.observe(motor.seen_at_end(record.seen, one), _now())
             else:
                 self._observe(record, status)
-            self._tell(record, record.ended, ask.number, _ENDS[one.outcome], "" if one.outcome.succeeded else result.reason)
+            self._tell(record, record.ended, ask.number, ENDS[one.outcome], "" if one.outcome.succeeded else result.reason)
 
     # -- what ends motions
 
@@ -171,7 +171,7 @@ class Asks:
             await stopping
             self._tell(record, record.ended, ask.number, End.REACHED, "")
         except bushd.RequestFailed as error:
-            self._tell(record, record.ended, ask.number, _ENDS[error.result.outcome], error.result.reason)
+            self._tell(record, record.ended, ask.number, ENDS[error.result.outcome], error.result.reason)
         except bushd.BushdError as error:
             self._failed(record, ask, error, False)
         except Exception as error:
@@ -212,7 +212,7 @@ class Asks:
             try:
                 outcome, reason = await self._ask(turn, client, record, ask)
             except bushd.RequestFailed as error:
-                outcome, reason = _ENDS[error.result.outcome], error.result.reason
+                outcome, reason = ENDS[error.result.outcome], error.result.reason
             turn.taken()
             self._observe(record, await _status(client))
             self._tell(record, record.ended, ask.number, outcome, reason)
@@ -293,7 +293,7 @@ class Asks:
 
 def _end_of(result: model.MoveResult, name: str) -> tuple[str, str]:
     outcome = next((one.outcome for one in result if one.motor == name), result.outcome)
-    return _ENDS[outcome], "" if outcome.succeeded else result.reason
+    return ENDS[outcome], "" if outcome.succeeded else result.reason
 
 
 async def _status(client: bushd.aio.Client) -> model.Status | None:

@@ -13,9 +13,11 @@ from caproto._dbr import native_type
 from caproto._utils import ConversionDirection
 
 from .fields import Kind, Value
+from .profile import MOST_POINTS
 from .record import Putter
 
 LONG_TEXT = 512
+MOST_CHARS = 256
 EVENTS = caproto.SubscriptionType.DBE_VALUE | caproto.SubscriptionType.DBE_LOG | caproto.SubscriptionType.DBE_ALARM
 
 PutFunction = Callable[[Value, Putter], None]
@@ -115,6 +117,46 @@ class Text(Channel, caproto.ChannelString):
         return str(value)
 
 
+class Doubles(Channel, caproto.ChannelDouble):
+    """A waveform."""
+
+    def get_field(self, field: str) -> Any:
+        """Clients of profiles put PROC after the array, which has been taken then already."""
+        if field != "PROC":
+            return super().get_field(field)
+        processed = Short(value=0)
+        processed.putter = lambda value, by: by.token("")
+        return processed
+
+    def show(self, value: Any) -> None:
+        self.set_value(list(value))
+
+    def read_put(self, command: Any) -> Any:
+        source = native_type(command.data_type)
+        try:
+            values = backend.convert_values(
+                values=command.data,
+                from_dtype=source,
+                to_dtype=ChannelType.STRING if source is ChannelType.STRING else ChannelType.DOUBLE,
+                string_encoding="latin-1",
+                direction=ConversionDirection.FROM_WIRE,
+            )
+            numbers = tuple(float(one) for one in values)
+        except (LookupError, ValueError, TypeError, OverflowError, caproto.CaprotoError) as error:
+            raise BadPut(f"no numbers: {error}") from None
+        if len(numbers) > self.max_length:
+            raise BadPut(f"{len(numbers)} values; it holds {self.max_length}")
+        return numbers
+
+    def describe(self, unit: str, precision: int, low: float, high: float) -> None:
+        self._data.update(units=unit[:8], precision=precision)
+
+
+class Chars(Channel, caproto.ChannelChar):
+    def show(self, value: Value) -> None:
+        self.set_value(str(value).encode("latin-1", "replace")[: MOST_CHARS - 1].decode("latin-1"))
+
+
 def _whole(value: str | float, limit: int) -> int:
     number = float(value)
     if number != int(number) or not -limit <= number < limit:
@@ -122,7 +164,7 @@ def _whole(value: str | float, limit: int) -> int:
     return int(number)
 
 
-def make(kind: Kind, value: Value, words: tuple[str, ...], alarm: Any, record_type: str) -> Any:
+def make(kind: Kind, value: Any, words: tuple[str, ...], alarm: Any, record_type: str) -> Any:
     how = {"alarm": alarm, "reported_record_type": record_type}
     match kind:
         case Kind.DOUBLE:
@@ -133,6 +175,12 @@ def make(kind: Kind, value: Value, words: tuple[str, ...], alarm: Any, record_ty
             return Short(value=int(value), **how)
         case Kind.ENUM:
             return Enum(value=words[int(value)], enum_strings=list(words), **how)
+        case Kind.ARRAY:
+            return Doubles(value=list(value), precision=3, units="", max_length=MOST_POINTS, **how)
+        case Kind.CHARS:
+            made = Chars(value="", max_length=MOST_CHARS, string_encoding="latin-1", **how)
+            made.show(value)
+            return made
     return Text(value=str(value), long_string_max_length=LONG_TEXT, **how)
 
 

@@ -15,6 +15,7 @@ from . import events, motor
 from .asks import Asks
 from .deferred import Deferred
 from .events import End, Speeds
+from .flights import Flights
 from .people import People, connect
 from .record import Record
 
@@ -49,6 +50,7 @@ class Daemon:
         self._speeds_of: dict[str, Any] = {}
         self._timers: dict[Record, asyncio.TimerHandle] = {}
         self._asks = Asks(self._people, self._names, self.deliver)
+        self.flights = Flights(self._people, self.records)
         self.deferred = Deferred()
         self._heard_at = 0.0
         self._silent = False
@@ -253,6 +255,7 @@ class Daemon:
     async def stop_all(self, who: str) -> None:
         """The daemon first; then what records still have in mind."""
         stopping = self._asks.stop_all(who)
+        self.flights.no_more()
         for record in self.records.values():
             self._drop_deferred(record)
             record.halt(who, _now())

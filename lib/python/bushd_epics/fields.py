@@ -19,6 +19,8 @@ class Kind(enum.Enum):
     SHORT = "short"
     ENUM = "enum"
     STRING = "string"
+    ARRAY = "array"  # of numbers, of profiles
+    CHARS = "chars"  # a longer text, of profiles
 
 
 Value = float | int | str

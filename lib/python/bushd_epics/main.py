@@ -85,6 +85,8 @@ async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
 
         daemons.append(Daemon(socket or None, record_name, server))
         server.add_daemon(daemons[-1])
+        for profile, motors in names.profiles.items():
+            server.add_profile(daemons[-1], f"{begins}{profile}:", motors)
     server.make_common()
     following = [asyncio.create_task(daemon.run()) for daemon in daemons]
     try:

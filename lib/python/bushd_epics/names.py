@@ -10,6 +10,7 @@ from typing import Any
 
 from .access import LOCAL
 
+MOST_AXES = 16  # of a profile
 MAX_NAME = 60  # of a process variable, with prefix and field
 _NAME = re.compile(r"[A-Za-z0-9_\-+:\[\]<>;]+")
 
@@ -22,6 +23,7 @@ class BadNames(Exception):
 class Names:
     motors: Mapping[str, str]  # by motor as bushd has it; "": it is not shown
     hosts: tuple[str, ...]
+    profiles: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)  # motors as bushd has them: M1, M2 and so on
 
     def of(self, motor: str) -> str:
         """What comes after the prefix; characters that EPICS has not are underscores."""
@@ -44,9 +46,9 @@ def read(path: str) -> Names:
 
 
 def parse(content: Mapping[str, Any]) -> Names:
-    unknown = set(content) - {"names", "allow"}
+    unknown = set(content) - {"names", "allow", "profiles"}
     if unknown:
-        raise BadNames(f"{sorted(unknown)[0]}: unknown key; allowed here: names, allow")
+        raise BadNames(f"{sorted(unknown)[0]}: unknown key; allowed here: names, allow, profiles")
     names, allow = content.get("names", {}), content.get("allow", {})
     if not isinstance(names, dict) or not isinstance(allow, dict):
         raise BadNames("names and allow are tables: [names], [allow]")
@@ -62,4 +64,16 @@ def parse(content: Mapping[str, Any]) -> Names:
     twice = next((name for name in shown if shown.count(name) > 1), None)
     if twice is not None:
         raise BadNames(f"names: {twice} is the name of two motors")
-    return Names(dict(names), tuple(hosts))
+    return Names(dict(names), tuple(hosts), _profiles(content.get("profiles", {})))
+
+
+def _profiles(content: Any) -> Mapping[str, tuple[str, ...]]:
+    if not isinstance(content, dict):
+        raise BadNames("profiles is a table: [profiles]")
+    for name, motors in content.items():
+        if not _NAME.fullmatch(name):
+            raise BadNames(f"profiles.{name}: letters, digits and _-+:[]<>; are allowed")
+        listed = motors if isinstance(motors, list) and all(isinstance(motor, str) and motor for motor in motors) else []
+        if not 1 <= len(listed) <= MOST_AXES or len(set(listed)) < len(listed):
+            raise BadNames(f'profiles.{name}: a list of 1 to {MOST_AXES} motors, each once, such as ["theta", "phi"]')
+    return {name: tuple(motors) for name, motors in content.items()}

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import logging
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import caproto
 
-from . import channels, events
+from . import channels, compare, events
 from .access import Access
 from .circuits import Circuit, Context
 from .daemon import Daemon
 from .fields import FIELDS, Kind, Value
 from .jogs import Jogs
+from .leaves import Leaves
+from .profile import Profile, all_fields
 from .record import Putter, Record
 
 LOG = logging.getLogger("bushd-epics")
@@ -27,15 +30,17 @@ ABLE = ("Enable", "Disable")
 class Pages:
     """The variables of one record."""
 
-    def __init__(self, record: Record, deliver: Callable[[Record], None], jogs: Jogs) -> None:
+    def __init__(self, record: Record, daemon: Daemon, jogs: Jogs) -> None:
         self.record = record
+        self._flights = daemon.flights
         self._jogs = jogs
-        self._deliver = deliver
+        self._deliver = daemon.deliver
         self._alarm = caproto.ChannelAlarm(
             status=int(record.alarm.status), severity=int(record.alarm.severity), alarm_string=record.alarm.reason
         )
         self._fields: dict[str, Any] = {}
         self._able: Any = None
+        self._compare: Leaves | None = None
         self._held = False
 
     def field(self, name: str) -> Any:
@@ -56,6 +61,16 @@ class Pages:
             self._able = channels.make(Kind.ENUM, int(self._held), ABLE, self._alarm, "bo")
             self._able.putter = self._put_able
         return self._able
+
+    def compare(self, name: str) -> Any:
+        """`NAMEPCOEnable` and what belongs to it. Raises KeyError."""
+        if self._compare is None:
+            made = self._flights.compare(self.record, lambda field, value: leaves.show(field, value))
+            leaves = Leaves(compare.FIELDS, made.values, self._put_compare, self._alarm)
+            self._compare = leaves
+        channel = self._compare.find(name)
+        self._compare.describe(str(self.record.values["EGU"]), int(self.record.values["PREC"]))
+        return channel
 
     def post(self, event: events.Post) -> None:
         channel = self._fields.get(event.field)
@@ -92,8 +107,14 @@ class Pages:
     def _put(self, name: str, value: Value, by: Putter) -> None:
         if name in ("JOGF", "JOGR") and value and self._jogs.renew(self.record, name, by.circuit, _now()):
             return by.token("")
+        if self._flights.flies(self.record) and (name == "STOP" and value or name == "SPMG" and not value):
+            self._flights.stop(self.record, by)
+            by = dataclasses.replace(by, token=None)
         self.record.put(name, value, by, _now())
         self._deliver(self.record)
+
+    def _put_compare(self, name: str, value: Any, by: Putter) -> None:
+        self._flights.put_compare(self.record, name, value, by)
 
     def _put_able(self, value: Value, by: Putter) -> None:
         self.record.hold(bool(value), by)
@@ -114,11 +135,22 @@ class Server(Context):
         self._pages: dict[str, Pages] = {}
         self._of: dict[Record, Pages] = {}
         self._common: dict[str, Any] = {}
+        self._profiles: dict[str, tuple[Profile, Leaves]] = {}  # by what their names begin with
         self._refused: set[str] = set()
         self._work: set[asyncio.Task[None]] = set()
 
     def add_daemon(self, daemon: Daemon) -> None:
         self._all.append(daemon)
+
+    def add_profile(self, daemon: Daemon, begins: str, motors: Sequence[str]) -> None:
+        """`begins`: what all its names begin with, "LAB:pm1:"."""
+        if begins in self._profiles:
+            LOG.error("%s is the name of two profiles: the second one is not shown", begins)
+            return
+        profile = Profile(begins, motors)
+        leaves = Leaves(profile.fields, profile.values, lambda field, value, by: daemon.flights.put(profile, field, value, by))
+        daemon.flights.add(profile, leaves.show)
+        self._profiles[begins] = profile, leaves
 
     def make_common(self) -> None:
         """Of all motors."""
@@ -131,7 +163,9 @@ class Server(Context):
     def names(self) -> list[str]:
         """All of them."""
         records = [f"{name}.{field}" for name in sorted(self._pages) for field in FIELDS]
-        return [*records, *(f"{name}_able" for name in sorted(self._pages)), *self._common]
+        able = [f"{name}_able" for name in sorted(self._pages)]
+        compares = [f"{name}{field}" for name, pages in sorted(self._pages.items()) if not pages.record.is_axis for field in compare.FIELDS]
+        return [*records, *able, *compares, *all_fields(profile for profile, _ in self._profiles.values()), *self._common]
 
     # -- for caproto
 
@@ -154,7 +188,19 @@ class Server(Context):
             return self._pages[record].field(field)
         if record.endswith("_able") and record.removesuffix("_able") in self._pages:
             return self._pages[record.removesuffix("_able")].able().get_field(field)
-        return self._common[record].get_field(field)
+        if record in self._common:
+            return self._common[record].get_field(field)
+        return self._find_beside(record).get_field(field)
+
+    def _find_beside(self, name: str) -> Any:
+        """A variable of a profile or of a position compare. Raises KeyError."""
+        begins, colon, field = name.rpartition(":")
+        if begins + colon in self._profiles:
+            return self._profiles[begins + colon][1].find(field)
+        motor, pco, field = name.rpartition("PCO")
+        if not pco or self._pages[motor].record.is_axis:
+            raise KeyError(name)
+        return self._pages[motor].compare(pco + field)
 
     async def look_up_names(self) -> None:
         """Of hosts that may put, as long as some were not found: at boot the network may not be there yet."""
@@ -194,7 +240,7 @@ class Server(Context):
         if record.name in self._pages:
             LOG.error("%s is the name of two motors: the second one is not shown", record.name)
         else:
-            self._pages[record.name] = Pages(record, daemon.deliver, self.jogs)
+            self._pages[record.name] = Pages(record, daemon, self.jogs)
         self._daemons[record] = daemon
         self._of[record] = self._pages[record.name]
 

@@ -1,0 +1,272 @@
+"""Carries out what profiles and position compares of one daemon ask for, by `bushd.aio`."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from typing import Any
+
+import bushd
+import bushd.aio
+from bushd import model
+from bushd.motion import Motion
+
+from . import compare, events, profile
+from .asks import ENDS, NEVER_BEGAN
+from .compare import Compare
+from .events import End, Seen
+from .people import People
+from .profile import BadProfile, Profile, Trajectory
+from .record import Putter, Record
+
+LOG = logging.getLogger("bushd-epics")
+POINTS_ARE_TOLD_EVERY_S = 0.1
+
+Show = Callable[[str, Any], None]  # a field and its value
+
+
+class Flight:
+    def __init__(self, motors: tuple[str, ...]) -> None:
+        self.motors = motors
+        self.stopped = False  # nothing of it begins any more
+
+
+class Flights:
+    def __init__(self, people: People, records: Mapping[str, Record]) -> None:
+        """`records`: by motor."""
+        self._people = people
+        self._records = records
+        self._under_way: dict[Profile, Flight] = {}
+        self._shows: dict[Profile | Compare, Show] = {}
+        self._compares: dict[Record, Compare] = {}
+        self._comparing = asyncio.Lock()  # what was put last holds
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def add(self, one: Profile, show: Show) -> None:
+        self._shows[one] = show
+
+    def compare(self, record: Record, show: Show) -> Compare:
+        made = self._compares[record] = Compare(record.name)
+        self._shows[made] = show
+        return made
+
+    def put(self, one: Profile, field: str, value: Any, by: Putter) -> None:
+        one.put(field, value, by, self._where)
+        self._deliver(one)
+
+    def put_compare(self, record: Record, field: str, value: Any, by: Putter) -> None:
+        one = self._compares[record]
+        one.put(field, value, by)
+        self._deliver_compare(record, one)
+
+    async def finish(self) -> None:
+        """Once nothing is under way any more."""
+        while self._tasks:
+            await asyncio.wait(set(self._tasks))
+
+    # -- stops
+
+    def flies(self, record: Record) -> bool:
+        motor = self._motor(record)
+        return any(motor in flight.motors for flight in self._under_way.values())
+
+    def stop(self, record: Record, by: Putter) -> None:
+        """The flights of this record's motor, with all their motors; the put is answered when the daemon has answered."""
+        motor = self._motor(record)
+        flights = [flight for flight in self._under_way.values() if motor in flight.motors]
+        for flight in flights:
+            flight.stopped = True
+        motors = sorted({name for flight in flights for name in flight.motors})
+
+        def answer(error: str) -> None:
+            if by.token is not None:
+                by.token(error)
+
+        self._spawn(self._stop(motors, str(by.who), answer))
+
+    def no_more(self) -> None:
+        """All motors are being stopped: nothing of what flies begins any more."""
+        for flight in self._under_way.values():
+            flight.stopped = True
+
+    async def _stop(self, motors: list[str], who: str, answer: Callable[[str], None]) -> None:
+        """Over a connection that is ready, whosever."""
+        self._people.begin(who)
+        error = ""
+        try:
+            client, _ = self._people.ready(who)
+            await (client or await self._people.client(who)).stop(*motors)
+        except bushd.BushdError as failed:
+            error = str(failed)
+        except Exception as failed:
+            LOG.error("a stop is given up", exc_info=failed)
+            error = f"bushd-epics has failed: {failed}"
+        finally:
+            self._people.end(who)
+        answer(error)
+
+    # -- profiles
+
+    def _deliver(self, one: Profile) -> None:
+        for event in one.take():
+            match event:
+                case events.Post():
+                    self._shows[one](event.field, event.value)
+                case events.Done():
+                    if event.error:
+                        LOG.warning("%s", event.error)
+                    event.token(event.error)
+                case profile.Check():
+                    self._spawn(self._check(one, event))
+                case profile.Fly():
+                    # Before anything else has its turn: a stop that comes now ends it.
+                    self._under_way[one] = Flight(event.trajectory.motors)
+                    self._spawn(self._fly(one, event))
+                case profile.Abort():
+                    self._abort(one, event.by)
+
+    def _abort(self, one: Profile, by: Putter) -> None:
+        flight = self._under_way.get(one)
+        if flight is None:
+            one.aborted(by)
+            return self._deliver(one)
+        flight.stopped = True
+
+        def answer(error: str) -> None:
+            one.aborted(by, error)
+            self._deliver(one)
+
+        self._spawn(self._stop(list(flight.motors), str(by.who), answer))
+
+    async def _check(self, one: Profile, ask: profile.Check) -> None:
+        made = ask.trajectory
+
+        async def asks(client: bushd.aio.Client) -> tuple[str, str]:
+            await client.check_follow(made.motors, made.time_s, made.rows, cubic=True)
+            return End.REACHED, ""
+
+        end, reason = await self._over(str(ask.who), asks)
+        one.checked("" if end == End.REACHED else reason or end)
+        self._deliver(one)
+
+    async def _fly(self, one: Profile, ask: profile.Fly) -> None:
+        made, flight = ask.trajectory, self._under_way[one]
+
+        async def flies(client: bushd.aio.Client) -> tuple[str, str]:
+            async def move() -> Motion:
+                return await client.move(dict(zip(made.motors, made.rows[0])), speed=self._speed(made), wait=False)
+
+            async def follow() -> Motion:
+                return await client.follow(made.motors, made.time_s, made.rows, cubic=True, wait=False)
+
+            end, reason = await self._leg(flight, client, move)
+            return await self._leg(flight, client, follow, one) if end == End.REACHED else (end, reason)
+
+        end, reason = await self._over(str(ask.who), flies)
+        del self._under_way[one]
+        one.over(End.STOPPED if flight.stopped and end != End.REACHED else end, reason)
+        self._deliver(one)
+
+    async def _leg(
+        self, flight: Flight, client: bushd.aio.Client, begin: Callable[[], Awaitable[Motion]], one: Profile | None = None
+    ) -> tuple[str, str]:
+        """`one`: this is what the profile calls its execution."""
+        if flight.stopped:
+            return End.STOPPED, NEVER_BEGAN
+        motion = await begin()
+        if flight.stopped:  # the stop may have overtaken it
+            await client.stop(*flight.motors, wait=False, check=False)
+        telling = None
+        if one is not None:
+            one.flying()
+            self._deliver(one)
+            telling = asyncio.create_task(self._tell_points(one))
+        try:
+            result = await motion.wait(check=False)
+        finally:
+            if telling is not None:
+                telling.cancel()
+        return ENDS[result.outcome], "" if result.outcome.succeeded else result.reason
+
+    async def _tell_points(self, one: Profile) -> None:
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        while True:
+            await asyncio.sleep(POINTS_ARE_TOLD_EVERY_S)
+            one.passed(loop.time() - began)
+            self._deliver(one)
+
+    async def _over(self, who: str, work: Callable[[bushd.aio.Client], Awaitable[tuple[str, str]]]) -> tuple[str, str]:
+        """Over the connection of this user; how it has ended."""
+        self._people.begin(who)
+        try:
+            return await work(await self._people.client(who))
+        except bushd.RequestFailed as error:
+            outcome: model.Outcome = error.result.outcome
+            return End.FAULT if outcome.succeeded else ENDS[outcome], error.result.reason
+        except (bushd.BushdError, TypeError, ValueError) as error:
+            return End.FAULT, str(error)
+        except Exception as error:
+            LOG.error("what was asked for is given up", exc_info=error)
+            return End.FAULT, f"bushd-epics has failed: {error}"
+        finally:
+            self._people.end(who)
+
+    def _speed(self, made: Trajectory) -> float | None:
+        """To the first row: a request has one speed, so the least VELO that somebody has set."""
+        speeds = [self._records[motor].floor("VELO") for motor in made.motors if motor in self._records]
+        return min((speed for speed in speeds if speed is not None), default=None)
+
+    def _where(self, motor: str) -> Seen:
+        record = self._records.get(motor)
+        if record is None:
+            raise BadProfile(f"{motor}: bushd has no motor of this name, or names.toml does not show it")
+        if record.is_axis:
+            raise BadProfile(f"{motor} is a pseudo-axis; name its motors in [profiles]")
+        if record.silent or not record.seen.live:
+            raise BadProfile(f"{motor}: {record.silent or 'its MCU is offline'}")
+        return record.seen
+
+    def _motor(self, record: Record) -> str:
+        return next((motor for motor, other in self._records.items() if other is record), "")
+
+    # -- position compare
+
+    def _deliver_compare(self, record: Record, one: Compare) -> None:
+        for event in one.take():
+            match event:
+                case events.Post():
+                    self._shows[one](event.field, event.value)
+                case events.Done():
+                    if event.error:
+                        LOG.warning("%s: %s", one.name, event.error)
+                    event.token(event.error)
+                case compare.Set():
+                    self._spawn(self._set_compare(record, one, event))
+
+    async def _set_compare(self, record: Record, one: Compare, ask: compare.Set) -> None:
+        async def asks(client: bushd.aio.Client) -> tuple[str, str]:
+            await client.position_compare(
+                self._motor(record), ask.position, positive=ask.on, negative=ask.on, width_us=ask.width_us
+            )
+            return End.REACHED, ""
+
+        async with self._comparing:
+            end, reason = await self._over(str(ask.by.who), asks)
+        one.answered(ask, "" if end == End.REACHED else reason or end)
+        self._deliver_compare(record, one)
+        if end == End.REACHED and ask.on:
+            for other, its in self._compares.items():
+                if other is not record and its.is_on and _mcu(other) == _mcu(record):
+                    its.replaced()
+                    self._deliver_compare(other, its)
+
+    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(coroutine)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+
+def _mcu(record: Record) -> str:
+    return record.seen.place.partition(" ")[0]

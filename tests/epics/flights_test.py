@@ -1,0 +1,269 @@
+#!/usr/bin/env python3
+"""What is asked of the daemon for a profile, in which order, and what a stop at any moment does to it: a fake client."""
+
+import asyncio
+import dataclasses
+import types
+import unittest
+
+from bench import REST
+from bushd import Refused, model
+from bushd_epics.events import Speeds
+from bushd_epics.flights import Flights
+from bushd_epics.people import People
+from bushd_epics.profile import Profile
+from bushd_epics.record import Putter, Record
+
+START = {"theta": 0.0, "phi": 5.0}
+
+
+async def settle():
+    """Whatever can go on has gone on."""
+    for _ in range(50):
+        await asyncio.sleep(0)
+
+
+class Motion:
+    def __init__(self):
+        self.ends = asyncio.get_running_loop().create_future()
+
+    async def wait(self, *, check=True):
+        outcome = await self.ends
+        return model.MoveResult(outcome, "" if outcome is model.Outcome.REACHED else f"it has ended: {outcome.value}")
+
+
+class Client:
+    connected = True
+
+    def __init__(self, world, who):
+        self.world, self.who = world, who
+
+    async def check_follow(self, motors, time_s, rows, *, cubic):
+        self.world.sent.append((self.who, "check", tuple(motors)))
+        if self.world.refuses:
+            raise Refused(self.world.refuses)
+
+    async def move(self, targets, *, speed, wait):
+        return await self._begin("move", (dict(targets), speed))
+
+    async def follow(self, motors, time_s, rows, *, cubic, wait):
+        return await self._begin("follow", tuple(motors))
+
+    async def _begin(self, what, of):
+        self.world.sent.append((self.who, what, of))
+        await self.world.accepts.wait()
+        self.world.motions.append(Motion())
+        return self.world.motions[-1]
+
+    async def stop(self, *names, wait=True, check=True):
+        self.world.sent.append((self.who, "stop", names))
+
+    async def position_compare(self, name, position, *, positive, negative, width_us):
+        self.world.sent.append((self.who, "compare", (name, position, positive, negative, width_us)))
+        if self.world.refuses:
+            raise Refused(self.world.refuses)
+
+
+class World:
+    def __init__(self):
+        self.sent, self.motions, self.answers, self.shown = [], [], {}, {}
+        self.refuses = ""
+        self.accepts = asyncio.Event()
+        self.accepts.set()
+        self.records = {}
+        for number, name in enumerate(("theta", "phi", "chi")):
+            self.records[name] = record = Record(f"LAB:{name}")
+            place = f"@hall:{1 + number // 2} {number % 2}"
+            record.observe(dataclasses.replace(REST, place=place), 0.0)
+            record.speeds(Speeds(top=25.0, least=1.0, ramp_s=0.2))
+        self.flights = Flights(People(self.connect), self.records)
+        self.profile = Profile("LAB:pm1:", ["theta", "phi"])
+        self.flights.add(self.profile, self.shown.__setitem__)
+        for field, value in (
+            ("NumPoints", 3), ("Acceleration", 0.0), ("M1UseAxis", 1), ("M1Positions", (0.0, 1.0, 2.0)), ("M2UseAxis", 1), ("M2Positions", (5.0, 6.0, 5.0)),
+        ):  # fmt: skip
+            self.put(field, value)
+
+    async def connect(self, program):
+        return Client(self, program.removeprefix("epics:"))
+
+    def by(self, token, who="me:pc"):
+        return Putter(who=who, token=lambda error: self.answers.__setitem__(token, error))
+
+    def put(self, field, value, who="me:pc"):
+        self.flights.put(self.profile, field, value, self.by(field, who))
+
+    async def built(self):
+        self.put("Build", 1)
+        await settle()
+        assert self.answers["Build"] == "", self.answers
+        self.sent.clear()
+
+    def end(self, outcome=model.Outcome.REACHED):
+        self.motions[-1].ends.set_result(outcome)
+
+    def whats(self):
+        return [what for _, what, _ in self.sent]
+
+
+class Profiles(unittest.IsolatedAsyncioTestCase):
+    async def asyncSetUp(self):
+        self.world = World()
+        await self.world.built()
+
+    def state(self):
+        values = self.world.profile.values
+        return values["Execute"], values["ExecuteState"], values["ExecuteStatus"]
+
+    async def test_motors_go_to_the_first_row_and_follow_from_there(self):
+        world = self.world
+        world.put("Execute", 1)
+        await settle()
+        self.assertEqual(world.sent, [("me:pc", "move", (START, None))])
+        self.assertEqual(self.state(), (1, 1, 0))
+        world.end()
+        await settle()
+        self.assertEqual(world.sent[1:], [("me:pc", "follow", ("theta", "phi"))])
+        self.assertEqual((self.state(), world.shown["ExecuteState"], "Execute" in world.answers), ((1, 2, 0), 2, False))
+        world.end()
+        await settle()
+        self.assertEqual((self.state(), world.answers["Execute"]), ((0, 0, 1), ""))
+        self.assertFalse(world.flights.flies(world.records["theta"]))
+
+    async def test_the_first_move_keeps_the_least_velo(self):
+        self.world.records["phi"].put("VELO", 2.0, Putter(), 0.0)
+        self.world.put("Execute", 1)
+        await settle()
+        self.assertEqual(self.world.sent[0][2], (START, 2.0))
+
+    async def test_what_the_daemon_refuses_fails_the_build(self):
+        self.world.refuses = "theta: 9 steps/s more than its table allows"
+        self.world.put("Build", 1)
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await settle()
+        self.assertEqual((self.world.shown["BuildStatus"], self.world.shown["BuildMessage"]), (2, self.world.refuses))
+        self.assertIn(self.world.refuses, self.world.answers["Build"])
+
+    async def test_who_builds_and_who_executes_has_a_connection_of_his_own(self):
+        self.world.put("Execute", 1, who="you:pc")
+        await settle()
+        self.assertEqual(self.world.sent[0][0], "you:pc")
+
+    async def test_a_first_move_that_does_not_arrive_ends_it(self):
+        self.world.put("Execute", 1)
+        await settle()
+        self.world.end(model.Outcome.LIMIT)
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await settle()
+        self.assertEqual((self.world.whats(), self.state()), (["move"], (0, 0, 2)))
+        self.assertEqual(self.world.shown["ExecuteMessage"], "it has ended: limit")
+
+    async def test_an_abort_stops_all_its_motors(self):
+        for legs in (1, 2):
+            with self.subTest(legs=legs):
+                self.world.sent.clear()
+                self.world.put("Execute", 1)
+                await settle()
+                if legs == 2:
+                    self.world.end()
+                    await settle()
+                self.world.put("Abort", 1)
+                await settle()
+                self.assertEqual(self.world.sent[-1], ("me:pc", "stop", ("theta", "phi")))
+                self.world.end(model.Outcome.STOPPED)
+                with self.assertLogs("bushd-epics", "WARNING"):
+                    await settle()
+                self.assertEqual((self.state(), self.world.answers["Abort"]), ((0, 0, 3), ""))
+                self.assertEqual(len(self.world.sent), legs + 1)
+
+    async def test_a_stop_between_the_legs_lets_the_second_one_never_begin(self):
+        """The first one has arrived before the stop, so the stop finds motors at rest."""
+        self.world.put("Execute", 1)
+        await settle()
+        self.world.end()
+        self.world.flights.stop(self.world.records["phi"], self.world.by("STOP", "other:pc"))
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await settle()
+        self.assertEqual((self.world.whats(), self.state()), (["move", "stop"], (0, 0, 3)))
+        self.assertEqual(self.world.answers["STOP"], "")
+
+    async def test_a_flight_that_a_stop_may_have_overtaken_is_stopped_once_it_is_accepted(self):
+        self.world.put("Execute", 1)
+        await settle()
+        self.world.accepts.clear()
+        self.world.end()
+        await settle()
+        self.world.flights.stop(self.world.records["theta"], self.world.by("STOP"))
+        await settle()
+        self.assertEqual(self.world.whats(), ["move", "follow", "stop"])
+        self.world.accepts.set()
+        await settle()
+        self.assertEqual(self.world.whats(), ["move", "follow", "stop", "stop"])
+
+    async def test_a_stop_of_all_lets_nothing_begin(self):
+        self.world.put("Execute", 1)
+        self.world.flights.no_more()
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await settle()
+        self.assertEqual((self.world.sent, self.state()), ([], (0, 0, 3)))
+
+    async def test_motors_that_are_not_heard_or_not_shown_cannot_be_built(self):
+        def fails(why):
+            with self.assertLogs("bushd-epics", "WARNING"):
+                self.world.put("Build", 1)
+            self.assertIn(why, self.world.answers["Build"])
+
+        self.world.records["theta"].fall_silent("bushd is not running", 0.0)
+        fails("bushd is not running")
+        del self.world.records["theta"]
+        fails("no motor of this name")
+        self.assertEqual(self.world.sent, [])
+
+    async def test_a_fault_of_the_bridge_ends_it_as_a_failure(self):
+        async def broken(self, *arguments, **how):
+            raise KeyError("unforeseen")
+
+        self.addCleanup(setattr, Client, "follow", Client.follow)
+        Client.follow = broken
+        self.world.put("Execute", 1)
+        await settle()
+        self.world.end()
+        with self.assertLogs("bushd-epics", "ERROR"):
+            await settle()
+        self.assertEqual((self.state(), types.SimpleNamespace(**self.world.shown).ExecuteStatus), ((0, 0, 2), 2))
+
+
+class Compares(unittest.IsolatedAsyncioTestCase):
+    async def asyncSetUp(self):
+        self.world = World()
+        self.values = {}
+        for name, record in self.world.records.items():
+            self.values[name] = self.world.flights.compare(record, lambda field, value: None).values
+
+    async def put(self, name, field, value):
+        self.world.flights.put_compare(self.world.records[name], field, value, self.world.by(name))
+        await settle()
+
+    def on(self):
+        return [name for name, values in self.values.items() if values["PCOEnable_RBV"]]
+
+    async def test_an_mcu_compares_for_one_motor(self):
+        await self.put("theta", "PCOStartPosition", 2.0)
+        await self.put("theta", "PCOEnable", 1)
+        self.assertEqual(self.world.sent, [("me:pc", "compare", ("theta", 2.0, True, True, 10))])
+        await self.put("chi", "PCOEnable", 1)
+        self.assertEqual(self.on(), ["theta", "chi"])
+        await self.put("phi", "PCOEnable", 1)
+        self.assertEqual(self.on(), ["phi", "chi"])
+        await self.put("phi", "PCOEnable", 0)
+        self.assertEqual((self.world.sent[-1], self.on()), (("me:pc", "compare", ("phi", 0.0, False, False, 10)), ["chi"]))
+
+    async def test_a_refusal_fails_the_put(self):
+        self.world.refuses = "MCU hall:1 has no position compare output"
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await self.put("theta", "PCOEnable", 1)
+        self.assertEqual((self.world.answers["theta"], self.on()), (self.world.refuses, []))
+
+
+if __name__ == "__main__":
+    unittest.main()
