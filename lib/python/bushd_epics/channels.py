@@ -175,7 +175,7 @@ def make(kind: Kind, value: Any, words: tuple[str, ...], alarm: Any, record_type
             return Short(value=int(value), **how)
         case Kind.ENUM:
             return Enum(value=words[int(value)], enum_strings=list(words), **how)
-        case Kind.ARRAY:
+        case Kind.WAVEFORM:
             return Doubles(value=list(value), precision=3, units="", max_length=MOST_POINTS, **how)
         case Kind.CHARS:
             made = Chars(value="", max_length=MOST_CHARS, string_encoding="latin-1", **how)

@@ -19,7 +19,7 @@ class Kind(enum.Enum):
     SHORT = "short"
     ENUM = "enum"
     STRING = "string"
-    ARRAY = "array"  # of numbers, of profiles
+    WAVEFORM = "waveform"  # numbers, of profiles
     CHARS = "chars"  # a longer text, of profiles
 
 

@@ -47,6 +47,11 @@ class Leaves:
             self._show_severity(name, value)
             self._channels[name].show(value)
 
+    def alarm_has_changed(self) -> None:
+        """What is read from now on has it."""
+        for channel in self._channels.values():
+            channel._content.clear()
+
     def describe(self, unit: str, precision: int) -> None:
         """Of those that are positions of a motor."""
         for name, channel in self._channels.items():
@@ -65,6 +70,6 @@ _RECORDS = {
     Kind.DOUBLE: "ao",
     Kind.LONG: "longout",
     Kind.ENUM: "bo",
-    Kind.ARRAY: "waveform",
+    Kind.WAVEFORM: "waveform",
     Kind.CHARS: "waveform",
 }

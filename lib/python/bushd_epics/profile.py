@@ -29,7 +29,7 @@ _LEAD = 1 / RAMP_ROWS  # of a row's time: so long it goes with v already before 
 UNDEFINED, SUCCESS, FAILURE, ABORT = range(4)
 DONE, BUSY = 0, 1
 MOVE_START, EXECUTING = 1, 2
-FIXED, ARRAY = 0, 1
+FIXED, FROM_LIST = 0, 1  # TimeMode
 ABSOLUTE, RELATIVE = 0, 1
 
 _STATES, _ENDS = ("Done", "Busy"), ("Undefined", "Success", "Failure")
@@ -54,7 +54,7 @@ FIELDS: dict[str, Field] = {
     "NumReadbacks": _said(Kind.LONG),
     "TimeMode": _put(Kind.ENUM, FIXED, ("Fixed", "Array")),
     "FixedTime": _put(Kind.DOUBLE, 1.0),
-    "Times": _put(Kind.ARRAY, ()),
+    "Times": _put(Kind.WAVEFORM, ()),
     "Acceleration": _put(Kind.DOUBLE, 0.5),
     "MoveMode": _put(Kind.ENUM, ABSOLUTE, ("Absolute", "Relative")),
     "Build": _put(Kind.ENUM, 0, ("Done", "Build")),
@@ -73,9 +73,9 @@ FIELDS: dict[str, Field] = {
 }
 AXIS_FIELDS: dict[str, Field] = {
     "UseAxis": _put(Kind.ENUM, 0, ("No", "Yes")),
-    "Positions": _put(Kind.ARRAY, ()),
-    "Readbacks": _said(Kind.ARRAY, ()),
-    "FollowingErrors": _said(Kind.ARRAY, ()),
+    "Positions": _put(Kind.WAVEFORM, ()),
+    "Readbacks": _said(Kind.WAVEFORM, ()),
+    "FollowingErrors": _said(Kind.WAVEFORM, ()),
 }
 
 

@@ -88,6 +88,8 @@ class Pages:
         )
         for channel in self._fields.values():
             channel._content.clear()  # what is read from now on has it; who watches VAL and RBV is told by the posts that follow
+        if self._compare is not None:
+            self._compare.alarm_has_changed()
 
     def held(self, held: bool) -> None:
         if held != self._held:
