@@ -238,7 +238,7 @@ class Compares(unittest.IsolatedAsyncioTestCase):
         self.world = World()
         self.values = {}
         for name, record in self.world.records.items():
-            self.values[name] = self.world.flights.compare(record, lambda field, value: None).values
+            self.values[name] = self.world.flights.add_compare(record, lambda field, value: None).values
 
     async def put(self, name, field, value):
         self.world.flights.put_compare(self.world.records[name], field, value, self.world.by(name))

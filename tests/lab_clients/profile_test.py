@@ -120,6 +120,37 @@ class Profiles(LabTest):
             self.assertTrue(self.put_fails("pm1:Readback", 1))
         self.end_all()
 
+    def test_a_plan_of_bluesky_flies_it(self):
+        from bluesky import RunEngine
+        from bluesky.plan_stubs import mv
+        from ophyd import Component, Device, EpicsSignal
+
+        def variable(name):
+            return Component(EpicsSignal, name, put_complete=True)
+
+        class ProfileMove(Device):
+            num_points = variable("NumPoints")
+            times = variable("Times")
+            time_mode = variable("TimeMode")
+            positions = variable("M1Positions")
+            use = variable("M1UseAxis")
+            build = variable("Build")
+            execute = variable("Execute")
+
+        self.bring_up_profile()
+        move = ProfileMove("LAB:pm1:", name="move")
+        move.wait_for_connection(timeout=20)
+
+        def plan():
+            yield from mv(move.num_points, 3, move.times, [0.5, 1.0], move.time_mode, "Array", move.use, "Yes", move.positions, [0.0, 1.0, 2.0])
+            yield from mv(move.build, 1)
+            yield from mv(move.execute, 1)
+
+        RunEngine({})(plan())
+        self.assertEqual((self.ends("Build"), self.ends("Execute")), ((SUCCESS, 0, 0), (SUCCESS, 0, 0)))
+        # Behind the last point it slows down from 1 degree a second, in 0.5 s.
+        self.assertAlmostEqual(self.get("theta.RBV"), 2.0 + 0.25 + 0.5 / 64, delta=1 / STEPS)
+
     def test_puts_take_the_rights_of_all_others(self):
         self.bring_up_profile("--read-only")
         for name in ("pm1:Execute", "pm1:M1Positions", "thetaPCOEnable"):

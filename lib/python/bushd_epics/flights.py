@@ -46,7 +46,7 @@ class Flights:
     def add(self, one: Profile, show: Show) -> None:
         self._shows[one] = show
 
-    def compare(self, record: Record, show: Show) -> Compare:
+    def add_compare(self, record: Record, show: Show) -> Compare:
         made = self._compares[record] = Compare(record.name)
         self._shows[made] = show
         return made

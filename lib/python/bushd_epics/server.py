@@ -65,7 +65,7 @@ class Pages:
     def compare(self, name: str) -> Any:
         """`NAMEPCOEnable` and what belongs to it. Raises KeyError."""
         if self._compare is None:
-            made = self._flights.compare(self.record, lambda field, value: leaves.show(field, value))
+            made = self._flights.add_compare(self.record, lambda field, value: leaves.show(field, value))
             leaves = Leaves(compare.FIELDS, made.values, self._put_compare, self._alarm)
             self._compare = leaves
         channel = self._compare.find(name)
