@@ -6,12 +6,15 @@ import argparse
 import asyncio
 import contextlib
 import logging
+import pathlib
 import re
 import signal
 import sys
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from . import names as names_file
+from . import screens
 
 if TYPE_CHECKING:  # they need caproto
     from .daemon import Daemon
@@ -23,7 +26,7 @@ LOG = logging.getLogger("bushd-epics")
 
 def main(arguments: list[str] | None = None) -> int:
     options = _parse(arguments)
-    logging.basicConfig(format="%(name)s: %(message)s", level=logging.ERROR if options.list else logging.INFO)
+    logging.basicConfig(format="%(name)s: %(message)s", level=logging.ERROR if options.list or options.screens else logging.INFO)
     logging.getLogger("caproto").setLevel(logging.WARNING)
     # Beacons are for clients that wait for a server to appear; that nobody listens to them is no fault.
     logging.getLogger("caproto.ctx").addFilter(lambda record: "beacon" not in str(record.msg))
@@ -57,7 +60,9 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
         "--longest-jog-s", type=float, default=60.0, metavar="SECONDS",
         help="a jog ends so long after JOGF or JOGR was put to 1 last. Default: 60",
     )
-    parser.add_argument("--list", action="store_true", help="print the names of all variables, and end")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument("--list", action="store_true", help="print the names of all variables, and end")
+    instead.add_argument("--screens", metavar="DIR", type=pathlib.Path, help="write screens of Phoebus for all motors to this folder, and end")
     options = parser.parse_args(arguments)
     if not re.fullmatch(r"[A-Za-z0-9_\-+:\[\]<>;]+", options.prefix):
         parser.error(f"--prefix {options.prefix}: letters, digits and _-+:[]<>; are allowed")
@@ -91,7 +96,9 @@ async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
     following = [asyncio.create_task(daemon.run()) for daemon in daemons]
     try:
         if options.list:
-            return await _list(server, daemons)
+            return await _tell_once(daemons, lambda: print("\n".join(server.names())))
+        if options.screens:
+            return await _tell_once(daemons, lambda: _write_screens(options.screens, options.prefix, server.records()))
         # Names are those of motors: until one daemon has told them there is nothing to be shown.
         appearing = [asyncio.create_task(daemon.appeared.wait()) for daemon in daemons]
         await asyncio.wait([*appearing, *following], return_when=asyncio.FIRST_COMPLETED)
@@ -102,14 +109,23 @@ async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
         await asyncio.gather(*following, return_exceptions=True)
 
 
-async def _list(server: Server, daemons: list[Daemon]) -> int:
+async def _tell_once(daemons: list[Daemon], tell: Callable[[], None]) -> int:
+    """When all daemons have told their motors."""
     await asyncio.gather(*(daemon.told.wait() for daemon in daemons))
     failed = [daemon.why.replace(REMEDY, "--daemon PATH") for daemon in daemons if daemon.why]
+    if not failed:
+        try:
+            tell()
+        except (screens.NotOurs, OSError) as error:
+            failed = [str(error)]
     for why in failed:
         print(f"bushd-epics: {why}", file=sys.stderr)
-    if not failed:
-        print("\n".join(server.names()))
     return 1 if failed else 0
+
+
+def _write_screens(folder: pathlib.Path, prefix: str, records: list[str]) -> None:
+    screens.write(folder, screens.make(prefix, records))
+    print(f"{folder / 'overview.bob'}: {len(records)} motors and axes")
 
 
 async def _serve(server: Server, following: list[asyncio.Task[None]]) -> int:

@@ -169,6 +169,10 @@ class Server(Context):
         compares = [f"{name}{field}" for name, pages in sorted(self._pages.items()) if not pages.record.is_axis for field in compare.FIELDS]
         return [*records, *able, *compares, *all_fields(profile for profile, _ in self._profiles.values()), *self._common]
 
+    def records(self) -> list[str]:
+        """The names of motors and axes that are shown."""
+        return sorted(self._pages)
+
     # -- for caproto
 
     def __getitem__(self, name: str) -> Any:
