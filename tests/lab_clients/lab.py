@@ -15,6 +15,11 @@ os.environ.update(
     EPICS_CAS_INTF_ADDR_LIST=ADDRESS,
     EPICS_CAS_BEACON_ADDR_LIST=ADDRESS,
     EPICS_CAS_AUTO_BEACON_ADDR_LIST="NO",
+    EPICS_PVA_ADDR_LIST=ADDRESS,
+    EPICS_PVA_AUTO_ADDR_LIST="NO",
+    EPICS_PVAS_INTF_ADDR_LIST=ADDRESS,
+    EPICS_PVAS_BEACON_ADDR_LIST=ADDRESS,
+    EPICS_PVAS_AUTO_BEACON_ADDR_LIST="NO",
 )
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 
@@ -27,7 +32,8 @@ STEPS = 100
 TOP = 25.0  # degrees a second, of bushd2-constant: 2500 steps/s
 
 
-def configuration(folder, theta=""):
+def configuration(folder, theta="", more=""):
+    """`theta`: keys of this motor; `more`: sections."""
     lines = ['[lcm]\nurl = "memq://"', f'[control]\npath = "{folder}/control"', f'[state]\npath = "{folder}/state"']
     lines += [f'[[bus]]\nname = "hall"\nport = "{folder}/port"\nbaud = 500000\ntick_us = 2560\nformat = "fine"']
     lines += [f'[[mcu]]\nbus = "hall"\naddress = {address}' for address in (1, 2)]
@@ -36,6 +42,7 @@ def configuration(folder, theta=""):
         lines += [f'[[motor]]\nname = "{name}"\nmcu = "hall:{address}"\noutput = {output}\ngroup = "all"']
         lines += [f'unit = "deg"\nsteps_per_unit = {STEPS}\nsoft_limits = [-500, 500]']
         lines += [theta] if name == "theta" else []
+    lines += [more]
     return "\n".join(lines) + "\n"
 
 
@@ -47,9 +54,9 @@ def pyepics():
 
 
 class LabTest(EndToEndTest):
-    def bring_up_lab(self, theta="", bridge=(), sim=(), known=True):
+    def bring_up_lab(self, theta="", bridge=(), sim=(), known=True, more=""):
         """`known`: somebody has said that all motors stand at 0."""
-        self.file("bushd.toml").write_text(configuration(self.folder, theta))
+        self.file("bushd.toml").write_text(configuration(self.folder, theta, more))
         self.bushsim = self.start_bushsim(options=sim)
         self.bushd = self.start_bushd()
         self.wait_until_ready()

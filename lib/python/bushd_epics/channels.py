@@ -12,6 +12,8 @@ from caproto._backend import backend  # what caproto's own channels convert with
 from caproto._dbr import native_type
 from caproto._utils import ConversionDirection
 
+from . import alarms
+from .alarms import Alarm
 from .fields import Kind, Value
 from .profile import MOST_POINTS
 from .record import Putter
@@ -31,6 +33,8 @@ class Channel:
     """What the classes below have in common; beside one of caproto's."""
 
     putter: PutFunction | None = None  # None: it is read only
+    reason: Callable[[], str] | None = None  # of its alarm, in full
+    told: Callable[[], None] | None = None  # called when its value, its alarm or what is said of its value has changed
 
     def get_field(self, field: str) -> Any:
         """NAME.VAL of a variable that is no record."""
@@ -44,11 +48,28 @@ class Channel:
         self._content.clear()
         if any(specs for syncs in self._queues.values() for types in syncs.values() for specs in types.values()):
             at_once(self.publish(EVENTS))
+        if self.told is not None:
+            self.told()
 
     def tell_again(self: Any) -> None:
         """Its alarm, or what is said of its value, has changed."""
         self._content.clear()
         at_once(self.publish(EVENTS))
+        if self.told is not None:
+            self.told()
+
+    def take_alarm(self: Any) -> None:
+        """What is read from now on has it; who watches VAL and RBV is told by what follows."""
+        self._content.clear()
+        if self.told is not None:
+            self.told()
+
+    def alarm_now(self: Any) -> Alarm:
+        alarm = self.alarm
+        if alarm.severity == caproto.AlarmSeverity.NO_ALARM:
+            return alarms.NONE
+        reason = self.reason() if self.reason is not None else str(alarm.alarm_string)
+        return Alarm(alarms.Status(int(alarm.status)), alarms.Severity(int(alarm.severity)), reason)
 
     def show(self, value: Value) -> None:
         self.set_value(value)

@@ -18,6 +18,7 @@ import caproto
 from caproto.asyncio import server as caproto_server
 from caproto.server.common import DisconnectedCircuit
 
+from . import people
 from .channels import BadPut
 from .record import Putter
 
@@ -77,8 +78,7 @@ class Circuit(caproto_server.VirtualCircuit):
     @property
     def who(self) -> str:
         """As it says itself; for history and logs, not for rights."""
-        words = (self.client_username or "unknown", self.client_hostname or self.host)
-        return ":".join("".join(c if 33 <= ord(c) < 127 and c != ":" else "_" for c in word)[:20] for word in words)
+        return people.name_of(self.client_username or "unknown", self.client_hostname or self.host)
 
     async def _process_command(self, command: Any) -> Any:
         if isinstance(command, (caproto.WriteRequest, caproto.WriteNotifyRequest)):
@@ -104,7 +104,7 @@ class Circuit(caproto_server.VirtualCircuit):
         if entry.putter is None:
             return answer("it cannot be put")
         if not self.context.access.may_put(self.host):
-            self.context.tell_refused(self, channel.name)
+            self.context.tell_refused(self.who, self.host, channel.name)
             return answer(f"{self.host} may not put: names.toml [allow]")
         try:
             value = entry.read_put(command)

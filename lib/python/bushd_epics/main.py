@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import contextlib
 import logging
+import os
 import pathlib
 import re
 import signal
@@ -18,6 +19,7 @@ from . import screens
 
 if TYPE_CHECKING:  # they need caproto
     from .daemon import Daemon
+    from .pva import Pva
     from .server import Server
 
 REMEDY = "connect(PATH) ($BUSHD_CONTROL), or connect(lcm=True)"  # of programs in Python
@@ -56,6 +58,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
         help="for ophyd-async 0.21, which takes a failed put for a good one: it runs into its timeout instead",
     )
     parser.add_argument("--interface", action="append", metavar="ADDRESS", help="to listen at; may be repeated. Default: all")
+    parser.add_argument("--no-pva", action="store_true", help="Channel Access alone, also where p4p is installed")
     parser.add_argument(
         "--longest-jog-s", type=float, default=60.0, metavar="SECONDS",
         help="a jog ends so long after JOGF or JOGR was put to 1 last. Default: 60",
@@ -102,7 +105,12 @@ async def _run(options: argparse.Namespace, names: names_file.Names) -> int:
         # Names are those of motors: until one daemon has told them there is nothing to be shown.
         appearing = [asyncio.create_task(daemon.appeared.wait()) for daemon in daemons]
         await asyncio.wait([*appearing, *following], return_when=asyncio.FIRST_COMPLETED)
-        return await _serve(server, following)
+        pva = None if options.no_pva else _serve_pva(server, options.interface)
+        try:
+            return await _serve(server, following)
+        finally:
+            if pva is not None:
+                pva.stop()
     finally:
         for task in following:
             task.cancel()
@@ -126,6 +134,22 @@ async def _tell_once(daemons: list[Daemon], tell: Callable[[], None]) -> int:
 def _write_screens(folder: pathlib.Path, prefix: str, records: list[str]) -> None:
     screens.write(folder, screens.make(prefix, records))
     print(f"{folder / 'overview.bob'}: {len(records)} motors and axes")
+
+
+def _serve_pva(server: Server, interfaces: list[str] | None) -> Pva | None:
+    """Where p4p is installed: it has no wheel for some machines, and Debian does not have it."""
+    try:
+        from .pva import Pva
+
+        pva = Pva(server, interfaces, in_environment="EPICS_PVAS_INTF_ADDR_LIST" in os.environ)
+    except ImportError as error:
+        LOG.info("Channel Access alone: PV Access needs p4p (%s)", error)
+        return None
+    except RuntimeError as error:
+        LOG.warning("Channel Access alone: PV Access cannot be served: %s", error)
+        return None
+    LOG.info("PV Access as well")
+    return pva
 
 
 async def _serve(server: Server, following: list[asyncio.Task[None]]) -> int:

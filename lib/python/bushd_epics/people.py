@@ -1,4 +1,4 @@
-"""A connection to the daemon for each user of Channel Access, so that its history names who has asked for what."""
+"""A connection to the daemon for each user of EPICS, so that its history names who has asked for what."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ import bushd.aio
 MOST = 16  # connections; who comes after that takes the place of the one that was used least lately
 
 Connect = Callable[[str], Awaitable[bushd.aio.Client]]
+
+
+def name_of(user: str, host: str) -> str:
+    """For history and logs."""
+    return ":".join("".join(c if 33 <= ord(c) < 127 and c != ":" else "_" for c in word)[:20] for word in (user, host))
 
 
 class People:

@@ -118,8 +118,8 @@ class Page:
         ET.SubElement(ET.SubElement(widget, "font"), "font", family="Liberation Sans", style="BOLD" if bold else "REGULAR", size=str(size))
 
     def shows(self, name: str, box: Box, units: bool = False, text: bool = False) -> None:
-        more = {"format": STRING} if text else {}
-        self._widget("textupdate", box, pv_name=name, show_units=units, vertical_alignment=1, **more)
+        more: dict[str, object] = {"format": STRING} if text else {}
+        self._widget("textupdate", box, "2.0.0", pv_name=name, show_units=units, vertical_alignment=1, **more)
 
     def takes(self, name: str, box: Box) -> None:
         self._widget("textentry", box, "3.0.0", pv_name=name, show_units=False)

@@ -50,6 +50,7 @@ class Pages:
             spec = FIELDS[name]
             channel = channels.make(spec.kind, self.record.values[name], spec.words, self._alarm, "motor")
             channel.putter = lambda value, by: self._put(name, value, by)
+            channel.reason = self._reason
             self._fields[name] = channel
             if spec.is_position and isinstance(channel, channels.Double):
                 self._describe(name, channel)
@@ -60,6 +61,7 @@ class Pages:
         if self._able is None:
             self._able = channels.make(Kind.ENUM, int(self._held), ABLE, self._alarm, "bo")
             self._able.putter = self._put_able
+            self._able.reason = self._reason
         return self._able
 
     def compare(self, name: str) -> Any:
@@ -86,8 +88,8 @@ class Pages:
         self._alarm._data.update(
             status=caproto.AlarmStatus(int(alarm.status)), severity=caproto.AlarmSeverity(int(alarm.severity)), alarm_string=alarm.reason[:39]
         )
-        for channel in self._fields.values():
-            channel._content.clear()  # what is read from now on has it; who watches VAL and RBV is told by the posts that follow
+        for channel in [*self._fields.values(), *([] if self._able is None else [self._able])]:
+            channel.take_alarm()
         if self._compare is not None:
             self._compare.alarm_has_changed()
 
@@ -96,6 +98,9 @@ class Pages:
             self._held = held
             if self._able is not None:
                 self._able.show(int(held))
+
+    def _reason(self) -> str:
+        return self.record.alarm.reason
 
     def _describe(self, name: str, channel: channels.Double) -> None:
         values = self.record.values
@@ -131,6 +136,7 @@ class Server(Context):
         self.prefix = prefix
         self.access = access
         self.answers_failed_moves = True
+        self.names_changed: Callable[[], None] | None = None  # is called then
         self.jogs = Jogs()
         self._all: list[Daemon] = []
         self._daemons: dict[Record, Daemon] = {}
@@ -233,11 +239,16 @@ class Server(Context):
             record.client_gone(circuit, _now())
             daemon.deliver(record)
 
-    def tell_refused(self, circuit: Circuit, name: str) -> None:
+    def tell_refused(self, who: str, host: str, name: str) -> None:
         """Once for each host."""
-        if circuit.host not in self._refused and len(self._refused) < 1000:
-            self._refused.add(circuit.host)
-            LOG.warning("%s at %s may not put (%s): names.toml [allow], or --read-only", circuit.who, circuit.host, name)
+        if host not in self._refused and len(self._refused) < 1000:
+            self._refused.add(host)
+            LOG.warning("%s at %s may not put (%s): names.toml [allow], or --read-only", who, host, name)
+
+    @property
+    def defers(self) -> bool:
+        """Targets are gathered."""
+        return any(daemon.deferred.on for daemon in self._all)
 
     # -- for daemons
 
@@ -249,6 +260,8 @@ class Server(Context):
             self._pages[record.name] = Pages(record, daemon, self.jogs)
         self._daemons[record] = daemon
         self._of[record] = self._pages[record.name]
+        if self.names_changed is not None:
+            self.names_changed()
 
     def post(self, record: Record, event: events.Post) -> None:
         if self._of[record].record is record:
