@@ -74,7 +74,8 @@ class LabTest(EndToEndTest):
     # -- what clients see
 
     def get(self, name, **how):
-        value = pyepics().caget(f"LAB:{name}", timeout=10, **how)
+        # Asked for each time: the answer to a first get may overwrite a newer value that pyepics has been told meanwhile.
+        value = pyepics().caget(f"LAB:{name}", timeout=10, use_monitor=False, **how)
         self.assertIsNotNone(value, name)
         return value
 
