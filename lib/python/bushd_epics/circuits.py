@@ -31,6 +31,7 @@ ALIVE = (
     (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3),
     (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 3000),  # milliseconds
 )
+BYTES_ACKNOWLEDGED = struct.Struct("=120xQ")  # in what Linux tells by TCP_INFO
 
 
 class Answer:
@@ -49,17 +50,25 @@ class Circuit(caproto_server.VirtualCircuit):
         # A PC that is gone is noticed within seconds: jogs of its programs end with the connection.
         for level, option, value in ALIVE:
             self._socket.setsockopt(level, option, value)
+        self._acknowledged = 0  # bytes, when it was looked at last
 
     @property
     def _socket(self) -> Any:
         return self.client.writer.get_extra_info("socket")
 
     def waiting_bytes(self) -> int:
-        """That the client's PC has not acknowledged, or that wait here. A frozen program of a PC that runs has none until its buffer is full."""
+        """That the client's PC has not acknowledged, or that wait here. A frozen program of a PC that runs has none until its buffer is full.
+
+        None either where the PC has acknowledged any since this was asked last: to a client that reads often something is always on the way.
+        """
         try:
             unsent = struct.unpack("i", fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, b"\0\0\0\0"))[0]
+            told = self._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, BYTES_ACKNOWLEDGED.size)
         except (OSError, ValueError):
             return 0  # it is closed: its end is told
+        before, (self._acknowledged,) = self._acknowledged, BYTES_ACKNOWLEDGED.unpack(told)
+        if self._acknowledged != before:
+            return 0
         return unsent + self.client.writer.transport.get_write_buffer_size()
 
     def show_life(self) -> None:
