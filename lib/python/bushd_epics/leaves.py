@@ -50,7 +50,7 @@ class Leaves:
     def alarm_has_changed(self) -> None:
         """What is read from now on has it."""
         for channel in self._channels.values():
-            channel._content.clear()
+            channel.take_alarm()
 
     def describe(self, unit: str, precision: int) -> None:
         """Of those that are positions of a motor."""
@@ -63,7 +63,7 @@ class Leaves:
             is_bad = severity(name, int(value))
             status = caproto.AlarmStatus.STATE if is_bad else caproto.AlarmStatus.NO_ALARM
             self._channels[name].alarm._data.update(status=status, severity=caproto.AlarmSeverity(is_bad))
-            self._channels[name]._content.clear()
+            self._channels[name].take_alarm()
 
 
 _RECORDS = {
