@@ -73,6 +73,41 @@ class Whole(unittest.TestCase):
         collector.add(health(part=1, parts=2, sequence=2, run=2, bus="cellar"))
         self.assertEqual(list(collector.health()), ["attic", "cellar"])
 
+    def test_what_is_told_again_is_not_made_anew(self):
+        collector = StatusCollector()
+        for part in (state(0, motors=["a"]), state(1, motors=["b"]), description(0, motors=["a"]), description(1, motors=["b"])):
+            collector.add(part)
+        first = collector.status()
+        self.assertIsNot(state(0, sequence=2, motors=["a"]).content, state(0, sequence=2, motors=["a"]).content)
+        for part in (state(0, sequence=2, motors=["a"]), state(1, sequence=3, motors=["b"], trust="uncertain"), description(0, sequence=4, motors=["a"])):
+            collector.add(part)
+        second = collector.status()
+        self.assertIs(second["a"], first["a"])
+        self.assertEqual((first["b"].trust, second["b"].trust), (Trust.KNOWN, Trust.UNCERTAIN))
+        self.assertEqual((first.sequence, second.sequence), (1, 3))
+        other = description(0, sequence=5, motors=["a"]).content.motors
+        self.assertIs(other[0], description(0, sequence=6, motors=["a"]).content.motors[0])
+        collector.add(state(0, sequence=7, motors=["a", "c"]))
+        self.assertEqual(list(collector.status().motors), ["a", "b"])  # c is described by nobody
+        collector.add(description(0, sequence=8, motors=["a", "c"]))
+        self.assertEqual(list(collector.status().motors), ["a", "c", "b"])
+
+    def test_a_list_of_motors_that_was_right_once_is_not_taken_with_another_length(self):
+        message = messages.mcu_state_t(mcu="hall:1", state="READY", parts=1, motors=[messages.motor_t(name="a", trust="known", activity="rest")])
+        good = message.encode()
+        self.assertEqual(len(codec.decode("STATE", good).content.motors), 1)
+        for count in (0, 2, -1):
+            at = len(good) - len(message.motors[0].encode()) + 8 - 4
+            self.assertEqual(good[at : at + 4], b"\0\0\0\1")
+            bad = good[:at] + count.to_bytes(4, "big", signed=True) + good[at + 4 :]
+            self.assertIsNone(codec.decode("STATE", bad))
+        self.assertIsNone(codec.decode("STATE", good[:-1]))
+        self.assertIsNone(codec.decode("STATE", good + b"\0"))
+
+    def test_a_word_that_no_daemon_says_is_refused_each_time(self):
+        for _ in range(2):
+            self.assertIsNone(state(0, motors=["a"], trust="sure"))
+
     def test_an_unknown_position_is_none(self):
         collector = StatusCollector()
         collector.add(state(0, 1, motors=["a"], trust="unknown"))

@@ -10,7 +10,8 @@ import dataclasses
 import datetime
 import enum
 import functools
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from . import messages, model
@@ -155,12 +156,23 @@ def _names(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(kind))
 
 
+@functools.cache
+def _taken(kind: Any, of: Any, given: tuple[str, ...]) -> tuple[tuple[str, ...], Callable[[Any], Iterable[Any]], tuple[str, ...]]:
+    """What is taken from a message of this type: names, a function that reads them, and which of them are arrays."""
+    names = tuple(name for name in _names(kind) if name not in given)
+    arrays = tuple(field.name for field in of.FIELDS if field.count and field.name in names)
+    # attrgetter makes no tuple of a single name.
+    read: Any = operator.attrgetter(*names) if len(names) > 1 else lambda message: [getattr(message, name) for name in names]
+    return names, read, arrays
+
+
 def made(kind: Callable[..., T], message: Any, **others: Any) -> T:
     """One of `model`: what is not among `others` is what the message has by that name. Arrays become tuples."""
-    for name in _names(kind):
-        if name not in others:
-            value = getattr(message, name)
-            others[name] = tuple(value) if isinstance(value, list) else value
+    of: Any = type(message)
+    names, read, arrays = _taken(kind, of, tuple(others))
+    others.update(zip(names, read(message)))
+    for name in arrays:
+        others[name] = tuple(others[name])
     return kind(**others)
 
 
@@ -234,18 +246,29 @@ def _welcome(message: Any) -> Welcome:
     return made(Welcome, message)
 
 
+_checked: dict[int, list[Any]] = {}  # by part: motors of a state that were found right
+
+
 def _state(message: Any) -> State:
     # Those that are shown (status.py) are looked at once a whole is asked for; words are checked here.
     at(message.utime_us)
     model.McuState(message.state)
-    for motor in message.motors:
+    known = _checked.get(message.part, [])
+    if len(known) != len(message.motors) or not all(map(operator.is_, known, message.motors)):
+        _check_motors(message.motors)
+        if 0 <= message.part < MAX_PARTS:
+            _checked[message.part] = message.motors
+    return made(State, message, content=message)
+
+
+def _check_motors(motors: list[Any]) -> None:
+    for motor in motors:
         model.Activity(motor.activity)
         model.Inhibited(motor.inhibited)
         model.Trust(motor.trust)
         at(motor.heard_utime_us)
         for value in (motor.user_position, motor.dial_position, motor.user_target, motor.velocity_steps_per_s):
             finite(value)
-    return made(State, message, content=message)
 
 
 def _description(message: Any) -> Description:

@@ -22,6 +22,9 @@ TYPES = pathlib.Path(__file__).parent / "types"
 FORMATS = {"boolean": "b", "int8_t": "b", "int16_t": "h", "int32_t": "i", "int64_t": "q", "double": "d"}
 
 _SIZE = struct.Struct(">I")
+# Told again and again, mostly as before, of each MCU: their motors, which are the rest of the message, are not read again then.
+REPEATED = ("mcu_state_t", "mcu_description_t")
+MOST_REMEMBERED = 256
 
 
 class Field:
@@ -134,7 +137,8 @@ def finite(value: float) -> float:
 def _reader(cls: Any) -> Callable[[bytes, int], tuple[Any, int]]:
     """A function of Python for each type, as that of a dataclass is made: states come often, and have many fields."""
     lines = ["def read(data, at):", "m = new(cls)"]
-    known: dict[str, Any] = {"cls": cls, "new": cls.__new__, "text": _read_text, "several": _read_several, "array": _read_array, "boolean": _boolean}
+    several = _read_rest if cls.__name__ in REPEATED else _read_several
+    known: dict[str, Any] = {"cls": cls, "new": cls.__new__, "text": _read_text, "several": several, "array": _read_array, "boolean": _boolean}
     for numbers, group in itertools.groupby(cls.FIELDS, lambda field: field.kind in FORMATS and not field.count):
         fields = list(group)
         if numbers:
@@ -179,6 +183,21 @@ def _read_several(read: Callable[[bytes, int], tuple[Any, int]], data: bytes, at
         value, at = read(data, at)
         values.append(value)
     return values, at
+
+
+_remembered: dict[tuple[bytes, int], tuple[list[Any], int]] = {}
+
+
+def _read_rest(read: Callable[[bytes, int], tuple[Any, int]], data: bytes, at: int, count: int) -> tuple[list[Any], int]:
+    """As _read_several. Where these bytes were read before the elements are the same ones, so nobody may change them."""
+    key = (data[:8] + data[at:], count)
+    known = _remembered.get(key)
+    if known is None:
+        if len(_remembered) >= MOST_REMEMBERED:
+            _remembered.clear()
+        values, end = _read_several(read, data, at, count)
+        known = _remembered[key] = (values, end - at)
+    return list(known[0]), at + known[1]
 
 
 def _valid(count: int) -> int:

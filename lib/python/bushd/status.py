@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 from . import codec, model
@@ -17,6 +18,7 @@ class StatusCollector:
         self._states: dict[int, Part] = {}
         self._descriptions: dict[int, Part] = {}
         self._healths: dict[int, Part] = {}
+        self._made: dict[int, tuple[Part, Part, list[model.Motor]]] = {}  # of what was asked for last
 
     def add(self, part: Part) -> bool:
         """Whether it is used: a part beyond all configurations, and one older than what is there, is not."""
@@ -71,10 +73,8 @@ class StatusCollector:
         for index, state in sorted(self._states.items()):
             description = self._descriptions[index]
             mcus[state.content.mcu] = _mcu(state.content, description.content)
-            described = {motor.name: motor for motor in description.content.motors}
-            for motor in state.content.motors:
-                if motor.name in described:
-                    motors[motor.name] = _motor(motor, described[motor.name], state.content.mcu)
+            for motor in self._motors(index, state, description):
+                motors[motor.name] = motor
         newest = max(self._states.values(), key=lambda part: part.sequence)
         return model.Status(
             motors=motors,
@@ -85,9 +85,25 @@ class StatusCollector:
             dropped_messages=newest.content.dropped_messages,
         )
 
+    def _motors(self, index: int, state: Part, description: Part) -> list[model.Motor]:
+        """Of one MCU; while the same is told of them, the same ones."""
+        known = self._made.get(index)
+        if known is not None and _tell_the_same(known[0], state) and _tell_the_same(known[1], description):
+            return known[2]
+        described = {motor.name: motor for motor in description.content.motors}
+        motors = [_motor(motor, described[motor.name], state.content.mcu) for motor in state.content.motors if motor.name in described]
+        self._made[index] = (state, description, motors)
+        return motors
+
     def health(self) -> dict[str, model.BusHealth]:
         """Only when it has_health()."""
         return {part.content.bus: part.content for _, part in sorted(self._healths.items())}
+
+
+def _tell_the_same(before: Part, part: Part) -> bool:
+    """Of motors, as they are read: what was told before is not made anew (messages.py)."""
+    old, new = before.content, part.content
+    return old.mcu == new.mcu and len(old.motors) == len(new.motors) and all(map(operator.is_, old.motors, new.motors))
 
 
 def _mcu(state: Any, description: Any) -> model.Mcu:

@@ -36,6 +36,8 @@ class Board:
     def post(self, field: str, value: Value, always: bool = False) -> None:
         """`always`: also where it is what it was."""
         was = self.values[field]
+        if was is value and not always:
+            return
         if always or not _same(was, value):
             self.values[field] = value
             self._out.append(events.Post(field, value))

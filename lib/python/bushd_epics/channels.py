@@ -9,10 +9,11 @@ from typing import Any
 import caproto
 from caproto import ChannelType
 from caproto._backend import backend  # what caproto's own channels convert with
-from caproto._dbr import native_type
+from caproto._data import SubscriptionUpdate
+from caproto._dbr import _channel_type_by_name, native_type
 from caproto._utils import ConversionDirection
 
-from . import alarms
+from . import alarms, values
 from .alarms import Alarm
 from .fields import Kind, Value
 from .profile import MOST_POINTS
@@ -45,16 +46,18 @@ class Channel:
     def set_value(self: Any, value: Any) -> None:
         self._data["value"] = value
         self._data["timestamp"] = caproto.TimeStamp.from_flexible_value(time.time())
-        self._content.clear()
-        if any(specs for syncs in self._queues.values() for types in syncs.values() for specs in types.values()):
-            at_once(self.publish(EVENTS))
-        if self.told is not None:
-            self.told()
+        self.tell_again()
 
     def tell_again(self: Any) -> None:
-        """Its alarm, or what is said of its value, has changed."""
+        """All who watch it; its alarm, or what is said of its value, may have changed alone. Filters, which some could watch it through, are not served."""
         self._content.clear()
-        at_once(self.publish(EVENTS))
+        for queue, syncs in self._queues.items():
+            for types in syncs.values():
+                for name, specs in types.items():
+                    if specs:
+                        made = values.ready(self, name)
+                        metadata, value = (None, made) if made is not None else at_once(self._read(_channel_type_by_name[name]))
+                        queue.put_nowait(SubscriptionUpdate(tuple(specs), metadata, value, EVENTS, None))
         if self.told is not None:
             self.told()
 
@@ -82,14 +85,14 @@ class Channel:
         text = source in (ChannelType.STRING, ChannelType.CHAR) and not (source is ChannelType.CHAR and self.data_type is not ChannelType.STRING)
         to = ChannelType.STRING if text else ChannelType.DOUBLE
         try:
-            values = backend.convert_values(
+            converted = backend.convert_values(
                 values=command.data,
                 from_dtype=source,
                 to_dtype=to,
                 string_encoding="latin-1",
                 direction=ConversionDirection.FROM_WIRE,
             )
-            value = values if isinstance(values, (str, bytes)) else values[0]
+            value = converted if isinstance(converted, (str, bytes)) else converted[0]
             if isinstance(value, bytes):
                 value = value.decode("latin-1")
             return self.to_value(value if text else float(value))
@@ -205,11 +208,11 @@ def make(kind: Kind, value: Any, words: tuple[str, ...], alarm: Any, record_type
     return Text(value=str(value), long_string_max_length=LONG_TEXT, **how)
 
 
-def at_once(coroutine: Coroutine[Any, Any, Any]) -> None:
-    """Nothing that a channel publishes waits: its queue has no bound. So what is told in one order is heard in that order."""
+def at_once(coroutine: Coroutine[Any, Any, Any]) -> Any:
+    """The result of what does not wait: what is told in one order is heard in that order."""
     try:
         coroutine.send(None)
-    except StopIteration:
-        return
+    except StopIteration as end:
+        return end.value
     coroutine.close()
-    raise RuntimeError("a channel has waited while it was published")
+    raise RuntimeError("a channel has waited while it was read")

@@ -12,6 +12,8 @@ import functools
 import socket
 import struct
 import termios
+import weakref
+from collections import deque
 from typing import Any
 
 import caproto
@@ -21,6 +23,7 @@ from caproto.server.common import DisconnectedCircuit
 from . import people
 from .channels import BadPut
 from .record import Putter
+from .values import Event, Ready
 
 AT_ONCE = 256  # of what waits, in one packet
 MOST_WAITING = 8000
@@ -135,6 +138,28 @@ class Circuit(caproto_server.VirtualCircuit):
             return
         self.context.subscription_queue.put_nowait(Answer(self, response))
 
+    def put_value(self, spec: Any, subscription: Any, ready: Ready) -> None:
+        """Behind what waits. What a client has not taken yet is given up for newer values, or when it wants to hear nothing for a while."""
+        if not self.events_on.is_set():
+            self._tell_later(spec, subscription)
+            return
+        event = Event(subscription, ready)
+        newest = self.unexpired_updates.get(event.subscriptionid)
+        if newest is None:
+            newest = self.unexpired_updates[event.subscriptionid] = deque(maxlen=subscription.db_entry.max_subscription_backlog)
+        newest.append(event)
+        self.subscription_queue.put_nowait(weakref.ref(event, functools.partial(self._given_up, spec, subscription)))
+
+    def _given_up(self, spec: Any, subscription: Any, _: Any) -> None:
+        if not self.events_on.is_set():
+            self._tell_later(spec, subscription)
+
+    def _tell_later(self, spec: Any, subscription: Any) -> None:
+        """When it wants to hear again."""
+        later = self.subscriptions_to_resend.setdefault(spec, [])
+        if subscription not in later:
+            later.append(subscription)
+
     async def subscription_queue_loop(self) -> None:
         """All that waits, in its order, as one packet."""
         self.events_on.set()
@@ -143,16 +168,34 @@ class Circuit(caproto_server.VirtualCircuit):
                 waiting = [await self.subscription_queue.get()]
                 while not self.subscription_queue.empty() and len(waiting) < AT_ONCE:
                     waiting.append(self.subscription_queue.get_nowait())
-                subscribed = {sub.subscriptionid for subs in self.subscriptions.values() for sub in subs}
-                commands = [command for command in map(_command, waiting) if _is_wanted(command, subscribed)]
-                if commands:
-                    await self.send(*commands)
+                buffers = [buffer for command in map(_command, waiting) for buffer in self._bytes_of(command)]
+                if buffers and self.connected:
+                    await self._send_all(buffers)
         except asyncio.CancelledError:
             return
         except DisconnectedCircuit:
             await self._on_disconnect()
             self.circuit.disconnect()
             await self.context.circuit_disconnected(self)
+
+    def _bytes_of(self, command: Any) -> list[Any]:
+        """Of values only while they are subscribed to."""
+        if command is None:
+            return []
+        if isinstance(command, (Event, caproto.EventAddResponse)):
+            asked_for = self.circuit.event_add_commands.get(command.subscriptionid)
+            if asked_for is None or asked_for.sid not in self.circuit.channels_sid:
+                return []
+        if isinstance(command, Event):
+            return [command.data]
+        buffers: list[Any] = self.circuit.send(command)
+        return buffers
+
+    async def _send_all(self, buffers: list[Any]) -> None:
+        try:
+            await self._send_buffers(*buffers)
+        except (OSError, caproto.CaprotoNetworkError) as error:
+            raise DisconnectedCircuit(f"the client has gone: {error}") from error
 
     async def command_queue_loop(self) -> None:
         try:
@@ -166,12 +209,6 @@ def _command(waiting: Any) -> Any:
     return waiting.command if isinstance(waiting, Answer) else waiting()
 
 
-def _is_wanted(command: Any, subscribed: set[int]) -> bool:
-    if isinstance(command, caproto.EventAddResponse):
-        return command.subscriptionid in subscribed
-    return command is not None
-
-
 class Context(caproto_server.Context):
     CircuitClass = Circuit
 
@@ -181,8 +218,16 @@ class Context(caproto_server.Context):
             if isinstance(update, Answer):
                 if update.circuit.connected and self._reads(update.circuit):
                     await update.circuit.subscription_queue.put(update)
+            elif isinstance(update.values, Ready):
+                self._put_values(update)
             else:
                 await self._subscription_queue_iteration(*update)
+
+    def _put_values(self, update: Any) -> None:
+        for spec in update.sub_specs:
+            for subscription in self.subscriptions[spec]:
+                if self._reads(subscription.circuit):
+                    subscription.circuit.put_value(spec, subscription, update.values)
 
     async def _subscription_queue_send(self, sub_spec: Any, sub: Any, **update: Any) -> None:
         if self._reads(sub.circuit):

@@ -113,7 +113,7 @@ class Daemon:
             record = self.records.get(name)
             if record is None:
                 record = self._add(name, is_axis=status.mcus[told.mcu].address == 0)
-            elif self._last.get(name) == told and not record.silent and not record.has_late_state:
+            elif _same(self._last.get(name), told) and not record.silent and not record.has_late_state:
                 continue
             self._last[name] = told
             if record is not None:
@@ -275,6 +275,10 @@ class Daemon:
         self._timers.pop(record, None)
         record.tick(_now())
         self.deliver(record)
+
+
+def _same(before: model.Motor | None, told: model.Motor) -> bool:
+    return before is told or before == told
 
 
 def _now() -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import fractions
+import functools
 
 LONGEST_STEP_S = 3600.0
 
@@ -33,6 +34,7 @@ class Scale:
         return round(dial / self.resolution)
 
 
+@functools.lru_cache(maxsize=1024)
 def resolution(steps_per_unit: str) -> float:
     """Of a motor with so many steps in a unit, as bushd tells it: "320", "12.5" or "1/3"; "" of one whose unit is steps."""
     parts = [fractions.Fraction(part) for part in (steps_per_unit or "1").split("/")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from . import alarms
 from .alarms import Alarm, Severity, Status
@@ -36,6 +37,7 @@ class View(Board):
         self.failure: Alarm = alarms.NONE  # of the last motion
         self.top = 1.0  # speed, in units a second: VMAX
         self.slipped = False
+        self._scale_shown: Any = None
 
     # -- what the shell tells
 
@@ -117,6 +119,10 @@ class View(Board):
 
     def _show_scale(self, seen: Seen) -> None:
         scale = seen.scale
+        now = (scale, seen.low, seen.high, seen.unit, seen.precision, seen.description, seen.place, seen.enabled)
+        if now == self._scale_shown:  # as nearly always: states come often
+            return
+        self._scale_shown = now
         low, high = (seen.low, seen.high) if seen.low is not None and seen.high is not None else (0.0, 0.0)
         dials = sorted((scale.dial(low), scale.dial(high))) if seen.low is not None else [0.0, 0.0]
         self.post_all({
