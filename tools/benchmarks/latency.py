@@ -125,6 +125,7 @@ class World:
         self._stack = contextlib.ExitStack()
         try:
             self._folder = pathlib.Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="bushd-latency-")))
+            self.control = self._folder / "control"
             self._stack.callback(in_real_time, False)
             in_real_time(True)
             self._begin()
@@ -165,7 +166,7 @@ class World:
     def _connected(self):
         self._alive()
         with contextlib.suppress(bushd.NoDaemon):
-            return bushd.connect(self._folder / "control")
+            return bushd.connect(self.control)
 
     def wait_until_ready(self):
         until("all MCUs to be READY", self._ready)
