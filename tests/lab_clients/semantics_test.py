@@ -128,7 +128,7 @@ class Failures(LabTest):
         self.put("theta.VAL", 200.0, wait=False)
         self.wait_for("theta.RBV", lambda rbv: rbv > 5)
         self.put("theta.STOP", 1)
-        self.wait_for("theta.DMOV", lambda dmov: dmov == 1)
+        self.wait_until("the motor to be done", lambda: heard.values("DMOV")[-1:] == [1])
         told = heard.take()
         self.assertEqual([value for field, value, _ in told if field == "DMOV"], [0, 1])
         self.assertEqual([severity for field, _, severity in told if field == "RBV"][-1], 2)
@@ -170,7 +170,7 @@ class Clients(LabTest):
         self.bring_up_lab(bridge=["--longest-jog-s", "2"])
         heard = self.watch("theta.DMOV")
         self.put("theta.JOGF", 1)
-        self.wait_for("theta.DMOV", lambda dmov: dmov == 1)
+        self.wait_until("both edges", lambda: heard.values("DMOV")[-1:] == [1])
         self.assertEqual((heard.values("DMOV"), self.get("theta.SEVR")), ([0, 1], 0))
         self.assertIn("--longest-jog-s", self.bridge.said())
 
