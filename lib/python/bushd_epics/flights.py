@@ -111,12 +111,8 @@ class Flights:
     def _deliver(self, one: Profile) -> None:
         for event in one.take():
             match event:
-                case events.Post():
-                    self._shows[one](event.field, event.value)
-                case events.Done():
-                    if event.error:
-                        LOG.warning("%s", event.error)
-                    event.token(event.error)
+                case events.Post() | events.Done():
+                    self._tell(one, event)
                 case profile.Check():
                     self._spawn(self._check(one, event))
                 case profile.Fly():
@@ -228,6 +224,15 @@ class Flights:
             raise BadProfile(f"{motor}: {record.silent or 'its MCU is offline'}")
         return record.seen
 
+    def _tell(self, one: Profile | Compare, event: events.Post | events.Done, where: str = "") -> None:
+        """`where`: begins the line of the log, where the error does not say it."""
+        if isinstance(event, events.Post):
+            self._shows[one](event.field, event.value)
+            return
+        if event.error:
+            LOG.warning("%s%s", where, event.error)
+        event.token(event.error)
+
     def _motor(self, record: Record) -> str:
         return next((motor for motor, other in self._records.items() if other is record), "")
 
@@ -236,12 +241,8 @@ class Flights:
     def _deliver_compare(self, record: Record, one: Compare) -> None:
         for event in one.take():
             match event:
-                case events.Post():
-                    self._shows[one](event.field, event.value)
-                case events.Done():
-                    if event.error:
-                        LOG.warning("%s: %s", one.name, event.error)
-                    event.token(event.error)
+                case events.Post() | events.Done():
+                    self._tell(one, event, f"{one.name}: ")
                 case compare.Set():
                     self._spawn(self._set_compare(record, one, event))
 
