@@ -30,21 +30,6 @@ std::int64_t random_number() {
   return static_cast<std::int64_t>(std::uint64_t{random()} << 32 | random());
 }
 
-// PROGRAM@HOST-PID-RANDOM (api/introduction.h). Unique among running clients: process numbers
-// repeat, and containers may share a host's name.
-std::string make_id(const std::string& program) {
-  const std::string tail =
-      fmt::format("-{}-{:08x}", getpid(), static_cast<std::uint32_t>(random_number()));
-  std::string name = program;
-  std::ranges::replace(name, '@', '_');  // what is behind the first one is the host
-  std::string head = name + "@" + host_name();
-  head.resize(std::min(head.size(), kMaxClientId - tail.size()));
-  std::replace_if(
-      head.begin(), head.end(), [](unsigned char c) { return c >= 0x80 || std::isgraph(c) == 0; },
-      '_');
-  return head + tail;
-}
-
 std::int64_t unix_time_us() {
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count();
@@ -101,6 +86,19 @@ Result<Opened> open_link(const ClientOptions& options) {
 }
 
 }  // namespace
+
+std::string make_id(const std::string& program) {
+  const std::string tail =
+      fmt::format("-{}-{:08x}", getpid(), static_cast<std::uint32_t>(random_number()));
+  std::string name = program;
+  std::ranges::replace(name, '@', '_');  // what is behind the first one is the host
+  std::string head = name + "@" + host_name();
+  head.resize(std::min(head.size(), kMaxClientId - tail.size()));
+  std::replace_if(
+      head.begin(), head.end(), [](unsigned char c) { return c >= 0x80 || std::isgraph(c) == 0; },
+      '_');
+  return head + tail;
+}
 
 std::string lcm_url(const std::string& given) {
   std::string url = named_url(given);

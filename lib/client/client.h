@@ -24,6 +24,10 @@ inline constexpr const char* kDefaultPrefix = "BUSHD";
 // The URL of LCM that is used where this one is given: it, else $LCM_DEFAULT_URL, else kDefaultUrl.
 std::string lcm_url(const std::string& given);
 
+// The client_id of a program: PROGRAM@HOST-PID-RANDOM (api/introduction.h). Unique among running
+// clients: process numbers repeat, and containers may share a host's name.
+std::string make_id(const std::string& program);
+
 struct ClientOptions {
   enum class Way {
     // The control socket. LCM only where this user has no right to that, or where there is none

@@ -1,6 +1,7 @@
 // A way to the daemon: the control socket of this PC, or LCM.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -32,9 +33,18 @@ Result<std::unique_ptr<Link>> open_lcm(const std::string& url, const std::string
 
 // What every client heeds.
 inline constexpr const char* kNameAnother = "$BUSHD_CONTROL";
+// How long a daemon that has no time is waited for, when connecting and when sending. Who serves
+// others meanwhile does not wait.
+struct Patience {
+  std::chrono::milliseconds connect{3000};
+  std::chrono::milliseconds send{3000};
+};
+inline constexpr Patience kNoPatience{.connect = std::chrono::milliseconds{0},
+                                      .send = std::chrono::milliseconds{0}};
 // `another`: how a user names another daemon, for the error.
 Result<std::unique_ptr<Link>> open_socket(const std::string& path,
-                                          const std::string& another = kNameAnother);
+                                          const std::string& another = kNameAnother,
+                                          Patience patience = {});
 
 // There is a socket at this path, or a folder that hides it, to which this user has no right.
 bool is_barred(const std::string& path);

@@ -17,9 +17,7 @@
 namespace bushd::client {
 namespace {
 
-constexpr int kSendWithinMs = 3000;
 constexpr int kEndsWithinMs = 200;
-constexpr timeval kConnectWithin{.tv_sec = 3, .tv_usec = 0};
 constexpr int kPacketsAtOnce = 256;
 
 // Precondition: it fits.
@@ -89,8 +87,11 @@ std::string why_closed(const std::string& path) {
 
 class SocketLink : public Link {
  public:
-  SocketLink(int fd, std::string path)
-      : fd_(fd), path_(std::move(path)), buffer_(control::kMaxPacketBytes) {}
+  SocketLink(int fd, std::string path, std::chrono::milliseconds send_within)
+      : fd_(fd),
+        path_(std::move(path)),
+        send_within_ms_(static_cast<int>(send_within.count())),
+        buffer_(control::kMaxPacketBytes) {}
   ~SocketLink() override { ::close(fd_); }
 
   int fd() const override { return fd_; }
@@ -99,7 +100,7 @@ class SocketLink : public Link {
     const auto bytes = control::packet_of(packet);
     // A daemon that is busy takes it a moment later.
     pollfd polled{.fd = fd_, .events = POLLOUT, .revents = 0};
-    ::poll(&polled, 1, kSendWithinMs);
+    ::poll(&polled, 1, send_within_ms_);
     if (::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT) < 0) {
       return fail(
           fmt::format("the daemon does not take messages at {}: {}", path_, std::strerror(errno)));
@@ -134,20 +135,25 @@ class SocketLink : public Link {
  private:
   int fd_;
   std::string path_;
+  int send_within_ms_;
   std::vector<std::uint8_t> buffer_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Link>> open_socket(const std::string& path, const std::string& another) {
+Result<std::unique_ptr<Link>> open_socket(const std::string& path, const std::string& another,
+                                          Patience patience) {
   if (path.size() >= sizeof sockaddr_un{}.sun_path) {
     return fail(Error{.message = "the path of the control socket is too long", .file = path});
   }
-  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-  if (fd < 0) return fail(std::string("no socket: ") + std::strerror(errno));
-  auto link = std::make_unique<SocketLink>(fd, path);
   // connect() waits for room among those that a daemon has not taken yet.
-  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &kConnectWithin, sizeof kConnectWithin);
+  const auto connect_ms = patience.connect.count();
+  const int waits = connect_ms == 0 ? SOCK_NONBLOCK : 0;
+  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | waits, 0);
+  if (fd < 0) return fail(std::string("no socket: ") + std::strerror(errno));
+  auto link = std::make_unique<SocketLink>(fd, path, patience.send);
+  const timeval within{.tv_sec = connect_ms / 1000, .tv_usec = connect_ms % 1000 * 1000};
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &within, sizeof within);
   const sockaddr_un address = address_of(path);
   if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int error = errno;

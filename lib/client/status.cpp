@@ -11,6 +11,15 @@ std::int64_t Status::sequence() const {
   return newest;
 }
 
+api::MotorDescription description_of(const api::Description& mcu, std::size_t index,
+                                     const std::string& motor) {
+  if (index < mcu.motors.size() && mcu.motors[index].name == motor) return mcu.motors[index];
+  for (const api::MotorDescription& description : mcu.motors) {
+    if (description.name == motor) return description;
+  }
+  return {};
+}
+
 template <class Message>
 void StatusCollector::put(Parts<Message>& parts, const Message& message) {
   const lcm::Part& part = message.part;

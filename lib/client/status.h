@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "lcm/codec.h"
@@ -29,6 +30,11 @@ struct Status {
 
   std::int64_t sequence() const;  // of the newest state
 };
+
+// The description of the motor at this place in the state; never another one's, whatever the
+// network says.
+api::MotorDescription description_of(const api::Description& mcu, std::size_t index,
+                                     const std::string& motor);
 
 class StatusCollector {
  public:

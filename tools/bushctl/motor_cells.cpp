@@ -68,15 +68,6 @@ std::string notes_text(const api::MotorState& motor) {
   return all;
 }
 
-api::MotorDescription description_of(const api::Description& mcu, std::size_t index,
-                                     const std::string& motor) {
-  if (index < mcu.motors.size() && mcu.motors[index].name == motor) return mcu.motors[index];
-  for (const api::MotorDescription& description : mcu.motors) {
-    if (description.name == motor) return description;
-  }
-  return {};
-}
-
 bool has_unit(const units::Scale& scale) {
   return scale.unit != units::Coordinates::kSteps;
 }

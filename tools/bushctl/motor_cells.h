@@ -7,13 +7,11 @@
 
 #include "api/reply.h"
 #include "api/snapshot.h"
+#include "client/status.h"
 
 namespace bushctl {
 
-// The description of the motor at this place in the state; never another one's, whatever the
-// network says.
-bushd::api::MotorDescription description_of(const bushd::api::Description& mcu, std::size_t index,
-                                            const std::string& motor);
+using bushd::client::description_of;
 
 bool has_position(const bushd::api::MotorState& motor);
 bool has_unit(const bushd::units::Scale& scale);

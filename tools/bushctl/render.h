@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -32,13 +31,6 @@ std::string way_text(const bushd::client::Status& status, std::size_t mcu, std::
 // "uncertain | limit positive | -5 .. 25".
 std::string stand_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
 std::string bounds_text(const bushd::client::Status& status, std::size_t mcu, std::size_t motor);
-
-// What the state and the description of a motor say, by the names of motor_t and
-// motor_description_t; "mcu" beside.
-nlohmann::ordered_json motor_json(const std::string& mcu, const bushd::api::MotorState& state,
-                                  const bushd::api::MotorDescription& description);
-// {"motors":[...],"mcus":[...],...}; docs/lcm.md says more.
-std::string json(const bushd::client::Status& status);
 
 // What a move would be, motor by motor and as a whole.
 std::string json(const bushd::api::MovePlan& plan);

@@ -12,6 +12,7 @@
 #include "live.h"
 #include "named_motors.h"
 #include "readiness.h"
+#include "client/status_json.h"
 #include "render.h"
 #include "screen.h"
 #include "watch.h"

@@ -7,6 +7,7 @@
 
 #include "api/name_pattern.h"
 #include "base/json_text.h"
+#include "client/status_json.h"
 #include "base/printable.h"
 #include "grid.h"
 #include "named_motors.h"
@@ -85,7 +86,7 @@ std::vector<std::string> table(const std::vector<Whereabouts>& motors) {
 std::string json(const std::vector<Whereabouts>& motors) {
   nlohmann::ordered_json out = {{"motors", nlohmann::json::array()}};
   for (const auto& [mcu, state, description, age_s] : motors) {
-    out["motors"].push_back(motor_json(mcu, state, description));
+    out["motors"].push_back(bushd::client::motor_json(mcu, state, description));
   }
   return bushd::json_text(out);
 }
