@@ -7,12 +7,12 @@
 #include <optional>
 
 #include "base/printable.h"
+#include "client/status_json.h"
 #include "commands.h"
 #include "health_view.h"
 #include "live.h"
 #include "named_motors.h"
 #include "readiness.h"
-#include "client/status_json.h"
 #include "render.h"
 #include "screen.h"
 #include "watch.h"

@@ -7,8 +7,8 @@
 
 #include "api/name_pattern.h"
 #include "base/json_text.h"
-#include "client/status_json.h"
 #include "base/printable.h"
+#include "client/status_json.h"
 #include "grid.h"
 #include "named_motors.h"
 #include "render.h"

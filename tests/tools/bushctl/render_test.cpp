@@ -1,13 +1,12 @@
 // How positions are shown, those that nobody knows too, and how far a move has come.
 #include "tools/bushctl/render.h"
 
-#include "client/status_json.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
+#include "client/status_json.h"
 #include "tools/bushctl/progress.h"
 
 namespace bushctl {

@@ -1,0 +1,297 @@
+#include "site.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "base/json_text.h"
+#include "base/printable.h"
+#include "client/status_json.h"
+#include "metrics.h"
+
+namespace bushweb {
+namespace {
+
+constexpr std::size_t kMostAddresses = 256;
+constexpr double kFailuresAtOnce = 10;
+constexpr double kFailuresPerSecond = 0.1;
+
+std::int64_t steady_us() {
+  const auto since = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(since).count();
+}
+
+std::int64_t unix_s() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::seconds>(since_1970).count();
+}
+
+Answer error_answer(int status, const std::string& why) {
+  return json_answer(status, bushd::json_text(nlohmann::json{{"error", why}}));
+}
+
+// A token has nothing but letters and digits, however people type it.
+std::string cookie_value(const std::string& typed) {
+  std::string value;
+  std::ranges::copy_if(typed, std::back_inserter(value),
+                       [](unsigned char c) { return c < 0x80 && std::isalnum(c) != 0; });
+  return value;
+}
+
+}  // namespace
+
+// A page and what it needs of the site.
+class Site::OpenPage : public Surroundings {
+ public:
+  OpenPage(Site& site, PageId id, Visit visit, const Rights& rights)
+      : site_(site), id_(id), visit_(std::move(visit)), page_(*this, rights, steady_us()) {}
+
+  void tell(const Text& text) override { site_.outlet_.send(id_, text); }
+  bool has_daemon(const std::string& daemon) const override {
+    return site_.watch_of(daemon) != nullptr;
+  }
+  bushd::Result<std::unique_ptr<Connection>> connect(const std::string& daemon,
+                                                     const std::string& program) override {
+    auto opened = DaemonLink::open(
+        site_.poller_, site_.watch_of(daemon)->daemon().socket, program,
+        {.reply = [this, daemon](
+                      std::int64_t number,
+                      const api::Reply& reply) { page_.on_reply(daemon, number, reply); },
+         .ended = [this, daemon](const std::string& why) { page_.on_end(daemon, why); }});
+    if (!opened) return bushd::fail(opened.error());
+    return std::unique_ptr<Connection>(std::move(*opened));
+  }
+  void run_doctor(const std::string& daemon, std::int64_t id) override {
+    site_.run_doctor(*site_.watch_of(daemon), id_, id);
+  }
+
+  PageId id() const { return id_; }
+  const Visit& visit() const { return visit_; }
+  Page& page() { return page_; }
+  void greet() { tell(hello(site_.options_.version, page_.rights(), names())); }
+  bool behind = false;  // what was told last is not all that there was
+
+ private:
+  std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (const DaemonName& daemon : site_.options_.daemons) names.push_back(daemon.name);
+    return names;
+  }
+
+  Site& site_;
+  PageId id_;
+  Visit visit_;
+  Page page_;
+};
+
+Site::Site(SiteOptions options, Poller& poller, Outlet& outlet)
+    : options_(std::move(options)),
+      poller_(poller),
+      outlet_(outlet),
+      content_(Content::load(options_.folder)),
+      tokens_(options_.tokens) {
+  for (const DaemonName& daemon : options_.daemons) {
+    watches_.push_back(std::make_unique<Watch>(poller_, daemon));
+  }
+  if (!content_) fmt::print(stderr, "bushd-web: {}\n", bushd::printable(content_.error().text()));
+  refresh_tokens();
+}
+
+Site::~Site() = default;
+
+Watch* Site::watch_of(const std::string& daemon) {
+  for (const auto& watch : watches_) {
+    if (watch->daemon().name == daemon) return watch.get();
+  }
+  return nullptr;
+}
+
+Rights Site::rights_for(const Visit& visit) const {
+  const auto token = tokens_.find(token_of(visit.cookies), unix_s());
+  return rights_of(visit, token ? std::optional(token->name) : std::nullopt, options_.access);
+}
+
+Answer Site::answer(const Visit& visit) {
+  if (const std::string why = why_not_host(visit, options_.access); !why.empty()) {
+    return text_answer(421, why);
+  }
+  if (visit.method == "POST") {
+    if (is_foreign(visit)) return error_answer(403, "this comes from a page of somebody else's");
+    if (visit.path == "/api/login") return log_in(visit);
+    if (visit.path == "/api/logout") return log_out(visit);
+    return error_answer(404, "there is nothing to be sent here");
+  }
+  if (visit.method != "GET") return error_answer(405, "only GET and POST are answered");
+  if (visit.path == "/metrics") return metrics();
+  if (visit.path == "/api/state") return state(visit);
+  return file(visit);
+}
+
+Answer Site::file(const Visit& visit) const {
+  if (!content_) return text_answer(503, content_.error().text());
+  const Answer* found = content_->find(visit.path, visit.takes_gzip);
+  return found != nullptr ? *found : text_answer(404, "there is nothing here: the page is at /");
+}
+
+// More tokens from where most came from are wrong than anybody mistypes.
+bool Site::may_fail_again(const std::string& peer, std::int64_t now_us) {
+  if (failures_.size() >= kMostAddresses && !failures_.contains(peer)) failures_.clear();
+  auto& [left, at_us] =
+      failures_.try_emplace(peer, Failures{.left = kFailuresAtOnce, .at_us = now_us}).first->second;
+  left = std::min(kFailuresAtOnce,
+                  left + static_cast<double>(now_us - at_us) * 1e-6 * kFailuresPerSecond);
+  at_us = now_us;
+  return left >= 1;
+}
+
+Answer Site::log_in(const Visit& visit) {
+  if (!may_fail_again(visit.peer, steady_us())) {
+    return error_answer(429, "too many wrong tokens came from this address: wait a minute");
+  }
+  refresh_tokens();
+  const auto told = nlohmann::json::parse(visit.body, nullptr, false);
+  const auto member = told.is_object() ? told.find("token") : told.end();
+  if (!told.is_object() || member == told.end() || !member->is_string()) {
+    return error_answer(400, "a JSON object with \"token\" is expected");
+  }
+  const auto typed = member->get<std::string>();
+  const std::int64_t now_s = unix_s();
+  const auto token = tokens_.find(typed, now_s);
+  if (!token) {
+    failures_[visit.peer].left -= 1;
+    return error_answer(403,
+                        "there is no such token, or it has ended: 'bushctl web-token' makes one");
+  }
+  return cookie(200, cookie_value(typed), token->expires_s - now_s);
+}
+
+Answer Site::log_out(const Visit& /*visit*/) const {
+  return cookie(200, "", 0);
+}
+
+Answer Site::cookie(int status, const std::string& token, std::int64_t seconds) const {
+  Answer answer = json_answer(status, "{}");
+  answer.headers.emplace_back(
+      "set-cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", kCookie,
+                                token, seconds, options_.access.tls ? "; Secure" : ""));
+  return answer;
+}
+
+Answer Site::state(const Visit& visit) {
+  Watch* watch = visit.daemon.empty() ? watches_.front().get() : watch_of(visit.daemon);
+  if (watch == nullptr) return error_answer(404, "there is no such daemon");
+  const auto status = watch->mirror().status();
+  if (!watch->mirror().connected() || status.states.empty() || status.descriptions.empty()) {
+    return error_answer(503, "the daemon has not told its state");
+  }
+  return json_answer(200, bushd::client::json(status));
+}
+
+Answer Site::metrics() {
+  std::vector<Measured> daemons;
+  for (const auto& watch : watches_) {
+    Mirror& mirror = watch->mirror();
+    Measured& measured = daemons.emplace_back(
+        Measured{.daemon = watch->daemon().name, .connected = mirror.connected()});
+    if (measured.connected) measured.status = mirror.status();
+  }
+  Answer answer = text_answer(200, "");
+  answer.type = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+  answer.body = std::make_shared<const std::string>(open_metrics(daemons));
+  return answer;
+}
+
+std::string Site::why_no_page(const Visit& visit) const {
+  if (visit.path != "/api/live") return "pages open /api/live";
+  if (std::string why = why_not_host(visit, options_.access); !why.empty()) return why;
+  return is_foreign(visit) ? "this comes from a page of somebody else's" : "";
+}
+
+void Site::open(PageId id, const Visit& visit) {
+  auto page = std::make_unique<OpenPage>(*this, id, visit, rights_for(visit));
+  page->greet();
+  catch_up(*page);
+  pages_[id] = std::move(page);
+}
+
+void Site::catch_up(OpenPage& page) {
+  for (const auto& watch : watches_) {
+    for (const Text& text : watch->mirror().everything()) page.tell(text);
+  }
+}
+
+void Site::hear(PageId id, std::string_view text) {
+  const auto found = pages_.find(id);
+  if (found != pages_.end()) found->second->page().hear(text, steady_us());
+}
+
+void Site::close(PageId id) {
+  pages_.erase(id);
+}
+
+void Site::tick() {
+  std::vector<Text> news;
+  for (const auto& watch : watches_) {
+    watch->tick(steady_us());
+    std::ranges::move(watch->mirror().news(), std::back_inserter(news));
+  }
+  for (const auto& [id, page] : pages_) {
+    if (outlet_.is_behind(id)) {
+      page->behind = page->behind || !news.empty();
+    } else if (std::exchange(page->behind, false)) {
+      catch_up(*page);
+    } else {
+      for (const Text& text : news) page->tell(text);
+    }
+  }
+  if (++ticks_ % kTicksPerSecond != 0) return;
+  refresh_tokens();
+  for (const auto& [id, page] : pages_) {
+    const Rights rights = rights_for(page->visit());
+    if (rights == page->page().rights()) continue;
+    page->page().set_rights(rights);
+    page->greet();
+  }
+}
+
+void Site::refresh_tokens() {
+  const std::string wrong = tokens_.refresh();
+  if (!wrong.empty()) fmt::print(stderr, "bushd-web: {}\n", bushd::printable(wrong));
+}
+
+void Site::run_doctor(const Watch& watch, PageId page, std::int64_t id) {
+  const std::string daemon = watch.daemon().name;
+  Examination& examination = examinations_[daemon];
+  examination.waiting.emplace_back(page, id);
+  if (examination.run) return;
+  examination.run = std::make_unique<ProgramRun>(
+      poller_,
+      [this, daemon](const bushd::Result<std::string>& output) { tell_findings(daemon, output); });
+  const auto started = examination.run->start(
+      {options_.bushctl, "doctor", "--json", "--socket", watch.daemon().socket});
+  if (!started) tell_findings(daemon, bushd::fail(started.error()));
+}
+
+void Site::tell_findings(const std::string& daemon, const bushd::Result<std::string>& output) {
+  const Examination examination = std::move(examinations_[daemon]);
+  examinations_.erase(daemon);
+  const auto told =
+      output ? nlohmann::ordered_json::parse(*output, nullptr, false) : nlohmann::ordered_json();
+  for (const auto& [page, id] : examination.waiting) {
+    if (!pages_.contains(page)) continue;
+    if (told.is_object() && told.contains("findings")) {
+      outlet_.send(page, result(id, "done", "examined", {{"findings", told["findings"]}}));
+    } else {
+      outlet_.send(page, refused(id, output ? "bushctl doctor has printed no findings"
+                                            : output.error().text()));
+    }
+  }
+}
+
+}  // namespace bushweb

@@ -1,0 +1,103 @@
+// What bushd-web serves: the page's files, what programs read, and open pages. Between the library
+// of HTTP (server.h) and the daemons.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "access.h"
+#include "content.h"
+#include "daemon_link.h"
+#include "messages.h"
+#include "page.h"
+#include "poller.h"
+#include "program_run.h"
+#include "token_file.h"
+
+namespace bushweb {
+
+using PageId = std::uint64_t;
+
+// The way to open pages.
+class Outlet {
+ public:
+  virtual ~Outlet() = default;
+  virtual void send(PageId page, const Text& text) = 0;
+  // It has not taken yet what it was sent: states would only be older when it does.
+  virtual bool is_behind(PageId page) const = 0;
+};
+
+struct SiteOptions {
+  std::string version{};
+  std::vector<DaemonName> daemons{};  // at least one, names differ
+  AccessOptions access{};
+  std::string tokens{};   // path
+  std::string folder{};   // of the page
+  std::string bushctl{};  // path
+};
+
+class Site {
+ public:
+  static constexpr int kTicksPerSecond = 10;
+
+  Site(SiteOptions options, Poller& poller, Outlet& outlet);
+  ~Site();
+  Site(const Site&) = delete;
+  Site& operator=(const Site&) = delete;
+
+  // Of anything but a WebSocket.
+  Answer answer(const Visit& visit);
+  // Why there is to be no WebSocket; "": there may.
+  std::string why_no_page(const Visit& visit) const;
+  void open(PageId page, const Visit& visit);
+  void hear(PageId page, std::string_view text);
+  void close(PageId page);
+
+  // So many times a second: states go out, daemons are tried again, tokens are read.
+  void tick();
+
+ private:
+  class OpenPage;
+
+  Answer log_in(const Visit& visit);
+  Answer log_out(const Visit& visit) const;
+  Answer cookie(int status, const std::string& token, std::int64_t seconds) const;
+  Answer state(const Visit& visit);
+  Answer metrics();
+  Answer file(const Visit& visit) const;
+  bool may_fail_again(const std::string& peer, std::int64_t now_us);
+  Rights rights_for(const Visit& visit) const;
+  Watch* watch_of(const std::string& daemon);
+  void catch_up(OpenPage& page);
+  void refresh_tokens();
+  void run_doctor(const Watch& watch, PageId page, std::int64_t id);
+  void tell_findings(const std::string& daemon, const bushd::Result<std::string>& output);
+
+  SiteOptions options_;
+  Poller& poller_;
+  Outlet& outlet_;
+  bushd::Result<Content> content_;
+  TokenFile tokens_;
+  std::vector<std::unique_ptr<Watch>> watches_{};
+  std::map<PageId, std::unique_ptr<OpenPage>> pages_;
+  // Of tokens that were wrong, by address: how many more are taken just now.
+  struct Failures {
+    double left;
+    std::int64_t at_us;
+  };
+  std::map<std::string, Failures> failures_{};
+  // Who waits for which daemon's doctor, which runs once for all of them.
+  struct Examination {
+    std::unique_ptr<ProgramRun> run;
+    std::vector<std::pair<PageId, std::int64_t>> waiting{};
+  };
+  std::map<std::string, Examination> examinations_{};
+  int ticks_ = 0;
+};
+
+}  // namespace bushweb
