@@ -92,8 +92,13 @@ class OpenPage:
 
 
 class WebTest(EndToEndTest):
-    def bring_up_web(self, *options, **configuration):
-        self.bring_up(**configuration)
+    def bring_up_web(self, *options, kept=False):
+        """`kept`: the daemon keeps positions and history."""
+        self.write_config(state=self.file("state") if kept else "")
+        self.bushsim = self.start_bushsim()
+        self.bushd = self.start_bushd()
+        self.wait_until_ready()
+        self.survey()
         self.start_web(*options)
 
     def start_web(self, *options, log="bushd-web.log"):

@@ -1,0 +1,54 @@
+// Numbers for Prometheus.
+#include "tools/bushweb/metrics.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace bushweb {
+namespace {
+
+namespace api = bushd::api;
+using testing::HasSubstr;
+using testing::Not;
+
+Measured told_of(std::vector<bushd::lcm::StateMessage> states,
+                 std::vector<bushd::lcm::HealthMessage> healths) {
+  Measured daemon{.daemon = "d", .connected = true};
+  daemon.status.states = std::move(states);
+  daemon.status.healths = std::move(healths);
+  return daemon;
+}
+
+TEST(Metrics, APositionThatNobodyKnowsIsLeftOut) {
+  bushd::lcm::StateMessage mcu;
+  mcu.snapshot = {.mcu = "hall:1", .state = api::McuState::kReady};
+  mcu.snapshot.motors = {{.name = "a", .position_steps = 5, .user = 0.5},
+                         {.name = "b\"\\\n", .trust = api::Trust::kUnknown}};
+  const std::string text = open_metrics({told_of({mcu}, {})});
+  EXPECT_THAT(text,
+              HasSubstr("bushd_motor_position{daemon=\"d\",mcu=\"hall:1\",motor=\"a\"} 0.5\n"));
+  EXPECT_THAT(text,
+              Not(HasSubstr("bushd_motor_position_steps{daemon=\"d\",mcu=\"hall:1\",motor=\"b")));
+  EXPECT_THAT(text, HasSubstr("motor=\"b\\\"\\\\\\n\",bushd_motor_trust=\"unknown\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("bushd_mcu_ready{daemon=\"d\",mcu=\"hall:1\"} 1\n"));
+  EXPECT_TRUE(text.ends_with("# EOF\n"));
+}
+
+TEST(Metrics, ClassesOfLatencyAddUp) {
+  bushd::lcm::HealthMessage bus;
+  bus.snapshot.bus = "b";
+  bus.snapshot.latency = {{1000, 3}, {2000, 4}, {std::numeric_limits<std::int64_t>::max(), 1}};
+  const std::string text = open_metrics({told_of({}, {bus})});
+  EXPECT_THAT(text, HasSubstr("_bucket{daemon=\"d\",bus=\"b\",le=\"0.002\"} 7\n"));
+  EXPECT_THAT(text, HasSubstr("_bucket{daemon=\"d\",bus=\"b\",le=\"+Inf\"} 8\n"));
+  EXPECT_THAT(text, HasSubstr("_count{daemon=\"d\",bus=\"b\"} 8\n"));
+}
+
+TEST(Metrics, ADaemonThatIsNotThereIsDown) {
+  EXPECT_THAT(open_metrics({Measured{.daemon = "d"}}), HasSubstr("bushd_up{daemon=\"d\"} 0\n"));
+}
+
+}  // namespace
+}  // namespace bushweb
