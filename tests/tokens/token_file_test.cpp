@@ -1,5 +1,5 @@
 // The file of tokens, and whatever may lie in its place. Who has a right to it:
-// tests/e2e/web_token_test.py.
+// tests/tools/bushctl/web_token_test.py.
 #include "tokens/token_file.h"
 
 #include <fcntl.h>

@@ -115,7 +115,7 @@ class WebTest(EndToEndTest):
 
     def make_token(self, name="anna", *options):
         made = self.command("web-token", name, "--file", self.file("tokens"), "--json", *options)
-        return json.loads(made)["token"]
+        return json.loads(made.stdout)["token"]
 
     def log_in(self, token):
         """The cookie of this token."""

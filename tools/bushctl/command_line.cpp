@@ -77,6 +77,11 @@ Command& Command::option(const std::string& name, std::string* value, const std:
   return *this;
 }
 
+Command& Command::word(const std::string& name, std::string* value, const std::string& text) {
+  app_->add_option(name, *value, text);
+  return *this;
+}
+
 Command& Command::file(const std::string& name, std::string* value, const std::string& text) {
   app_->add_option(name, *value, text)->type_name("FILE")->capture_default_str();
   return *this;

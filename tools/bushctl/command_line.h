@@ -43,6 +43,8 @@ class Command {
                        const std::string& text);
   // `name` without dashes: in its place among the words, and needed.
   Command& option(const std::string& name, std::string* value, const std::string& text);
+  // In its place among the words, and not needed.
+  Command& word(const std::string& name, std::string* value, const std::string& text);
   // The path of a file.
   Command& file(const std::string& name, std::string* value, const std::string& text);
   Command& choice(const std::string& name, std::string* value,

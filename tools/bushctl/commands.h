@@ -46,6 +46,8 @@ void add_raw_bus_commands(CommandLine& commands);
 void add_setup_command(CommandLine& commands);
 // doctor
 void add_doctor_command(CommandLine& commands);
+// web-token
+void add_web_commands(CommandLine& commands);
 
 // Where the service has its configuration.
 inline constexpr const char* kSystemConfig = "/etc/bushd/bushd.toml";
@@ -54,6 +56,9 @@ inline constexpr const char* kSystemConfig = "/etc/bushd/bushd.toml";
 inline constexpr const char* kMotors = "Motors; 'slit*' and @GROUP stand for several";
 inline constexpr const char* kMotorsOrAll =
     "Motors; 'slit*' and @GROUP stand for several (default: all)";
+
+// The file of tokens of bushd-web: the given one, if any.
+std::string web_token_file(const std::string& given);
 
 // What may follow these words (base/completion.h), with names that the daemon knows.
 int complete(CommandLine& commands, const std::vector<std::string>& words);

@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "config/setting.h"
+#include "tokens/token_file.h"
 
 namespace bushctl {
 namespace {
@@ -61,13 +62,32 @@ std::set<std::string> keys() {
   return names;
 }
 
+// Names of tokens stand behind --revoke alone: that of a new one is its maker's.
+bool is_about_tokens(const std::vector<std::string>& words) {
+  return std::find(words.begin(), words.end() - 1, "web-token") != words.end() - 1;
+}
+
+std::set<std::string> token_names(const bushd::Completion& completion) {
+  std::set<std::string> names;
+  const auto file = completion.given.find("--file");
+  const auto found =
+      bushd::tokens::read(web_token_file(file == completion.given.end() ? "" : file->second));
+  if (completion.value != "TEXT" || !found) return names;
+  for (const bushd::tokens::Token& token : *found) names.insert(token.name);
+  return names;
+}
+
 }  // namespace
 
 int complete(CommandLine& commands, const std::vector<std::string>& words) {
   bushd::Completion completion = commands.complete(words);
-  const auto names =
-      wants_keys(words) ? keys() : known_names(commands.connection(), completion.value);
-  completion.value.clear();
+  std::set<std::string> names;
+  if (is_about_tokens(words)) {
+    names = token_names(completion);
+  } else {
+    names = wants_keys(words) ? keys() : known_names(commands.connection(), completion.value);
+    completion.value.clear();
+  }
   bushd::print_completion(completion, words.back(), {names.begin(), names.end()});
   return kDone;
 }

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
     bushctl::add_raw_bus_commands(commands);
     bushctl::add_setup_command(commands);
     bushctl::add_doctor_command(commands);
+    bushctl::add_web_commands(commands);
     if (const auto words = bushd::completion_asked(argc, argv)) {
       return bushd::finished_output(bushctl::complete(commands, *words));
     }

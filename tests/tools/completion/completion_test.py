@@ -81,6 +81,15 @@ class Others(unittest.TestCase):
         self.assertEqual(complete_in_bash("bushctl", "--socket", "/nowhere", "config", "o"), set())
         self.assertEqual(complete_in_bash("bushctl", "--socket", "/nowhere", "stop", ""), set())
 
+    def test_tokens_by_name(self):
+        with tempfile.TemporaryDirectory() as directory:
+            tokens = pathlib.Path(directory) / "tokens"
+            tokens.write_text(f"{'a' * 64} tablet 2 1 anna\n{'b' * 64} otto 2 1 anna\n")
+            self.assertEqual(complete_in_bash("bushctl", "web-token", "--file", tokens, "--revoke", ""), {"otto", "tablet"})
+            self.assertEqual(complete_in_bash("bushctl", "web-token", "--file", tokens, "--revoke", "t"), {"tablet"})
+            self.assertEqual(complete_in_bash("bushctl", "web-token", "--file", tokens, "t"), set())
+            self.assertEqual(complete_in_bash("bushctl", "web-token", "--file", "to", directory=directory), {"tokens"})
+
     def test_daemon_and_simulator(self):
         self.assertEqual(complete_in_bash("bushd", "--check"), {"--check-config"})
         self.assertEqual(complete_in_bash("bushsim", "--tr"), {"--trace"})
