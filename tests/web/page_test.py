@@ -49,8 +49,10 @@ class WebPage(WebTest):
         result = page.result(number)
         self.assertEqual((result["outcome"], [motor["position_steps"] for motor in result["detail"]["motors"]]), ("reached", [300, -70]))
         history = page.result(page.ask("get history", motor="a0"))["detail"]["history"]["motions"]
-        self.assertRegex(history[0]["who"], "^web:anna@")
-        self.assert_stands_where_the_trace_ends(page, "a0", "b1")
+        self.assertRegex(history[0]["who"], " of web:anna@")
+        self.end_programs()
+        traced = self.traced_positions()
+        self.assertEqual((traced["a0"], traced["b1"]), (300, -70))
 
     def test_a_jog_ends_with_the_page_that_keeps_it_going(self):
         self.bring_up_web()
@@ -88,9 +90,11 @@ class WebPage(WebTest):
         self.assertIn("bushd has ended", refused["reason"])
         page.motors.clear()
         self.bushd = self.start_bushd(moves="moves-2.jsonl")
-        page.take_until(lambda: page.daemons["bushd"]["connected"] and page.mcus["hall:1"]["state"] == "ready" and "a0" in page.motors)
-        self.assertEqual(page.result(page.ask("move", **by("a0", 5)))["outcome"], "reached")
-        self.assert_stands_where_the_trace_ends(page, "a0")
+        page.take_until(lambda: page.daemons["bushd"]["connected"] and "a0" in page.motors and page.mcus["hall:1"]["state"] == "READY")
+        result = page.result(page.ask("move", **by("a0", 5)))
+        self.assertEqual(result["outcome"], "reached")
+        self.end_programs()
+        self.assertEqual(self.traced_positions()["a0"], result["detail"]["motors"][0]["position_steps"])
 
     def test_a_table_is_checked_before_it_is_stored(self):
         self.bring_up_web()

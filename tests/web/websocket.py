@@ -32,6 +32,13 @@ class WebSocket:
                     (("Sec-WebSocket-Protocol", protocol), ("Origin", origin), ("Cookie", cookie)) if value}
         lines = [f"GET {path} HTTP/1.1", *(f"{name}: {value}" for name, value in headers.items()), "", ""]
         self._socket.sendall("\r\n".join(lines).encode())
+        try:
+            self._await_upgrade()
+        except (Ended, Refused, OSError):
+            self.close()
+            raise
+
+    def _await_upgrade(self):
         while b"\r\n\r\n" not in self._bytes:
             self._receive()
         head, _, self._bytes = self._bytes.partition(b"\r\n\r\n")
