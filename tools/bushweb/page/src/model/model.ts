@@ -1,0 +1,273 @@
+// What the page knows of all daemons: by daemon and name from the beginning, so that two daemons
+// may have motors of one name. What a daemon has said stays when its connection ends, and grows
+// old: heardMs of its MCUs tells.
+import type {
+  BusHealth, DaemonMessage, DescriptionMessage, HealthMessage, Hello, McuDescription, McuState,
+  MotorDescription, MotorState, StateMessage,
+} from "../net/messages";
+import { Lateness } from "./lateness";
+import { Rate } from "./rates";
+
+export interface Motor {
+  readonly key: string;
+  readonly daemon: string;
+  readonly name: string;
+  mcu: Mcu;
+  state: MotorState | undefined;
+  about: MotorDescription | undefined;
+}
+
+export interface Mcu {
+  readonly key: string;
+  readonly daemon: string;
+  readonly name: string;
+  bus: string;
+  part: number;
+  heardMs: number; // by the page's clock
+  state: McuState | undefined;
+  about: McuDescription | undefined;
+  motors: Motor[];
+}
+
+export interface Bus {
+  readonly key: string;
+  readonly daemon: string;
+  readonly name: string;
+  health: BusHealth;
+  heardMs: number;
+  crc: Rate;
+  mcus: Map<string, { crc: Rate; repeats: Rate }>;
+}
+
+export interface Daemon {
+  readonly name: string;
+  connected: boolean;
+  why: string;
+  told: boolean; // whether it is connected
+  mcus: Map<string, Mcu>;
+  motors: Map<string, Motor>;
+  buses: Map<string, Bus>;
+}
+
+export interface Changes {
+  structure: boolean; // which daemons, MCUs and motors there are, or what is said of them
+  motors: Set<Motor>;
+  mcus: Set<Mcu>;
+  health: boolean;
+  rights: boolean;
+}
+
+export const kOldMs = 1000;
+const kLateMs = 200; // less than that is the scatter of timers and networks
+
+export function noChanges(): Changes {
+  return { structure: false, motors: new Set(), mcus: new Set(), health: false, rights: false };
+}
+
+export class Model {
+  readonly daemons = new Map<string, Daemon>();
+  hello: Hello | undefined;
+  changes = noChanges();
+  // Each report of a motor's MCU, whether the motor has changed or not.
+  onReport: (mcu: Mcu) => void = () => {};
+  private readonly lateness = new Map<string, Lateness>();
+
+  constructor(private readonly nowMs: () => number) {}
+
+  takeHello(hello: Hello): void {
+    this.hello = hello;
+    const names = Array.isArray(hello.daemons) ? hello.daemons : [];
+    for (const name of [...this.daemons.keys()]) if (!names.includes(name)) this.daemons.delete(name);
+    for (const name of names) this.daemon(name);
+    this.changes.structure = this.changes.rights = true;
+  }
+
+  takeDaemon(message: DaemonMessage): void {
+    const daemon = this.daemon(message.daemon);
+    daemon.connected = message.connected;
+    daemon.why = message.why ?? "";
+    daemon.told = true;
+    this.changes.structure = true;
+  }
+
+  takeState(message: StateMessage): void {
+    const daemon = this.daemon(message.daemon);
+    const nowMs = this.nowMs();
+    const lateMs = this.latenessOf(message.daemon).of(message.utime_us / 1000, nowMs);
+    const heardMs = lateMs > kLateMs ? nowMs - lateMs : nowMs;
+    if (message.full) this.keepOnly(daemon, message.mcus);
+    for (const told of message.mcus) {
+      const mcu = this.mcu(daemon, told.mcu, told.bus, told.part);
+      mcu.heardMs = Math.max(mcu.heardMs, heardMs);
+      mcu.state = told;
+      for (const state of told.motors) {
+        const motor = this.motor(daemon, mcu, state.name);
+        motor.state = state;
+        this.changes.motors.add(motor);
+      }
+      if (message.full) this.keepMotors(daemon, mcu, told.motors);
+      this.changes.mcus.add(mcu);
+      this.onReport(mcu);
+    }
+  }
+
+  takeDescription(message: DescriptionMessage): void {
+    const daemon = this.daemon(message.daemon);
+    if (message.full) this.keepOnly(daemon, message.mcus);
+    for (const told of message.mcus) {
+      const mcu = this.mcu(daemon, told.mcu, told.bus, told.part);
+      mcu.about = told;
+      for (const about of told.motors) this.motor(daemon, mcu, about.name).about = about;
+    }
+    this.changes.structure = true;
+  }
+
+  takeHealth(message: HealthMessage): void {
+    const daemon = this.daemon(message.daemon);
+    const nowMs = this.nowMs();
+    if (message.full) {
+      const names = new Set(message.buses.map((bus) => bus.bus));
+      for (const name of [...daemon.buses.keys()]) if (!names.has(name)) daemon.buses.delete(name);
+    }
+    for (const health of message.buses) {
+      let bus = daemon.buses.get(health.bus);
+      if (!bus) {
+        bus = {
+          key: keyOf(daemon.name, health.bus), daemon: daemon.name, name: health.bus, health,
+          heardMs: nowMs, crc: new Rate(), mcus: new Map(),
+        };
+        daemon.buses.set(health.bus, bus);
+      }
+      bus.health = health;
+      bus.heardMs = nowMs;
+      bus.crc.take(health.crc_errors, nowMs);
+      for (const mcu of health.mcus) {
+        const rates = bus.mcus.get(mcu.mcu) ?? { crc: new Rate(), repeats: new Rate() };
+        rates.crc.take(mcu.crc_errors, nowMs);
+        rates.repeats.take(mcu.repeats, nowMs);
+        bus.mcus.set(mcu.mcu, rates);
+      }
+    }
+    this.changes.health = true;
+  }
+
+  // What has changed since it was asked the last time.
+  takeChanges(): Changes {
+    const changes = this.changes;
+    this.changes = noChanges();
+    return changes;
+  }
+
+  hasChanged(): boolean {
+    const { structure, motors, mcus, health, rights } = this.changes;
+    return structure || health || rights || motors.size > 0 || mcus.size > 0;
+  }
+
+  allMotors(): Motor[] {
+    const all: Motor[] = [];
+    for (const daemon of this.daemons.values()) {
+      const mcus = [...daemon.mcus.values()].sort((a, b) => a.part - b.part);
+      for (const mcu of mcus) all.push(...mcu.motors);
+    }
+    return all;
+  }
+
+  allMcus(): Mcu[] {
+    return [...this.daemons.values()].flatMap((daemon) =>
+      [...daemon.mcus.values()].sort((a, b) => a.part - b.part),
+    );
+  }
+
+  find(daemon: string, name: string): Motor | undefined {
+    return this.daemons.get(daemon)?.motors.get(name);
+  }
+
+  // Since its MCU was heard.
+  ageMs(mcu: Mcu): number {
+    return this.nowMs() - mcu.heardMs;
+  }
+
+  isOld(mcu: Mcu): boolean {
+    return this.ageMs(mcu) > kOldMs;
+  }
+
+  statesAreDue(): boolean {
+    return [...this.daemons.values()].some((daemon) => daemon.connected && daemon.mcus.size > 0);
+  }
+
+  private daemon(name: string): Daemon {
+    let daemon = this.daemons.get(name);
+    if (!daemon) {
+      daemon = {
+        name, connected: false, why: "", told: false, mcus: new Map(), motors: new Map(),
+        buses: new Map(),
+      };
+      this.daemons.set(name, daemon);
+      this.changes.structure = true;
+    }
+    return daemon;
+  }
+
+  private mcu(daemon: Daemon, name: string, bus: string, part: number): Mcu {
+    let mcu = daemon.mcus.get(name);
+    if (!mcu) {
+      mcu = {
+        key: keyOf(daemon.name, name), daemon: daemon.name, name, bus, part,
+        heardMs: -Infinity, state: undefined, about: undefined, motors: [],
+      };
+      daemon.mcus.set(name, mcu);
+      this.changes.structure = true;
+    }
+    mcu.bus = bus;
+    mcu.part = part;
+    return mcu;
+  }
+
+  private motor(daemon: Daemon, mcu: Mcu, name: string): Motor {
+    let motor = daemon.motors.get(name);
+    if (!motor) {
+      motor = {
+        key: keyOf(daemon.name, name), daemon: daemon.name, name, mcu, state: undefined,
+        about: undefined,
+      };
+      daemon.motors.set(name, motor);
+      mcu.motors.push(motor);
+      this.changes.structure = true;
+    } else if (motor.mcu !== mcu) {
+      motor.mcu.motors = motor.mcu.motors.filter((other) => other !== motor);
+      motor.mcu = mcu;
+      mcu.motors.push(motor);
+      this.changes.structure = true;
+    }
+    return motor;
+  }
+
+  private keepOnly(daemon: Daemon, mcus: readonly { mcu: string }[]): void {
+    const names = new Set(mcus.map((mcu) => mcu.mcu));
+    for (const mcu of [...daemon.mcus.values()]) {
+      if (names.has(mcu.name)) continue;
+      for (const motor of mcu.motors) daemon.motors.delete(motor.name);
+      daemon.mcus.delete(mcu.name);
+      this.changes.structure = true;
+    }
+  }
+
+  private keepMotors(daemon: Daemon, mcu: Mcu, motors: readonly { name: string }[]): void {
+    const names = new Set(motors.map((motor) => motor.name));
+    const gone = mcu.motors.filter((motor) => !names.has(motor.name));
+    if (gone.length === 0) return;
+    for (const motor of gone) daemon.motors.delete(motor.name);
+    mcu.motors = mcu.motors.filter((motor) => names.has(motor.name));
+    this.changes.structure = true;
+  }
+
+  private latenessOf(daemon: string): Lateness {
+    const lateness = this.lateness.get(daemon) ?? new Lateness();
+    this.lateness.set(daemon, lateness);
+    return lateness;
+  }
+}
+
+export function keyOf(daemon: string, name: string): string {
+  return JSON.stringify([daemon, name]);
+}

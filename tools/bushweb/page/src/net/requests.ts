@@ -1,0 +1,112 @@
+// Requests and their answers. A request is sent at once or not at all: it never waits behind
+// others, and none is sent a second time, as it may have been carried out.
+import type { Reply } from "./messages";
+
+// "lost": the connection ended before the answer came.
+export interface Answer {
+  id: number;
+  daemon: string;
+  request: string;
+  fields: object;
+  phase: "accepted" | "refused" | "result" | "lost" | "not sent";
+  outcome: string;
+  reason: string;
+  detail: NonNullable<Reply["detail"]>;
+  tookMs: number;
+}
+
+export interface Options {
+  quiet?: boolean; // not for notices and the log: renewals, and what only reads
+  onAccepted?: () => void;
+}
+
+interface Waiting {
+  answer: Answer;
+  options: Options;
+  sentMs: number;
+  settle: (answer: Answer) => void;
+}
+
+export class Requests {
+  onAnswer: (answer: Answer, options: Options) => void = () => {};
+  private count = 0;
+  private readonly waiting = new Map<number, Waiting>();
+
+  constructor(
+    private readonly send: (message: object) => boolean,
+    private readonly nowMs: () => number,
+  ) {}
+
+  ask(daemon: string, request: string, fields: object = {}, options: Options = {}): Promise<Answer> {
+    return this.put({ kind: "ask", daemon, request, fields }, daemon, request, fields, options);
+  }
+
+  // Those that are not requests of the daemon: "check" and "doctor".
+  call(kind: string, daemon: string, more: object = {}): Promise<Answer> {
+    return this.put({ kind, daemon, ...more }, daemon, kind, more, { quiet: true });
+  }
+
+  take(reply: Reply): void {
+    const waiting = this.waiting.get(reply.id);
+    if (!waiting) return;
+    waiting.answer.phase = reply.phase;
+    if (reply.phase === "accepted") {
+      waiting.options.onAccepted?.();
+      this.onAnswer({ ...waiting.answer, tookMs: this.nowMs() - waiting.sentMs }, waiting.options);
+      return;
+    }
+    this.waiting.delete(reply.id);
+    waiting.answer.outcome = reply.outcome ?? "";
+    waiting.answer.reason = reply.reason ?? "";
+    waiting.answer.detail = reply.detail ?? {};
+    this.finish(waiting);
+  }
+
+  // The connection has ended: what was asked may have been carried out or not.
+  lose(): void {
+    const all = [...this.waiting.values()];
+    this.waiting.clear();
+    for (const waiting of all) {
+      waiting.answer.phase = "lost";
+      waiting.answer.reason =
+        "the connection ended before the answer came: look where the motors stand";
+      this.finish(waiting);
+    }
+  }
+
+  private put(
+    message: object,
+    daemon: string,
+    request: string,
+    fields: object,
+    options: Options,
+  ): Promise<Answer> {
+    const id = ++this.count;
+    const answer: Answer = {
+      id, daemon, request, fields, phase: "not sent", outcome: "", detail: {}, tookMs: 0,
+      reason: "not sent: there is no connection to bushd-web",
+    };
+    return new Promise((settle) => {
+      const waiting = { answer, options, sentMs: this.nowMs(), settle };
+      // Before it is sent, so that no answer can come too early.
+      this.waiting.set(id, waiting);
+      if (this.send({ ...message, id })) {
+        answer.phase = "lost";
+        answer.reason = "";
+        return;
+      }
+      this.waiting.delete(id);
+      this.finish(waiting);
+    });
+  }
+
+  private finish(waiting: Waiting): void {
+    waiting.answer.tookMs = this.nowMs() - waiting.sentMs;
+    this.onAnswer(waiting.answer, waiting.options);
+    waiting.settle(waiting.answer);
+  }
+}
+
+export function isGood(answer: Answer): boolean {
+  return answer.phase === "result" && (answer.outcome === "done" || answer.outcome === "reached");
+}

@@ -1,0 +1,52 @@
+// What all views use.
+import type { Answer, Options, Requests } from "../net/requests";
+import type { Connection } from "../net/connection";
+import type { Changes, Model, Motor } from "../model/model";
+import type { EventLog } from "./event_log";
+import type { Recorder } from "./recorder";
+
+export interface View {
+  readonly root: HTMLElement;
+  readonly title: string;
+  update(changes: Changes): void;
+  tick(): void; // four times a second: ages
+  close(): void;
+}
+
+export interface App {
+  readonly model: Model;
+  readonly connection: Connection;
+  readonly requests: Requests;
+  readonly log: EventLog;
+  readonly recorder: Recorder;
+  readonly scroller: HTMLElement; // what the views stand in
+  nowMs(): number;
+  notice(level: "ok" | "warning" | "error", text: string): void;
+}
+
+export function mayCommand(app: App): boolean {
+  return app.model.hello?.may_command === true && app.connection.isOpen();
+}
+
+// Asks for something of one motor.
+export function askMotor(
+  app: App,
+  motor: Motor,
+  request: string,
+  fields: object = { motors: [motor.name] },
+  options: Options = {},
+): Promise<Answer> {
+  return app.requests.ask(motor.daemon, request, fields, options);
+}
+
+export function motorAddress(motor: Motor): string {
+  return `#/motor/${encodeURIComponent(motor.daemon)}/${encodeURIComponent(motor.name)}`;
+}
+
+export function unitOf(motor: Motor): string {
+  return motor.about?.unit ?? "";
+}
+
+export function precisionOf(motor: Motor): number {
+  return motor.about?.precision ?? 0;
+}
