@@ -9,7 +9,7 @@ import sys
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
-from rig import EndToEndTest, program
+from rig import TOP, EndToEndTest, program
 from websocket import WebSocket
 
 
