@@ -51,6 +51,8 @@ class Layout(Installation):
             if file.name == "bushd-firmware.install":
                 continue
             for line in file.read_text().split():
+                if line == "usr/share/bushd-web":  # the page, which tools/package builds
+                    continue
                 yield line.removeprefix("usr/").replace("lib/*/", "lib/").replace("${env:SYSTEM_LIBDIR}", "lib")
 
     def test_packages_take_what_is_there_and_leave_nothing(self):
@@ -71,7 +73,7 @@ class Layout(Installation):
     def test_units_start_programs_of_this_prefix(self):
         programs = [command for unit in self.prefix.rglob("*.service")
                     for command in re.findall(r"^Exec(?:Start|Stop)=(\S+)", unit.read_text(), re.MULTILINE)]
-        self.assertEqual(len(programs), 5)
+        self.assertEqual(len(programs), 6)
         for program in programs:
             with self.subTest(program):
                 self.assertTrue(pathlib.Path(program).is_relative_to(self.prefix))
@@ -143,6 +145,40 @@ class Epics(Installation):
         postrm = (SOURCE / "debian/bushd-epics.postrm").read_text()
         for command in ("userdel", "groupdel"):
             self.assertIn(f"{command} {user} ", postrm)
+
+
+class Web(Installation):
+    """bushd-web as it is installed; without its page, which tools/package builds."""
+
+    def setUp(self):
+        self.unit = next(self.prefix.rglob("bushd-web.service")).read_text()
+        self.postrm = (SOURCE / "debian/bushd-web.postrm").read_text()
+
+    def test_page_and_help_tell_of_the_same_options(self):
+        page = (SOURCE / "docs/man/bushd-web.8").read_text().replace(r"\-", "-")
+        options = set(re.findall(r"^\.TP\n\\fB(--[a-z-]+)", page, re.MULTILINE))
+        ran = subprocess.run([self.prefix / "bin/bushd-web", "--help"], capture_output=True, text=True, check=True)
+        said = set(re.findall(r"^  (?:-\w,)?(--[a-z-]+)", ran.stdout, re.MULTILINE))
+        self.assertEqual(options, said)
+
+    def test_the_folder_of_tokens_is_that_of_the_programs_and_the_groups(self):
+        file = re.search(r'kSystemFile = "(.*)";', (SOURCE / "lib/tokens/token_file.h").read_text())[1]
+        folder = str(pathlib.PurePosixPath(file).parent)
+        made = (self.prefix / "lib/tmpfiles.d/bushd-web.conf").read_text()
+        self.assertRegex(made, rf"(?m)^d {folder} 2770 root bushd$")
+        self.assertRegex(self.postrm, rf"rm -rf {folder}\n", "purge leaves it")
+
+    def test_the_user_of_the_unit_is_made_and_removed(self):
+        (user,) = re.findall("^User=(.*)$", self.unit, re.MULTILINE)
+        self.assertEqual(re.findall("^SupplementaryGroups=(.*)$", self.unit, re.MULTILINE), ["bushd"])
+        self.assertRegex((self.prefix / "lib/sysusers.d/bushd-web.conf").read_text(), rf"(?m)^u {user} -")
+        for command in ("userdel", "groupdel"):
+            self.assertIn(f"{command} {user} ", self.postrm)
+
+    def test_it_starts_without_the_file_of_options_and_purge_removes_that(self):
+        (options,) = re.findall("^EnvironmentFile=(.*)$", self.unit, re.MULTILINE)
+        self.assertTrue(options.startswith("-/"))
+        self.assertIn(f"rm -f {options[1:]}\n", self.postrm)
 
 
 class Vendored(unittest.TestCase):

@@ -11,7 +11,7 @@ import time
 
 from install_test.debian import TOP, Failed, folder_of, make_debian, release_of_this_pc, sh
 
-NAMES = ["bushd", "bushd-sim", "bushd-epics", "bushd-firmware", "libbushd-dev", "python3-bushd"]
+NAMES = ["bushd", "bushd-sim", "bushd-epics", "bushd-web", "bushd-firmware", "libbushd-dev", "python3-bushd"]
 BASE_PACKAGES = "systemd,systemd-sysv,dbus,udev,kmod,iproute2,procps,passwd"
 # For clients that are compiled, and what a lab PC has.
 TOOLS = ["cmake", "g++", "logrotate", "ninja-build", "pkg-config"]
