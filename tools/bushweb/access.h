@@ -14,7 +14,7 @@
 
 namespace bushweb {
 
-// Of a request over HTTP, as it came; a header that is not there is "".
+// A request over HTTP, as it came; a header that is not there is "".
 struct Visit {
   std::string method{};
   std::string path{};

@@ -173,7 +173,7 @@ int main(int argc, char** argv) {
       ->type_name("ADDRESS:PORT")
       ->capture_default_str();
   app.add_option("--daemon", wanted.daemons,
-                 "A daemon and its control socket; may be repeated (default: that of this PC)")
+                 "A daemon and its control socket; may be repeated. Without it that of this PC")
       ->type_name("NAME=SOCKET")
       ->allow_extra_args(false);
   app.add_option("--host", wanted.hosts,
@@ -196,8 +196,9 @@ int main(int argc, char** argv) {
   const std::map<std::string, WhoStops> who{{"nobody", WhoStops::kNobody},
                                             {"loopback", WhoStops::kLoopback},
                                             {"anyone", WhoStops::kAnyone}};
-  app.add_option("--stop-without-token", wanted.stops,
-                 "Who may stop motors without a token (default: loopback, browsers on this PC)")
+  app.add_option(
+         "--stop-without-token", wanted.stops,
+         "Who may stop motors without a token; without this option loopback: browsers on this PC")
       ->type_name("nobody|loopback|anyone")
       ->transform(CLI::CheckedTransformer(who, CLI::ignore_case).description(""));
   app.footer("Exit codes: 0 ended on request, 1 it could not start, 2 wrong usage.");

@@ -50,7 +50,7 @@ class Site {
   Site(const Site&) = delete;
   Site& operator=(const Site&) = delete;
 
-  // Of anything but a WebSocket.
+  // To anything but a WebSocket.
   Answer answer(const Visit& visit);
   // Why there is to be no WebSocket; "": there may.
   std::string why_no_page(const Visit& visit) const;
@@ -85,7 +85,7 @@ class Site {
   TokenFile tokens_;
   std::vector<std::unique_ptr<Watch>> watches_{};
   std::map<PageId, std::unique_ptr<OpenPage>> pages_;
-  // Of tokens that were wrong, by address: how many more are taken just now.
+  // How many more wrong tokens are taken from an address just now.
   struct Failures {
     double left;
     std::int64_t at_us;

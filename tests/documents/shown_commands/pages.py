@@ -8,7 +8,7 @@ import pathlib
 import re
 import shlex
 
-OURS = ("bushctl", "bushd", "bushsim", "bushtab", "bushfaults", "bushd-epics", "bushd-flash")
+OURS = ("bushctl", "bushd", "bushsim", "bushtab", "bushfaults", "bushd-epics", "bushd-web", "bushd-flash")
 # Other programs that pages show. A line of an indented block that begins with one of them is a command.
 OTHERS = (
     "apt avrdude cat cc cd cmake cp ctest echo export g++ gdb gdb-multiarch gfortran install ip journalctl kill lcm-gen ls make man ninja nft openocd pip"

@@ -37,7 +37,7 @@ def help_of(*command):
 
 def programs():
     """Each program and subcommand that has a --help, as a command line."""
-    for name in ("bushd", "bushsim", "bushctl", "bushtab", "bushfaults"):
+    for name in ("bushd", "bushsim", "bushctl", "bushd-web", "bushtab", "bushfaults"):
         yield from with_subcommands([str(BUILD / "bin" / name)])
     yield [str(SOURCE / "tools/flash/bushd-flash")]
     for name in SCRIPTS:
