@@ -48,6 +48,22 @@ export class TableEditor {
     this.change({ ...this.now, [side]: codes });
   }
 
+  // While a point is dragged its neighbours give way, counted from where the drag began: so they
+  // come back when the point does.
+  dragCode(side: Side, index: number, code: number): void {
+    const from = this.drag ?? this.now;
+    const codes = [...(side === "accel" ? from.accel : from.decel)];
+    if (codes[index] === undefined || !Number.isFinite(code)) return;
+    const kept = Math.min(Math.max(Math.round(code), 1), kMostCode);
+    const moved = codes.map((other, i) => {
+      if (i === index) return kept;
+      const slower = side === "accel" ? i < index : i > index;
+      return slower ? Math.max(other, kept) : Math.min(other, kept);
+    });
+    if (moved.every((other, i) => other === this.codes(side)[i])) return;
+    this.change({ ...this.now, [side]: moved });
+  }
+
   // A code between this one and the next, as the mean of both.
   insertAfter(side: Side, index: number): void {
     const codes = [...this.codes(side)];
@@ -88,7 +104,9 @@ export class TableEditor {
   endDrag(): void {
     const before = this.drag;
     this.drag = undefined;
-    if (before && before !== this.now) this.keep(before);
+    if (!before || before === this.now) return;
+    if (sameCodes(before, this.now)) this.now = before; // it came back
+    else this.keep(before);
   }
 
   undo(): void {
@@ -116,4 +134,10 @@ export class TableEditor {
     if (this.past.length > kKept) this.past.shift();
     this.future = [];
   }
+}
+
+function sameCodes(one: TableFile, other: TableFile): boolean {
+  const same = (a: number[], b: number[]): boolean =>
+    a.length === b.length && a.every((code, i) => code === b[i]);
+  return same(one.accel, other.accel) && same(one.decel, other.decel);
 }

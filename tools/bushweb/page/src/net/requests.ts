@@ -42,8 +42,8 @@ export class Requests {
   }
 
   // Those that are not requests of the daemon: "check" and "doctor".
-  call(kind: string, daemon: string, more: object = {}): Promise<Answer> {
-    return this.put({ kind, daemon, ...more }, daemon, kind, more, { quiet: true });
+  call(kind: "check" | "doctor", message: object): Promise<Answer> {
+    return this.put({ kind, ...message }, "", kind, message, { quiet: true });
   }
 
   take(reply: Reply): void {

@@ -16,7 +16,8 @@ export class MotorSettings {
     this.rows,
   );
   readonly root = section("Settings", el("div", { class: "buttons" },
-    button("Read again", () => void this.load())), this.said, this.table);
+    button("Read again", () => void this.load())), this.said,
+    el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Settings" }, this.table));
 
   constructor(private readonly app: App, private readonly motor: Motor) {}
 

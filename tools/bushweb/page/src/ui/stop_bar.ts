@@ -1,7 +1,7 @@
 // STOP on every view. Esc and the button ramp down all motors of all daemons, at once and without a
 // question. Emergency stop is elsewhere and looks different: it latches until faults are cleared.
 import type { App } from "./app";
-import { attribute, button, el, mark, put } from "./dom";
+import { button, el, mark, put } from "./dom";
 import type { Answer } from "../net/requests";
 
 export class StopBar {
@@ -42,7 +42,6 @@ export class StopBar {
   update(): void {
     const open = this.app.connection.isOpen();
     mark(this.root, "cut", !open);
-    attribute(this.stopButton, "aria-disabled", open ? undefined : "true");
     put(this.stopButton, open ? "STOP all motors" : "STOP CANNOT BE SENT");
     if (!open) {
       put(this.said,

@@ -27,7 +27,7 @@ export class Trouble {
         el("span", { text: `MCU ${mcu.name}: ${text}` }),
         fault && may && mcu.motors.length > 0
           ? button("Clear faults", () => this.clear(mcu), {
-            "aria-label": `Clear the faults of MCU ${mcu.name}`, testid: "clear-faults",
+            "aria-label": `Clear faults of MCU ${mcu.name}`, testid: "clear-faults",
           })
           : null,
       );

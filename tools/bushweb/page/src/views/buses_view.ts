@@ -68,8 +68,8 @@ export class BusesView implements View {
       ["Tick", mcus[0]?.about ? microseconds(mcus[0].about.tick_ns / 1000) : "–"],
       ["Errors at the PC", `${health.crc_errors}, ${perSecond(bus.crc.perSecond())}`],
       ["Stray frames", String(health.stray_frames)],
-      ["Latency of late", microseconds(health.recent_latency_us)],
-      ["Left at a start", health.start_margin_us === 0 ? "–" : microseconds(health.start_margin_us)],
+      ["Recent latency", microseconds(health.recent_latency_us)],
+      ["Start margin", health.start_margin_us === 0 ? "–" : microseconds(health.start_margin_us)],
     ] : [["Health", "not reported yet"]];
     return section(
       title,

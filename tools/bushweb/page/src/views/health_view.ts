@@ -53,7 +53,7 @@ export class HealthView implements View {
     put(this.said, "Looking for some seconds");
     const daemons = [...this.app.model.daemons.keys()];
     const answers = await Promise.all(
-      daemons.map((daemon) => this.app.requests.call("doctor", daemon)));
+      daemons.map((daemon) => this.app.requests.call("doctor", { daemon })));
     const all = answers.flatMap((answer, i) =>
       answer.detail.findings
         ? answer.detail.findings.map((finding) => ({ daemon: daemons[i] ?? "", finding }))
@@ -63,7 +63,7 @@ export class HealthView implements View {
     const errors = all.filter(({ finding }) => finding.level === "error").length;
     const warnings = all.filter(({ finding }) => finding.level === "warning").length;
     put(this.said, daemons.length === 0 ? "No daemon is known to this page"
-      : `${errors} errors, ${warnings} warnings`);
+      : `${counted(errors, "error")}, ${counted(warnings, "warning")}`);
     this.findings.replaceChildren(...all.map(({ daemon, finding }) => el(
       "li", { class: finding.level },
       el("strong", { text: finding.level }),
@@ -106,4 +106,8 @@ export class HealthView implements View {
     const rows = parts.map((part) => part.slice(part.indexOf("\n") + 1));
     if (missing === "") download("bushd-history.csv", `${head}\n${rows.join("")}`);
   }
+}
+
+function counted(n: number, word: string): string {
+  return `${n} ${word}${n === 1 ? "" : "s"}`;
 }
