@@ -36,16 +36,29 @@ const watcher = new Watcher(model, log);
 let view: View | undefined;
 let viewAddress = "";
 let frame = 0;
+let waits = false; // for a view that wants some time between its updates
+let drawnMs = 0;
 
 model.onReport = (mcu) => recorder.take(mcu);
 
 // One frame for all that has come since the last one.
 function schedule(): void {
-  if (frame === 0 && model.hasChanged()) frame = requestAnimationFrame(draw);
+  if (frame !== 0 || waits || !model.hasChanged()) return;
+  const pauseMs = drawnMs + (view?.pauseMs?.() ?? 0) - nowMs();
+  if (pauseMs <= 0) {
+    frame = requestAnimationFrame(draw);
+    return;
+  }
+  waits = true;
+  setTimeout(() => {
+    waits = false;
+    frame = requestAnimationFrame(draw);
+  }, pauseMs);
 }
 
 function draw(): void {
   frame = 0;
+  drawnMs = nowMs();
   const changes = model.takeChanges();
   if (changes.structure || changes.rights) {
     header.update();
@@ -119,8 +132,14 @@ function navigate(): void {
 }
 
 connection.onMessage = take;
+let wasOpen = false;
 connection.onState = (state) => {
-  log.add(state === "open" ? "ok" : "warning", `connection to bushd-web: ${state}`);
+  // Attempts are not logged one by one.
+  const isOpen = connection.isOpen();
+  if (isOpen !== wasOpen) {
+    log.add(isOpen ? "ok" : "error", isOpen ? "connected to bushd-web" : "the connection to bushd-web is lost");
+  }
+  wasOpen = isOpen;
   if (state === "closed") requests.lose();
   header.update();
   stopBar.update();

@@ -60,6 +60,11 @@ export class Connection {
     return true;
   }
 
+  // It was tried, and nothing has been heard since.
+  hasFailed(): boolean {
+    return this.tries > 0;
+  }
+
   isOpen(): boolean {
     return this.state === "open" || this.state === "silent";
   }

@@ -10,6 +10,7 @@ export interface View {
   readonly title: string;
   update(changes: Changes): void;
   tick(): void; // four times a second: ages
+  pauseMs?(): number; // least time from the last update to the next one
   close(): void;
 }
 

@@ -28,7 +28,7 @@ export class FirstStart {
   private parts(): { title: string; seen: string; doIt: string[] }[] {
     const { connection, model } = this.app;
     if (!model.hello) {
-      if (connection.state !== "closed") return [];
+      if (!connection.hasFailed()) return [];
       return [{
         title: "No connection to bushd-web",
         seen: "The page tries again each two seconds.",

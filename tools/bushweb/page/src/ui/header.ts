@@ -29,7 +29,10 @@ export class Header {
 
   update(): void {
     const { connection, model } = this.app;
-    attribute(this.link, "data-state", connection.state);
+    const retries = connection.state === "connecting" && connection.hasFailed();
+    const away = [...model.daemons.values()].some((daemon) => daemon.told && !daemon.connected);
+    attribute(this.link, "data-daemons", away ? "away" : undefined);
+    attribute(this.link, "data-state", retries ? "closed" : connection.state);
     put(this.link, this.words());
     const hello = model.hello;
     show(this.rights, hello !== undefined);
@@ -51,14 +54,15 @@ export class Header {
     const nowMs = this.app.nowMs();
     switch (connection.state) {
       case "connecting":
-        return "connecting";
+        // Said once, and not at each attempt.
+        return connection.hasFailed() ? "not connected" : "connecting";
       case "closed":
         return "not connected";
       case "silent":
         return `silent for ${age(nowMs - connection.lastHeardMs)}`;
       default: {
         const away = [...model.daemons.values()].filter((daemon) => daemon.told && !daemon.connected);
-        if (away.length > 0) return `connected; ${away.map((daemon) => daemon.name).join(", ")} is not`;
+        if (away.length > 0) return `no daemon: ${away.map((daemon) => daemon.name).join(", ")}`;
         return "connected";
       }
     }

@@ -168,5 +168,10 @@ function clock(atS: number): string {
 }
 
 function timeTicks(_: uPlot, values: number[]): string[] {
-  return values.map(clock);
+  const [first = 0, second = first + 1] = values;
+  const decimals = second - first >= 1 ? 0 : second - first >= 0.1 ? 1 : 2;
+  return values.map((atS) => {
+    const fraction = (atS - Math.floor(atS)).toFixed(decimals).slice(1);
+    return clock(Math.floor(atS)) + fraction;
+  });
 }

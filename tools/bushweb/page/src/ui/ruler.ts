@@ -28,14 +28,15 @@ export class Ruler {
     put(this.low, short(marks.low, 6));
     put(this.high, short(marks.high, 6));
     show(this.at, marks.at !== undefined);
-    if (marks.at !== undefined) this.at.style.left = percent(marks.at);
+    if (marks.at !== undefined) this.at.style.transform = `translateX(${percent(marks.at)})`;
     const goes = marks.target !== undefined && marks.at !== undefined;
     show(this.target, goes);
     show(this.way, goes);
     if (marks.target !== undefined && marks.at !== undefined) {
-      this.target.style.left = percent(marks.target);
-      this.way.style.left = percent(Math.min(marks.at, marks.target));
-      this.way.style.width = percent(Math.abs(marks.at - marks.target));
+      this.target.style.transform = `translateX(${percent(marks.target)})`;
+      const from = Math.min(marks.at, marks.target);
+      const length = Math.abs(marks.at - marks.target);
+      this.way.style.transform = `translateX(${percent(from)}) scaleX(${length.toFixed(4)})`;
     }
     mark(this.track, "beyond", marks.beyond);
   }

@@ -17,6 +17,7 @@ export class StopBar {
     class: "estop", testid: "estop", title:
       "Stops all motors of all buses at once, and latches until faults are cleared",
   });
+  private state = "";
   private round = 0;
   private answers = new Map<string, string>();
 
@@ -38,18 +39,22 @@ export class StopBar {
     this.ask("emergency stop", {}, "Emergency stop");
   }
 
-  // Says whether a stop can be sent.
+  // Says whether a stop can be sent, and whether somebody is there to carry it out.
   update(): void {
     const open = this.app.connection.isOpen();
-    mark(this.root, "cut", !open);
-    put(this.stopButton, open ? "STOP all motors" : "STOP CANNOT BE SENT");
-    if (!open) {
-      put(this.said,
-        "No connection to bushd-web. Use the emergency stop of the machine, or bushctl stop.");
-    } else if (this.round === 0 || this.said.textContent?.startsWith("No connection")) {
-      const may = this.app.model.hello?.may_stop ?? true;
-      put(this.said, may ? "Esc stops too" : "This page may not stop motors: it has no token");
-    }
+    const daemons = [...this.app.model.daemons.values()].filter((daemon) => daemon.told);
+    const nobody = open && daemons.length > 0 && daemons.every((daemon) => !daemon.connected);
+    mark(this.root, "cut", !open || nobody);
+    put(this.stopButton,
+      !open ? "STOP CANNOT BE SENT" : nobody ? "STOP REACHES NO DAEMON" : "STOP all motors");
+    const may = this.app.model.hello?.may_stop ?? true;
+    const state = !open ? "No connection to bushd-web. Use the emergency stop of the machine, or bushctl stop."
+      : nobody ? "No daemon is connected. If motors move, use the emergency stop of the machine."
+        : may ? "Esc stops too" : "This page may not stop motors: it has no token";
+    if (state === this.state) return;
+    // What came of the last stop stays until the state is another.
+    this.state = state;
+    put(this.said, state);
   }
 
   private ask(request: string, fields: object, name: string): void {

@@ -14,15 +14,15 @@ export class AccessView implements View {
   private readonly logout: HTMLButtonElement;
 
   constructor(private readonly app: App) {
-    const enter = button("Use this token", () => void this.enter(), { testid: "login" });
-    this.token.input.addEventListener("keydown", (event) => {
-      if (event.key === "Enter") void this.enter();
-    });
+    const enter = el("button", { type: "submit", text: "Use this token", testid: "login" });
     this.login = el(
       "div", {},
       el("p", {}, "A member of the group bushd makes one with ", el("code", { text: "bushctl web-token" }),
         ". It is entered once; the browser keeps a cookie that scripts cannot read."),
-      el("div", { class: "fields" }, this.token.root, enter), this.said,
+      el("form", {
+        class: "fields",
+        on: { submit: (event: Event) => { event.preventDefault(); void this.enter(); } },
+      }, this.token.root, enter), this.said,
     );
     this.logout = button("Forget the token in this browser", () => void this.leave(), { testid: "logout" });
     this.root = el("div", {}, el("h1", { text: "Access" }),

@@ -17,6 +17,8 @@ const kStandard: Layout = {
 const kTitlePx = 36;
 const kRowPx = 64;
 const kNarrowRowPx = 124; // as in page.css
+const kPauseOfRowMs = 25; // of each row that changed: more of them may be drawn less often
+const kMostPauseMs = 180;
 
 class Title implements Row {
   readonly root: HTMLElement;
@@ -39,6 +41,7 @@ export class Overview implements View {
   private readonly first: FirstStart;
   private readonly trouble: Trouble;
   private readonly tools: HTMLElement;
+  private touched = 0; // rows, by the last update
   private readonly narrow = matchMedia("(max-width: 760px)");
   private readonly rebuild = (): void => this.arrange();
 
@@ -73,6 +76,7 @@ export class Overview implements View {
   }
 
   update(changes: Changes): void {
+    let touched = 0;
     if (changes.structure || changes.rights) {
       this.first.update();
       this.arrange();
@@ -81,9 +85,12 @@ export class Overview implements View {
       if (this.layout.sorting === "state" && changes.motors.size > 0) this.arrangeSoon();
       for (const motor of changes.motors) {
         const row = this.list.row(motor.key);
-        if (row instanceof MotorRow) row.update();
+        if (!(row instanceof MotorRow)) continue;
+        row.update();
+        touched += 1;
       }
     }
+    this.touched = touched;
     if (changes.mcus.size > 0 || changes.structure) this.trouble.update();
   }
 
@@ -91,6 +98,11 @@ export class Overview implements View {
     this.first.update();
     this.trouble.update();
     for (const [, row] of this.list.shown()) if (row instanceof MotorRow) row.tick();
+  }
+
+  // Many motors in motion are drawn five times a second, few as often as they report.
+  pauseMs(): number {
+    return Math.min(this.touched * kPauseOfRowMs, kMostPauseMs);
   }
 
   close(): void {
