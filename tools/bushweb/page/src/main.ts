@@ -98,6 +98,8 @@ function take(message: FromServer): void {
 function told(answer: Answer, options: Options): void {
   if (options.quiet || answer.phase === "accepted") return;
   const good = isGood(answer);
+  // A jog that ended when it was let go is no news.
+  if (answer.request === "jog" && good) return;
   const level = good ? "ok" : answer.outcome === "stopped" ? "warning" : "error";
   const what = answer.phase === "result" ? answer.outcome : answer.phase;
   const reason = answer.reason === "" || answer.reason === what ? "" : `: ${answer.reason}`;

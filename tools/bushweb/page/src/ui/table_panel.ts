@@ -81,7 +81,8 @@ export class TablePanel {
     this.connectFields();
     this.root.append(
       el("h2", { text: `${file}, revision ${table.revision}` }),
-      el("p", { class: "quiet", text: `${table.description === "" ? "" : `${table.description}; `}time unit ${table.time_unit_ns} ns` }),
+      el("p", { class: "quiet", text:
+        [table.description, `time unit ${table.time_unit_ns} ns`].filter((text) => text !== "").join("; ") }),
       el("div", { class: "codes" }, sides.root, this.index.root, this.code.root, this.speed.root,
         button("Insert after", edit(() => this.editor.insertAfter(this.side, this.plot.selected))),
         button("Delete", edit(() => this.editor.remove(this.side, this.plot.selected))),
@@ -197,7 +198,8 @@ export class TablePanel {
         el("td", { text: `${change.side}[${change.index}]` }),
         el("td", { text: String(change.before ?? "–") }),
         el("td", { text: String(change.after ?? "–") }),
-        el("td", { text: `${speed(change.before, base.time_unit_ns)} → ${speed(change.after, table.time_unit_ns)} steps/s` }))),
+        el("td", { text:
+          `${speed(change.before, base.time_unit_ns)} → ${speed(change.after, table.time_unit_ns)} steps/s` }))),
       ...(codes.length > kShownChanges
         ? [el("tr", {}, el("td", { text: `and ${codes.length - kShownChanges} more`, colspan: "4" }))] : []),
     );

@@ -1,27 +1,33 @@
-// MCUs that are not as they should be, above all motors: what it is, and what to do.
+// MCUs that are not as they should be: what it is, and what to do. All of them above the overview,
+// and that of the motor above a motor.
 import { age } from "../logic/format";
 import type { Mcu } from "../model/model";
 import { mayCommand, type App } from "./app";
 import { button, el, show } from "./dom";
 
+const kMostLines = 8;
+
 export class Trouble {
   readonly root = el("div", { class: "trouble", testid: "trouble", hidden: true });
   private shown = "";
 
-  constructor(private readonly app: App) {
+  constructor(
+    private readonly app: App,
+    private readonly mcus: () => Mcu[],
+  ) {
     this.update();
   }
 
   update(): void {
-    const found = this.app.model.allMcus()
+    const found = this.mcus()
       .map((mcu) => ({ mcu, text: this.words(mcu) }))
       .filter(({ text }) => text !== "");
     const may = mayCommand(this.app);
     const state = JSON.stringify([may, found.map(({ mcu, text }) => [mcu.key, text])]);
     if (state === this.shown) return;
     this.shown = state;
-    const lines = found.slice(0, 8).map(({ mcu, text }) => {
-      const fault = mcu.state?.state.toUpperCase() === "FAULT";
+    const lines = found.slice(0, kMostLines).map(({ mcu, text }) => {
+      const fault = isFault(mcu);
       return el(
         "div", { class: `line ${fault ? "error" : "warning"}` },
         el("span", { text: `MCU ${mcu.name}: ${text}` }),
@@ -32,8 +38,15 @@ export class Trouble {
           : null,
       );
     });
-    if (found.length > lines.length) {
-      lines.push(el("div", { class: "line", text: `and ${found.length - lines.length} more` }));
+    const faults = found.filter(({ mcu }) => isFault(mcu));
+    if (may && faults.length > 1) {
+      lines.unshift(el("div", { class: "line error" }, el("span", { text: `${faults.length} MCUs have faults` }),
+        button("Clear all faults", () => this.clearAll(faults.map(({ mcu }) => mcu.daemon)), {
+          testid: "clear-all-faults",
+        })));
+    }
+    if (found.length > kMostLines) {
+      lines.push(el("div", { class: "line", text: `and ${found.length - kMostLines} more` }));
     }
     this.root.replaceChildren(...lines);
     show(this.root, lines.length > 0);
@@ -59,9 +72,19 @@ export class Trouble {
     return parts.join(", ");
   }
 
+  private clearAll(daemons: string[]): void {
+    for (const daemon of new Set(daemons)) {
+      void this.app.requests.ask(daemon, "clear faults", { motors: [] });
+    }
+  }
+
   private clear(mcu: Mcu): void {
     void this.app.requests.ask(mcu.daemon, "clear faults", {
       motors: mcu.motors.map((motor) => motor.name),
     });
   }
+}
+
+function isFault(mcu: Mcu): boolean {
+  return mcu.state?.state.toUpperCase() === "FAULT";
 }

@@ -13,6 +13,7 @@ import { MotorSettings } from "../ui/motor_settings";
 import { RampPlot } from "../ui/ramp_plot";
 import { userSpeed } from "../ui/recorder";
 import { Ruler } from "../ui/ruler";
+import { Trouble } from "../ui/trouble";
 
 const kFacts = [
   "Target", "Speed", "State", "Inputs", "Dial", "Steps", "Line", "MCU", "Group", "Table",
@@ -36,6 +37,7 @@ export class MotorView implements View {
   private readonly ramp: RampPlot;
   private readonly plot: LivePlot;
   private readonly head: HTMLElement;
+  private readonly trouble: Trouble;
   private wasMoving = false;
   private readonly redraw: ReturnType<typeof setInterval>;
 
@@ -46,6 +48,7 @@ export class MotorView implements View {
       void askMotor(app, motor, "stop");
       this.jog.end("stop");
     });
+    this.trouble = new Trouble(app, () => [motor.mcu]);
     this.settings = new MotorSettings(app, motor);
     this.history = new MotorHistory(app, motor);
     this.ramp = new RampPlot(app, motor);
@@ -63,6 +66,7 @@ export class MotorView implements View {
     );
     this.root = el(
       "div", { class: "motor-view", testid: `view-${motor.name}`, "data-motor": motor.name },
+      this.trouble.root,
       el("div", { class: "columns" },
         el("div", {}, this.head),
         el("div", {}, this.commands.root, section("Jog", this.jog.root))),
@@ -89,6 +93,7 @@ export class MotorView implements View {
 
   tick(): void {
     this.writeAge();
+    this.trouble.update();
     this.commands.update();
     this.jog.update();
   }
@@ -126,7 +131,8 @@ export class MotorView implements View {
       if (value) put(value, text === "" ? "–" : text);
     };
     tell("Target", state ? `${fixed(state.user_target, decimals)} ${unit}` : "");
-    tell("Speed", state ? `${short(userSpeed(motor), 4)} ${unit}/s (${short(state.velocity_steps_per_s, 5)} steps/s)` : "");
+    tell("Speed", state
+      ? `${short(userSpeed(motor), 4)} ${unit}/s (${short(state.velocity_steps_per_s, 5)} steps/s)` : "");
     tell("State", state ? stateWords(motor).join(", ") || "at rest" : "");
     tell("Inputs", inputsOf(motor));
     tell("Dial", state ? `${fixed(state.dial_position, decimals)} ${unit}` : "");
@@ -138,7 +144,8 @@ export class MotorView implements View {
       (mcu.state?.detail ? `: ${mcu.state.detail}` : ""));
     tell("Group", about?.group ?? "");
     const table = about?.table;
-    tell("Table", table ? `${table.name}${table.revision > 0 ? `, revision ${table.revision}` : ""}, ${table.hash}` : "");
+    const revision = table && table.revision > 0 ? `, revision ${table.revision}` : "";
+    tell("Table", table ? `${table.name}${revision}, ${table.hash}` : "");
     mark(this.head, "moving", state?.moving === true);
     this.ruler.update(motor);
     this.ramp.update();
@@ -146,7 +153,9 @@ export class MotorView implements View {
     this.writeAge();
     // What has just ended is in the history.
     const moving = state?.moving === true;
-    if (this.wasMoving && !moving) setTimeout(() => { if (this.root.isConnected) void this.history.load(); }, 700);
+    if (this.wasMoving && !moving) {
+      setTimeout(() => { if (this.root.isConnected) void this.history.load(); }, 700);
+    }
     this.wasMoving = moving;
   }
 

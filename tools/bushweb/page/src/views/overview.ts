@@ -50,7 +50,7 @@ export class Overview implements View {
     if (!Array.isArray(this.layout.favourites)) this.layout.favourites = [];
     if (typeof this.layout.filter !== "string") this.layout.filter = "";
     this.first = new FirstStart(app);
-    this.trouble = new Trouble(app);
+    this.trouble = new Trouble(app, () => app.model.allMcus());
     this.list = new VirtualList<Motor | string, MotorRow | Title>(app.scroller, (value) =>
       typeof value === "string"
         ? new Title(value)

@@ -39,7 +39,9 @@ export class PathsView implements View {
   private round = 0;
 
   constructor(private readonly app: App) {
-    const file = el("input", { type: "file", accept: ".csv,text/csv,text/plain", id: "path-file", testid: "path-file" });
+    const file = el("input", {
+      type: "file", accept: ".csv,text/csv,text/plain", id: "path-file", testid: "path-file",
+    });
     file.addEventListener("change", () => {
       const [chosen] = file.files ?? [];
       if (chosen) void this.read(chosen);
@@ -141,11 +143,12 @@ export class PathsView implements View {
     const { path } = this;
     if (!path) return;
     const from = path.motors.map((_, i) => this.motor(i)?.state?.user_position ?? null);
-    const label = (i: number): string => {
+    const unit = (i: number): string => {
       const motor = this.motor(i);
-      return `${path.motors[i] ?? ""} (${motor ? unitOf(motor) : "?"})`;
+      return motor ? unitOf(motor) : "?";
     };
-    const units = new Set([this.x, this.y].map((i) => { const motor = this.motor(i); return motor ? unitOf(motor) : "?"; }));
+    const label = (i: number): string => `${path.motors[i] ?? ""} (${unit(i)})`;
+    const units = new Set([unit(this.x), unit(this.y)]);
     const single = path.motors.length === 1;
     this.plane.draw({
       // One motor alone: its positions over the number of the point.
@@ -211,7 +214,8 @@ export class PathsView implements View {
     this.tellRefusal(answer);
     const reason = located(this.path, answer.reason);
     const level = isGood(answer) ? "ok" : answer.outcome === "stopped" ? "warning" : "error";
-    const text = `path ${this.path.file} ${answer.outcome || answer.phase}${reason === answer.outcome ? "" : `: ${reason}`}`;
+    const why = reason === answer.outcome ? "" : `: ${reason}`;
+    const text = `path ${this.path.file} ${answer.outcome || answer.phase}${why}`;
     this.app.log.add(level, text);
     this.app.notice(level, text);
     this.draw();
