@@ -15,7 +15,10 @@ export class Notices {
       button("×", () => notice.remove(), { class: "close", "aria-label": "Close this message" }),
     );
     this.root.append(notice);
-    while (this.root.children.length > kMost) this.root.firstElementChild?.remove();
+    // Good news makes room first, so that a refusal is not pushed out by it.
+    while (this.root.children.length > kMost) {
+      (this.root.querySelector(".notice.ok") ?? this.root.firstElementChild)?.remove();
+    }
     if (level === "ok") setTimeout(() => notice.remove(), kGoodMs);
   }
 }
