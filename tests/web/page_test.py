@@ -125,6 +125,7 @@ class WebPage(WebTest):
         self.assertIn("openmetrics-text", headers["content-type"])
         self.assertIn('bushd_motor_position_steps{daemon="bushd",mcu="hall:1",motor="a0"} 0\n', body)
         self.assertIn('bushd_motor_trust{daemon="bushd",mcu="hall:1",motor="a0",bushd_motor_trust="known"} 1\n', body)
+        self.assertRegex(body, r'bushd_daemon_cpu_seconds_total\{daemon="bushd"\} 0\.\d+\n')
         self.assertTrue(body.endswith("# EOF\n"))
 
 

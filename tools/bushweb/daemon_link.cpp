@@ -1,6 +1,13 @@
 #include "daemon_link.h"
 
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <chrono>
+#include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "client/client.h"
@@ -17,6 +24,20 @@ constexpr const char* kAnother = "--daemon NAME=SOCKET";
 std::int64_t unix_time_us() {
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count();
+}
+
+// What /proc/PID/stat has behind the name, in which there may be anything: fields 14 and 15 of all.
+std::optional<double> cpu_seconds_of(pid_t pid) {
+  std::ifstream file(fmt::format("/proc/{}/stat", pid));
+  std::string text;
+  if (!std::getline(file, text)) return std::nullopt;
+  std::istringstream fields(text.substr(std::min(text.rfind(')') + 1, text.size())));
+  std::string skipped;
+  for (int i = 3; i < 14; ++i) fields >> skipped;
+  double user = 0;
+  double system = 0;
+  if (!(fields >> user >> system)) return std::nullopt;
+  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
 bushd::Result<void> send(client::Link& link, const bushd::Result<lcm::Packet>& packet) {
@@ -97,6 +118,13 @@ bushd::Result<void> Watch::connect() {
   }
   mirror_.connect();
   return {};
+}
+
+std::optional<double> Watch::cpu_s() const {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (!link_ || ::getsockopt(link_->fd(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) return {};
+  return cpu_seconds_of(peer.pid);
 }
 
 void Watch::handle() {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "client/link.h"
@@ -62,6 +63,8 @@ class Watch {
   Mirror& mirror() { return mirror_; }
   // Connects when it is time to.
   void tick(std::int64_t now_us);
+  // Processor time of the daemon since its start; nothing where this PC does not tell.
+  std::optional<double> cpu_s() const;
 
  private:
   bushd::Result<void> connect();

@@ -157,6 +157,10 @@ Text hello(std::string_view version, const Rights& rights,
                   {"daemons", daemons}});
 }
 
+Text alive() {
+  return std::make_shared<const std::string>(R"({"kind":"alive"})");
+}
+
 Text reply(std::int64_t id, const api::Reply& reply) {
   return text_of(std::visit(
       bushd::Overloaded{[&](const api::Accepted&) { return reply_json(id, "accepted", "", ""); },

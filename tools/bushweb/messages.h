@@ -58,6 +58,8 @@ struct Rights {
 };
 
 Text hello(std::string_view version, const Rights& rights, const std::vector<std::string>& daemons);
+// That bushd-web is there, where there is nothing else to say.
+Text alive();
 Text reply(std::int64_t id, const api::Reply& reply);
 Text refused(std::int64_t id, std::string_view reason);
 // A result of bushd-web's own: `detail` is an object of one member.

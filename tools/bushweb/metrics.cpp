@@ -165,6 +165,10 @@ std::string open_metrics(const std::vector<Measured>& daemons) {
   for (const Measured& daemon : daemons) {
     out.sample("", of_daemon(daemon), daemon.connected ? 1 : 0);
   }
+  out.family("bushd_daemon_cpu_seconds", "counter", "Processor time of the daemon");
+  for (const Measured& daemon : daemons) {
+    if (daemon.cpu_s) out.sample("_total", of_daemon(daemon), *daemon.cpu_s);
+  }
   tell_motors(out, daemons);
   tell_mcus(out, daemons);
   out.family("bushd_bus_open", "gauge", "1 while the serial port of the bus is open");

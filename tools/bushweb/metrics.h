@@ -1,6 +1,7 @@
 // What a daemon tells as numbers for Prometheus: text of OpenMetrics 1.0.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@ namespace bushweb {
 struct Measured {
   std::string daemon{};
   bool connected = false;
+  std::optional<double> cpu_s{};  // of the daemon
   bushd::client::Status status{};
 };
 

@@ -199,7 +199,9 @@ Answer Site::metrics() {
     Mirror& mirror = watch->mirror();
     Measured& measured = daemons.emplace_back(
         Measured{.daemon = watch->daemon().name, .connected = mirror.connected()});
-    if (measured.connected) measured.status = mirror.status();
+    if (!measured.connected) continue;
+    measured.cpu_s = watch->cpu_s();
+    measured.status = mirror.status();
   }
   Answer answer = text_answer(200, "");
   answer.type = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -241,6 +243,8 @@ void Site::tick() {
     watch->tick(steady_us());
     std::ranges::move(watch->mirror().news(), std::back_inserter(news));
   }
+  const bool second = ++ticks_ % kTicksPerSecond == 0;
+  if (second) news.push_back(alive());
   for (const auto& [id, page] : pages_) {
     if (outlet_.is_behind(id)) {
       page->behind = page->behind || !news.empty();
@@ -250,7 +254,7 @@ void Site::tick() {
       for (const Text& text : news) page->tell(text);
     }
   }
-  if (++ticks_ % kTicksPerSecond != 0) return;
+  if (!second) return;
   refresh_tokens();
   for (const auto& [id, page] : pages_) {
     const Rights rights = rights_for(page->visit());
