@@ -22,8 +22,9 @@ def free_port():
 class OpenPage:
     """One page: what it asks, and what it has been told."""
 
-    def __init__(self, socket):
+    def __init__(self, socket, daemon="bushd"):
         self.socket = socket
+        self.daemon = daemon  # of several
         self.hello = None
         self.daemons = {}
         self.motors = {}
@@ -36,7 +37,7 @@ class OpenPage:
     def ask(self, request, **fields):
         """Returns the number of the request."""
         self._count += 1
-        self.socket.send({"kind": "ask", "id": self._count, "daemon": "bushd", "request": request, "fields": fields})
+        self.socket.send({"kind": "ask", "id": self._count, "daemon": self.daemon, "request": request, "fields": fields})
         return self._count
 
     def say(self, kind, **fields):
@@ -52,6 +53,8 @@ class OpenPage:
             self.hello = told
         elif kind == "daemon":
             self.daemons[told["daemon"]] = told
+        elif told.get("daemon", self.daemon) != self.daemon:
+            pass
         elif kind == "state":
             if told["full"]:
                 self.motors, self.mcus = {}, {}
@@ -133,10 +136,10 @@ class WebTest(EndToEndTest):
         finally:
             connection.close()
 
-    def open_page(self, token=None, **options):
+    def open_page(self, token=None, daemon="bushd", **options):
         if token is not None:
             options["cookie"] = self.log_in(token)
-        page = OpenPage(WebSocket(self.port, **options))
+        page = OpenPage(WebSocket(self.port, **options), daemon)
         self.addCleanup(page.socket.close)
         page.take_until(lambda: page.hello)
         return page

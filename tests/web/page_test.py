@@ -113,6 +113,23 @@ class WebPage(WebTest):
         findings = page.result(page.say("doctor", daemon="bushd"))["detail"]["findings"]
         self.assertIn("daemon", {finding["check"] for finding in findings})
 
+    def test_shows_a_daemon_as_another_page_shows_it(self):
+        self.bring_up_web()
+        there, there_port = self.web, self.port
+        self.start_web("--remote", f"hutch=http://127.0.0.1:{there_port}", log="here.log")
+        hutch = self.open_page(self.make_token(), daemon="hutch")
+        self.assertEqual(hutch.hello["daemons"], ["bushd", "hutch"])
+        hutch.take_until(lambda: "a0" in hutch.motors and "a0" in hutch.descriptions and hutch.buses)
+        self.start_move("a0", "300")
+        hutch.take_until(lambda: hutch.motors["a0"]["position_steps"] == 300 and not hutch.motors["a0"]["moving"])
+        refused = hutch.result(hutch.ask("stop"))
+        self.assertEqual(refused["phase"], "refused")
+        self.assertIn("open the page there", refused["reason"])
+        there.end()
+        hutch.take_until(lambda: not hutch.daemons["hutch"]["connected"])
+        self.assertIn(f"http://127.0.0.1:{there_port}", hutch.daemons["hutch"]["why"])
+        self.assertTrue(hutch.daemons["bushd"]["connected"])
+
     def test_programs_read_state_and_metrics(self):
         self.bring_up_web()
         page = self.open_page()

@@ -10,9 +10,9 @@
 #include <string>
 
 #include "client/link.h"
-#include "mirror.h"
 #include "page.h"
 #include "poller.h"
+#include "source.h"
 
 namespace bushweb {
 
@@ -50,21 +50,19 @@ class DaemonLink : public Connection {
 };
 
 // Keeps the mirror of one daemon, and comes back when the daemon does.
-class Watch {
+class Watch : public Source {
  public:
   static constexpr std::int64_t kTryAgainUs = 500'000;
 
   Watch(Poller& poller, DaemonName daemon);
-  ~Watch();
+  ~Watch() override;
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  const DaemonName& daemon() const { return daemon_; }
-  Mirror& mirror() { return mirror_; }
-  // Connects when it is time to.
-  void tick(std::int64_t now_us);
-  // Processor time of the daemon since its start; nothing where this PC does not tell.
-  std::optional<double> cpu_s() const;
+  Mirror& mirror() override { return mirror_; }
+  void tick(std::int64_t now_us) override;
+  std::string socket() const override { return daemon_.socket; }
+  std::optional<double> cpu_s() const override;
 
  private:
   bushd::Result<void> connect();

@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,7 @@ constexpr int kUsage = 2;
 struct Wanted {
   std::string listen = "127.0.0.1:8260";
   std::vector<std::string> daemons{};
+  std::vector<std::string> remotes{};
   std::vector<std::string> hosts{};
   std::string tokens{};
   std::string page = BUSHD_WEB_PAGE;
@@ -73,6 +75,23 @@ Result<ServerOptions> server_options(const Wanted& wanted) {
   return options;
 }
 
+Result<std::vector<RemoteName>> remote_names(const std::vector<std::string>& told) {
+  std::vector<RemoteName> remotes;
+  for (const std::string& text : told) {
+    auto remote = remote_name(text);
+    if (!remote) return fail(remote.error());
+    remotes.push_back(std::move(*remote));
+  }
+  return remotes;
+}
+
+bool any_twice(const std::vector<DaemonName>& daemons, const std::vector<RemoteName>& remotes) {
+  std::set<std::string> names;
+  for (const DaemonName& daemon : daemons) names.insert(daemon.name);
+  for (const RemoteName& remote : remotes) names.insert(remote.name);
+  return names.size() < daemons.size() + remotes.size();
+}
+
 Result<std::vector<DaemonName>> daemon_names(const std::vector<std::string>& told) {
   std::vector<DaemonName> daemons;
   for (const std::string& text : told) {
@@ -82,9 +101,6 @@ Result<std::vector<DaemonName>> daemon_names(const std::vector<std::string>& tol
       return fail("--daemon: NAME=SOCKET is expected, such as hall=/run/bushd/control");
     }
     daemon.socket = text.substr(sign + 1);
-    if (std::ranges::any_of(daemons, [&](auto& other) { return other.name == daemon.name; })) {
-      return fail("--daemon: two are called " + daemon.name);
-    }
     daemons.push_back(std::move(daemon));
   }
   if (!daemons.empty()) return daemons;
@@ -117,6 +133,11 @@ int serve(const Wanted& wanted) {
   if (!server_wanted) return usage(server_wanted.error());
   auto daemons = daemon_names(wanted.daemons);
   if (!daemons) return usage(daemons.error());
+  auto remotes = remote_names(wanted.remotes);
+  if (!remotes) return usage(remotes.error());
+  if (any_twice(*daemons, *remotes)) {
+    return usage({.message = "--daemon and --remote: two have the same name"});
+  }
 
   sigset_t signals;
   sigemptyset(&signals);
@@ -138,6 +159,7 @@ int serve(const Wanted& wanted) {
   }
   Site site({.version = BUSHD_VERSION,
              .daemons = std::move(*daemons),
+             .remotes = std::move(*remotes),
              .access = {.hosts = wanted.hosts,
                         .behind_proxy = wanted.behind_proxy,
                         .tls = !wanted.certificate.empty(),
@@ -145,12 +167,13 @@ int serve(const Wanted& wanted) {
              .tokens = wanted.tokens,
              .folder = wanted.page,
              .bushctl = bushctl_path()},
-            poller, server);
+            poller, server, server);
   const Ticks ticks(Site::kTicksPerSecond);
   poller.add(ticks.fd(), [&] {
     ticks.take();
     site.tick();
     server.close_deaf();
+    server.close_silent();
   });
   const int signal_fd = ::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
   poller.add(signal_fd, [&] { server.end(); });
@@ -175,6 +198,10 @@ int main(int argc, char** argv) {
   app.add_option("--daemon", wanted.daemons,
                  "A daemon and its control socket; may be repeated. Without it that of this PC")
       ->type_name("NAME=SOCKET")
+      ->allow_extra_args(false);
+  app.add_option("--remote", wanted.remotes,
+                 "A daemon as another bushd-web shows it, only to be looked at; may be repeated")
+      ->type_name("NAME=URL")
       ->allow_extra_args(false);
   app.add_option("--host", wanted.hosts,
                  "A name by which browsers call this PC; may be repeated. Addresses and localhost "

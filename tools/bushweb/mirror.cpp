@@ -41,8 +41,8 @@ void Mirror::connect() {
   connection_fresh_ = true;
   full_ = true;
   mcus_.clear();
-  descriptions_.clear();
-  healths_.clear();
+  descriptions_ = {};
+  healths_ = {};
   collector_.clear();
 }
 
@@ -73,7 +73,7 @@ void Mirror::hear_from(const lcm::Part& part) {
   part_count_ = part.parts;
   full_ = true;
   mcus_.clear();
-  descriptions_.clear();
+  descriptions_ = {};
   collector_.clear();
 }
 
@@ -101,7 +101,8 @@ void Mirror::hear_state(const lcm::StateMessage& message) {
 template <class Message>
 void Mirror::hear_part(Parts& parts, const Message& message) {
   std::string json = open_object(message.part.part, message.snapshot, nullptr) + "}";
-  Told& told = parts[message.part.part];
+  parts.count = message.part.parts;
+  Told& told = parts.told[message.part.part];
   if (told.json == json) return;
   told = {.json = std::move(json), .fresh = true};
 }
@@ -129,10 +130,10 @@ Text Mirror::states(bool full) const {
 }
 
 Text Mirror::parts(const char* kind, const char* list, const Parts& parts, bool full) const {
-  std::string text = fmt::format(R"({{"kind":"{}","daemon":{},"full":{},"{}":[)", kind,
-                                 json_string(daemon_), full, list);
+  std::string text = fmt::format(R"({{"kind":"{}","daemon":{},"full":{},"parts":{},"{}":[)", kind,
+                                 json_string(daemon_), full, parts.count, list);
   const char* before = "";
-  for (const auto& [part, told] : parts) {
+  for (const auto& [part, told] : parts.told) {
     if (full || told.fresh) text += std::exchange(before, ",") + told.json;
   }
   return shared(text + "]}");
@@ -144,17 +145,17 @@ std::vector<Text> Mirror::news() {
   if (!connected()) return out;
   const auto fresh = [](auto& entry) { return entry.second.fresh; };
   const bool full = std::exchange(full_, false);
-  if (full || std::ranges::any_of(descriptions_, fresh)) {
+  if (full || std::ranges::any_of(descriptions_.told, fresh)) {
     out.push_back(parts("description", "mcus", descriptions_, full));
   }
   if (full || std::ranges::any_of(mcus_, [](auto& entry) { return entry.second.heard; })) {
     out.push_back(states(full));
   }
-  if (full || std::ranges::any_of(healths_, fresh)) {
+  if (full || std::ranges::any_of(healths_.told, fresh)) {
     out.push_back(parts("health", "buses", healths_, full));
   }
-  for (auto& [part, told] : descriptions_) told.fresh = false;
-  for (auto& [part, told] : healths_) told.fresh = false;
+  for (auto& [part, told] : descriptions_.told) told.fresh = false;
+  for (auto& [part, told] : healths_.told) told.fresh = false;
   for (auto& [part, mcu] : mcus_) {
     mcu.heard = false;
     for (Motor& motor : mcu.motors) motor.fresh = false;

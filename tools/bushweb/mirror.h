@@ -51,7 +51,10 @@ class Mirror {
     std::string json{};
     bool fresh = true;
   };
-  using Parts = std::map<std::int32_t, Told>;
+  struct Parts {
+    std::map<std::int32_t, Told> told{};
+    std::int32_t count = 0;  // that there are
+  };
 
   void hear_state(const bushd::lcm::StateMessage& message);
   template <class Message>

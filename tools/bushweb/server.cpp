@@ -17,7 +17,8 @@ namespace {
 
 constexpr const char* kPageProtocol = "bushd";
 constexpr const char* kPollerProtocol = "bushd-poller";
-constexpr std::size_t kHeaderBytes = 8192;  // of an answer, and of a request
+constexpr const char* kRemoteProtocol = "bushd-remote";  // the name on this side
+constexpr std::size_t kHeaderBytes = 8192;               // of an answer, and of a request
 constexpr std::size_t kChunk = 32 * 1024;
 constexpr unsigned kHandshakeSeconds = 5;
 constexpr int kIdleSeconds = 15;  // of a connection that has been answered
@@ -88,16 +89,18 @@ int on_library_event(lws* wsi, lws_callback_reasons reason, void* /*user*/, void
   if (server == nullptr) return 0;
   // A length does not always belong to a text.
   const bool has_text = reason == LWS_CALLBACK_HTTP || reason == LWS_CALLBACK_HTTP_BODY ||
-                        reason == LWS_CALLBACK_RECEIVE;
+                        reason == LWS_CALLBACK_RECEIVE || reason == LWS_CALLBACK_CLIENT_RECEIVE ||
+                        (reason == LWS_CALLBACK_CLIENT_CONNECTION_ERROR && in != nullptr);
   const std::string_view text =
       has_text ? std::string_view(static_cast<const char*>(in), length) : std::string_view();
   return server->on_event(wsi, static_cast<int>(reason), text);
 }
 
-const std::array<lws_protocols, 4> kProtocols{
+const std::array<lws_protocols, 5> kProtocols{
     {{"http-only", on_library_event, 0, 0, 0, nullptr, 0},
      {kPageProtocol, on_library_event, 0, 16 * 1024, 0, nullptr, 0},
      {kPollerProtocol, on_library_event, 0, 0, 0, nullptr, 0},
+     {kRemoteProtocol, on_library_event, 0, 64 * 1024, 0, nullptr, 0},
      {nullptr, nullptr, 0, 0, 0, nullptr, 0}}};
 
 void log_line(int /*level*/, const char* line) {
@@ -116,7 +119,7 @@ bushd::Result<void> Server::open(const ServerOptions& options) {
   info.port = CONTEXT_PORT_NO_LISTEN;
   info.user = this;
   info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
-  if (!options.certificate.empty()) info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+  info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;  // for TLS of either side
   info.max_http_header_data2 = kHeaderBytes;
   info.max_http_header_pool2 = kMostConnections;
   context_ = lws_create_context(&info);
@@ -138,8 +141,8 @@ bushd::Result<void> Server::open(const ServerOptions& options) {
     host.ssl_cert_filepath = options.certificate.c_str();
     host.ssl_private_key_filepath = options.key.c_str();
   }
-  lws_vhost* vhost = lws_create_vhost(context_, &host);
-  if (vhost == nullptr) {
+  vhost_ = lws_create_vhost(context_, &host);
+  if (vhost_ == nullptr) {
     return bushd::fail(fmt::format(
         "nothing can listen at {}:{}: the port is taken, the address is not of this PC, or the "
         "files of TLS cannot be used; --listen names another",
@@ -147,7 +150,7 @@ bushd::Result<void> Server::open(const ServerOptions& options) {
   }
   lws_sock_file_fd_type fd{};
   fd.filefd = ::dup(poller_.fd());  // the library closes it
-  if (lws_adopt_descriptor_vhost(vhost, LWS_ADOPT_RAW_FILE_DESC, fd, kPollerProtocol, nullptr) ==
+  if (lws_adopt_descriptor_vhost(vhost_, LWS_ADOPT_RAW_FILE_DESC, fd, kPollerProtocol, nullptr) ==
       nullptr) {
     return bushd::fail("libwebsockets does not wait for descriptors of ours");
   }
@@ -181,6 +184,11 @@ int Server::on_event(lws* wsi, int reason, std::string_view in) {
   }
   if (site_ == nullptr) return 0;
   switch (reason) {
+    case LWS_CALLBACK_CLIENT_ESTABLISHED:
+    case LWS_CALLBACK_CLIENT_RECEIVE:
+    case LWS_CALLBACK_CLIENT_CONNECTION_ERROR:
+    case LWS_CALLBACK_CLIENT_CLOSED:
+      return on_remote_event(wsi, reason, in);
     case LWS_CALLBACK_HTTP:
       return on_http(wsi, in);
     case LWS_CALLBACK_HTTP_BODY:
@@ -342,6 +350,69 @@ void Server::close_deaf() {
     const bool deaf = !page.unsent.empty() && now_us - page.waits_since_us > kDeafUs;
     if (deaf || page.bytes > kMostUnsent) {
       lws_set_timeout(page.wsi, PENDING_TIMEOUT_USER_REASON_BASE, LWS_TO_KILL_ASYNC);
+    }
+  }
+}
+
+void Server::dial(Remote& remote) {
+  const RemoteName& name = remote.name();
+  const std::string host = fmt::format("{}:{}", name.host, name.port);
+  lws* wsi = nullptr;
+  lws_client_connect_info info{};
+  info.context = context_;
+  info.vhost = vhost_;
+  info.address = name.host.c_str();
+  info.port = name.port;
+  info.ssl_connection = name.tls ? LCCSCF_USE_SSL : 0;
+  info.path = "/api/live";
+  info.host = host.c_str();
+  info.protocol = kPageProtocol;
+  info.local_protocol_name = kRemoteProtocol;
+  info.alpn = "http/1.1";
+  info.pwsi = &wsi;
+  // Events of a connection that fails at once come before this returns.
+  dialled_ = &remote;
+  if (lws_client_connect_via_info(&info) != nullptr && wsi != nullptr) {
+    remotes_[wsi].remote = &remote;
+  } else if (std::exchange(dialled_, nullptr) != nullptr) {
+    remote.on_end("there is no connection");
+  }
+  dialled_ = nullptr;
+}
+
+int Server::on_remote_event(lws* wsi, int reason, std::string_view in) {
+  const auto found = remotes_.find(wsi);
+  if (found == remotes_.end()) {
+    if (reason == LWS_CALLBACK_CLIENT_CONNECTION_ERROR && dialled_ != nullptr) {
+      std::exchange(dialled_, nullptr)->on_end(std::string(in));
+    }
+    return 0;
+  }
+  Far& far = found->second;
+  switch (reason) {
+    case LWS_CALLBACK_CLIENT_ESTABLISHED:
+      far.remote->on_open();
+      return 0;
+    case LWS_CALLBACK_CLIENT_RECEIVE:
+      if (far.heard.size() + in.size() > Remote::kMostMessage) return -1;
+      far.heard += in;
+      if (lws_remaining_packet_payload(wsi) == 0 && lws_is_final_fragment(wsi) != 0) {
+        far.remote->on_text(std::exchange(far.heard, ""));
+      }
+      return 0;
+    default: {
+      Remote* remote = far.remote;
+      remotes_.erase(found);
+      remote->on_end(in.empty() ? "the connection has ended" : std::string(in));
+      return 0;
+    }
+  }
+}
+
+void Server::close_silent() {
+  for (const auto& [wsi, far] : remotes_) {
+    if (far.remote->is_silent()) {
+      lws_set_timeout(wsi, PENDING_TIMEOUT_USER_REASON_BASE, LWS_TO_KILL_ASYNC);
     }
   }
 }

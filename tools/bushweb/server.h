@@ -27,7 +27,7 @@ struct ServerOptions {
   std::string key{};
 };
 
-class Server : public Outlet {
+class Server : public Outlet, public Dialer {
  public:
   // Connections, and pages among them.
   static constexpr std::size_t kMostConnections = 512;
@@ -56,6 +56,9 @@ class Server : public Outlet {
 
   void send(PageId page, const Text& text) override;
   bool is_behind(PageId page) const override;
+  void dial(Remote& remote) override;
+  // Ends connections to others that are silent.
+  void close_silent();
 
   // What the library tells. `reason`: lws_callback_reasons.
   int on_event(lws* wsi, int reason, std::string_view in);
@@ -84,10 +87,12 @@ class Server : public Outlet {
   int on_message(lws* wsi, std::string_view bytes);
   int write_text(lws* wsi);
   void on_page_closed(lws* wsi);
+  int on_remote_event(lws* wsi, int reason, std::string_view in);
 
   Poller& poller_;
   Site* site_ = nullptr;
   lws_context* context_ = nullptr;
+  lws_vhost* vhost_ = nullptr;
   bool ended_ = false;
   std::size_t connections_ = 0;
   std::map<lws*, Exchange> exchanges_{};
@@ -95,6 +100,12 @@ class Server : public Outlet {
   PageId last_page_ = 0;
   std::map<lws*, PageId> ids_{};
   std::map<PageId, OpenPage> pages_{};
+  struct Far {
+    Remote* remote = nullptr;
+    std::string heard{};  // of a message that has not come whole
+  };
+  std::map<lws*, Far> remotes_{};
+  Remote* dialled_ = nullptr;  // while dial() runs
 };
 
 }  // namespace bushweb

@@ -21,6 +21,8 @@ namespace {
 constexpr std::size_t kMostAddresses = 256;
 constexpr double kFailuresAtOnce = 10;
 constexpr double kFailuresPerSecond = 0.1;
+constexpr const char* kElsewhere =
+    "this daemon is shown as another bushd-web shows it: open the page there to command it";
 
 std::int64_t steady_us() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -54,12 +56,14 @@ class Site::OpenPage : public Surroundings {
 
   void tell(const Text& text) override { site_.outlet_.send(id_, text); }
   bool has_daemon(const std::string& daemon) const override {
-    return site_.watch_of(daemon) != nullptr;
+    return site_.source_of(daemon) != nullptr;
   }
   bushd::Result<std::unique_ptr<Connection>> connect(const std::string& daemon,
                                                      const std::string& program) override {
+    const std::string socket = site_.source_of(daemon)->socket();
+    if (socket.empty()) return bushd::fail(kElsewhere);
     auto opened = DaemonLink::open(
-        site_.poller_, site_.watch_of(daemon)->daemon().socket, program,
+        site_.poller_, socket, program,
         {.reply = [this, daemon](
                       std::int64_t number,
                       const api::Reply& reply) { page_.on_reply(daemon, number, reply); },
@@ -68,7 +72,7 @@ class Site::OpenPage : public Surroundings {
     return std::unique_ptr<Connection>(std::move(*opened));
   }
   void run_doctor(const std::string& daemon, std::int64_t id) override {
-    site_.run_doctor(*site_.watch_of(daemon), id_, id);
+    site_.run_doctor(*site_.source_of(daemon), id_, id);
   }
 
   PageId id() const { return id_; }
@@ -80,7 +84,7 @@ class Site::OpenPage : public Surroundings {
  private:
   std::vector<std::string> names() const {
     std::vector<std::string> names;
-    for (const DaemonName& daemon : site_.options_.daemons) names.push_back(daemon.name);
+    for (const auto& source : site_.sources_) names.push_back(source->mirror().daemon());
     return names;
   }
 
@@ -90,14 +94,17 @@ class Site::OpenPage : public Surroundings {
   Page page_;
 };
 
-Site::Site(SiteOptions options, Poller& poller, Outlet& outlet)
+Site::Site(SiteOptions options, Poller& poller, Outlet& outlet, Dialer& dialer)
     : options_(std::move(options)),
       poller_(poller),
       outlet_(outlet),
       content_(Content::load(options_.folder)),
       tokens_(options_.tokens) {
   for (const DaemonName& daemon : options_.daemons) {
-    watches_.push_back(std::make_unique<Watch>(poller_, daemon));
+    sources_.push_back(std::make_unique<Watch>(poller_, daemon));
+  }
+  for (const RemoteName& remote : options_.remotes) {
+    sources_.push_back(std::make_unique<Remote>(remote, dialer));
   }
   if (!content_) fmt::print(stderr, "bushd-web: {}\n", bushd::printable(content_.error().text()));
   refresh_tokens();
@@ -105,9 +112,9 @@ Site::Site(SiteOptions options, Poller& poller, Outlet& outlet)
 
 Site::~Site() = default;
 
-Watch* Site::watch_of(const std::string& daemon) {
-  for (const auto& watch : watches_) {
-    if (watch->daemon().name == daemon) return watch.get();
+Source* Site::source_of(const std::string& daemon) const {
+  for (const auto& source : sources_) {
+    if (source->mirror().daemon() == daemon) return source.get();
   }
   return nullptr;
 }
@@ -184,10 +191,10 @@ Answer Site::cookie(int status, const std::string& token, std::int64_t seconds) 
 }
 
 Answer Site::state(const Visit& visit) {
-  Watch* watch = visit.daemon.empty() ? watches_.front().get() : watch_of(visit.daemon);
-  if (watch == nullptr) return error_answer(404, "there is no such daemon");
-  const auto status = watch->mirror().status();
-  if (!watch->mirror().connected() || status.states.empty() || status.descriptions.empty()) {
+  Source* source = visit.daemon.empty() ? sources_.front().get() : source_of(visit.daemon);
+  if (source == nullptr) return error_answer(404, "there is no such daemon");
+  const auto status = source->mirror().status();
+  if (!source->mirror().connected() || status.states.empty() || status.descriptions.empty()) {
     return error_answer(503, "the daemon has not told its state");
   }
   return json_answer(200, bushd::client::json(status));
@@ -195,12 +202,12 @@ Answer Site::state(const Visit& visit) {
 
 Answer Site::metrics() {
   std::vector<Measured> daemons;
-  for (const auto& watch : watches_) {
-    Mirror& mirror = watch->mirror();
+  for (const auto& source : sources_) {
+    Mirror& mirror = source->mirror();
     Measured& measured = daemons.emplace_back(
-        Measured{.daemon = watch->daemon().name, .connected = mirror.connected()});
+        Measured{.daemon = source->mirror().daemon(), .connected = mirror.connected()});
     if (!measured.connected) continue;
-    measured.cpu_s = watch->cpu_s();
+    measured.cpu_s = source->cpu_s();
     measured.status = mirror.status();
   }
   Answer answer = text_answer(200, "");
@@ -223,8 +230,8 @@ void Site::open(PageId id, const Visit& visit) {
 }
 
 void Site::catch_up(OpenPage& page) {
-  for (const auto& watch : watches_) {
-    for (const Text& text : watch->mirror().everything()) page.tell(text);
+  for (const auto& source : sources_) {
+    for (const Text& text : source->mirror().everything()) page.tell(text);
   }
 }
 
@@ -239,9 +246,9 @@ void Site::close(PageId id) {
 
 void Site::tick() {
   std::vector<Text> news;
-  for (const auto& watch : watches_) {
-    watch->tick(steady_us());
-    std::ranges::move(watch->mirror().news(), std::back_inserter(news));
+  for (const auto& source : sources_) {
+    source->tick(steady_us());
+    std::ranges::move(source->mirror().news(), std::back_inserter(news));
   }
   const bool second = ++ticks_ % kTicksPerSecond == 0;
   if (second) news.push_back(alive());
@@ -269,16 +276,17 @@ void Site::refresh_tokens() {
   if (!wrong.empty()) fmt::print(stderr, "bushd-web: {}\n", bushd::printable(wrong));
 }
 
-void Site::run_doctor(const Watch& watch, PageId page, std::int64_t id) {
-  const std::string daemon = watch.daemon().name;
+void Site::run_doctor(Source& source, PageId page, std::int64_t id) {
+  if (source.socket().empty()) return outlet_.send(page, refused(id, kElsewhere));
+  const std::string daemon = source.mirror().daemon();
   Examination& examination = examinations_[daemon];
   examination.waiting.emplace_back(page, id);
   if (examination.run) return;
   examination.run = std::make_unique<ProgramRun>(
       poller_,
       [this, daemon](const bushd::Result<std::string>& output) { tell_findings(daemon, output); });
-  const auto started = examination.run->start(
-      {options_.bushctl, "doctor", "--json", "--socket", watch.daemon().socket});
+  const auto started =
+      examination.run->start({options_.bushctl, "doctor", "--json", "--socket", source.socket()});
   if (!started) tell_findings(daemon, bushd::fail(started.error()));
 }
 

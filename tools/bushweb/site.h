@@ -17,6 +17,7 @@
 #include "page.h"
 #include "poller.h"
 #include "program_run.h"
+#include "remote.h"
 #include "token_file.h"
 
 namespace bushweb {
@@ -34,7 +35,8 @@ class Outlet {
 
 struct SiteOptions {
   std::string version{};
-  std::vector<DaemonName> daemons{};  // at least one, names differ
+  std::vector<DaemonName> daemons{};  // with the next ones at least one, names differ
+  std::vector<RemoteName> remotes{};
   AccessOptions access{};
   std::string tokens{};   // path
   std::string folder{};   // of the page
@@ -45,7 +47,7 @@ class Site {
  public:
   static constexpr int kTicksPerSecond = 10;
 
-  Site(SiteOptions options, Poller& poller, Outlet& outlet);
+  Site(SiteOptions options, Poller& poller, Outlet& outlet, Dialer& dialer);
   ~Site();
   Site(const Site&) = delete;
   Site& operator=(const Site&) = delete;
@@ -72,10 +74,10 @@ class Site {
   Answer file(const Visit& visit) const;
   bool may_fail_again(const std::string& peer, std::int64_t now_us);
   Rights rights_for(const Visit& visit) const;
-  Watch* watch_of(const std::string& daemon);
+  Source* source_of(const std::string& daemon) const;
   void catch_up(OpenPage& page);
   void refresh_tokens();
-  void run_doctor(const Watch& watch, PageId page, std::int64_t id);
+  void run_doctor(Source& source, PageId page, std::int64_t id);
   void tell_findings(const std::string& daemon, const bushd::Result<std::string>& output);
 
   SiteOptions options_;
@@ -83,7 +85,7 @@ class Site {
   Outlet& outlet_;
   bushd::Result<Content> content_;
   TokenFile tokens_;
-  std::vector<std::unique_ptr<Watch>> watches_{};
+  std::vector<std::unique_ptr<Source>> sources_{};
   std::map<PageId, std::unique_ptr<OpenPage>> pages_;
   // How many more wrong tokens are taken from an address just now.
   struct Failures {

@@ -4,7 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "source_path.h"
 
 namespace bushweb {
 namespace {
@@ -44,6 +49,32 @@ TEST(Metrics, ClassesOfLatencyAddUp) {
   EXPECT_THAT(text, HasSubstr("_bucket{daemon=\"d\",bus=\"b\",le=\"0.002\"} 7\n"));
   EXPECT_THAT(text, HasSubstr("_bucket{daemon=\"d\",bus=\"b\",le=\"+Inf\"} 8\n"));
   EXPECT_THAT(text, HasSubstr("_count{daemon=\"d\",bus=\"b\"} 8\n"));
+}
+
+// What a name in a query of the dashboard begins with, and what families are called.
+TEST(Metrics, TheDashboardAsksForWhatIsTold) {
+  bushd::lcm::HealthMessage bus;
+  bus.snapshot.latency = {{std::numeric_limits<std::int64_t>::max(), 1}};
+  bus.snapshot.mcus = {{.mcu = "m"}};
+  bushd::lcm::StateMessage mcu;
+  mcu.snapshot.motors = {{.name = "a"}};
+  Measured daemon = told_of({mcu}, {bus});
+  daemon.cpu_s = 1;
+  const std::string told = open_metrics({daemon});
+  std::ifstream file(bushd::test::source_path("tools/bushweb/grafana.json"));
+  const auto dashboard = nlohmann::json::parse(file);
+  const std::regex name("bushd_[a-z_]+(?=\\{)");
+  int asked = 0;
+  for (const auto& panel : dashboard["panels"]) {
+    for (const auto& target : panel["targets"]) {
+      const std::string query = target["expr"];
+      for (std::sregex_iterator at(query.begin(), query.end(), name), end; at != end; ++at) {
+        ++asked;
+        EXPECT_THAT(told, HasSubstr("\n" + at->str() + "{")) << query;
+      }
+    }
+  }
+  EXPECT_EQ(asked, 11);
 }
 
 TEST(Metrics, ADaemonThatIsNotThereIsDown) {
