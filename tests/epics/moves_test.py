@@ -52,6 +52,13 @@ class Edges(unittest.TestCase):
                 self.assertEqual(bench.values("DMOV"), [0, 1])
                 self.assertEqual([bench["RLV"], bench["TWF"], bench["TWR"]], [0, 0, 0])
 
+    def test_a_field_that_nobody_looks_at_is_right_and_not_told(self):
+        bench = Bench()
+        bench.record.shown = {"RBV", "DMOV"}
+        self.move(bench, 2.0)
+        self.assertEqual({event.field for event in bench.said if isinstance(event, events.Post)}, {"RBV", "DMOV"})
+        self.assertEqual((bench["RRBV"], bench["DRBV"], bench["VAL"]), (200, 2.0, 2.0))
+
     def test_the_user_scale_may_run_against_the_dial(self):
         scale = Scale(0.01, negative=True, offset=10.0)
         bench = Bench(scale=scale, user=10.0, dial=0.0, plus_limit=True, low=-40.0, high=60.0)

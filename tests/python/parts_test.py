@@ -9,19 +9,27 @@ import unittest
 from unittest import mock
 
 from bushd import NoDaemon, Trust, aio, arguments, client, codec, messages, motion, requests, udpm
-from bushd.status import StatusCollector
+from bushd.status import MOST_PUT_OFF, StatusCollector
 
 
-def state(part, parts=2, sequence=1, run=1, motors=(), trust="known"):
+def encoded_state(part, parts=2, sequence=1, run=1, motors=(), trust="known", position=12.5):
     message = messages.mcu_state_t()
     message.mcu, message.state = f"hall:{part + 1}", "READY"
     message.part, message.parts, message.sequence, message.run = part, parts, sequence, run
     for name in motors:
         motor = messages.motor_t()
-        motor.name, motor.trust, motor.activity, motor.user_position = name, trust, "rest", 12.5
+        motor.name, motor.trust, motor.activity, motor.user_position = name, trust, "rest", position
         message.motors.append(motor)
     message.motor_count = len(motors)
-    return codec.decode("STATE", message.encode())
+    return message.encode()
+
+
+def state(*arguments, **named):
+    return codec.decode("STATE", encoded_state(*arguments, **named))
+
+
+def unread(*arguments, **named):
+    return codec.unread(encoded_state(*arguments, **named))
 
 
 def description(part, parts=2, sequence=1, run=1, motors=()):
@@ -114,6 +122,55 @@ class Whole(unittest.TestCase):
         collector.add(description(0, 1, motors=["a"]))
         motor = collector.status()["a"]
         self.assertEqual((motor.trust, motor.position, motor.target_steps), (Trust.UNKNOWN, None, None))
+
+    def collector(self):
+        collector = StatusCollector()
+        for part in (state(0, 1, sequence=5, motors=["a"]), description(0, 1, motors=["a"])):
+            collector.add(part)
+        return collector
+
+    def test_a_state_that_is_put_off_is_read_with_the_whole(self):
+        collector = self.collector()
+        heard = collector.states_heard
+        for sequence, position in ((6, 13.0), (8, 14.0), (7, 15.0)):
+            self.assertTrue(collector.put_off(unread(0, 1, sequence=sequence, motors=["a"], position=position)))
+        self.assertEqual(collector.states_heard, heard + 3)
+        self.assertFalse(collector.add(state(0, 1, sequence=7, motors=["a"])))
+        status = collector.status()
+        self.assertEqual((status["a"].position, status.sequence), (14.0, 8))
+        self.assertFalse(collector.put_off(unread(0, 1, sequence=7, motors=["a"])))
+
+    def test_a_newer_state_that_is_read_takes_the_place_of_one_that_was_put_off(self):
+        collector = self.collector()
+        collector.put_off(unread(0, 1, sequence=6, motors=["a"], position=13.0))
+        collector.add(state(0, 1, sequence=7, motors=["a"], trust="uncertain"))
+        self.assertEqual((collector.status()["a"].trust, collector.status().sequence), (Trust.UNCERTAIN, 7))
+
+    def test_what_begins_anew_is_not_put_off(self):
+        collector = StatusCollector()
+        self.assertFalse(collector.put_off(unread(0, 1)))
+        collector = self.collector()
+        self.assertTrue(collector.put_off(unread(0, 1, sequence=6, motors=["a"], position=13.0)))
+        for other in (unread(0, 1, run=2, sequence=9), unread(0, 2, sequence=9), unread(1, 2, sequence=9), unread(-1, 1, sequence=9)):
+            self.assertFalse(collector.put_off(other))
+        collector.add(state(0, 1, run=2, sequence=1, motors=["a"]))
+        collector.add(description(0, 1, run=2, motors=["a"]))
+        self.assertEqual((collector.status()["a"].position, collector.status().run), (12.5, 2))
+
+    def test_what_was_put_off_and_is_no_state_is_dropped(self):
+        good = encoded_state(0, 1, sequence=6, motors=["a"], position=13.0)
+        for bad in (good[:-1], good + b"\0", good[:40], encoded_state(0, 1, sequence=6, motors=["a"], trust="sure")):
+            collector = self.collector()
+            self.assertTrue(collector.put_off(codec.unread(bad)))
+            status = collector.status()
+            self.assertEqual((status["a"].position, status.sequence), (12.5, 5))
+            self.assertTrue(collector.put_off(codec.unread(good)))
+            for _ in range(MOST_PUT_OFF - 1):
+                self.assertTrue(collector.put_off(codec.unread(bad)))
+            self.assertFalse(collector.put_off(codec.unread(bad)))
+            self.assertEqual(collector.status()["a"].position, 13.0)
+        for none in (b"", good[:39], b"\0" + good[1:]):
+            self.assertIsNone(codec.unread(none))
 
     def test_states_and_descriptions_of_different_configurations_are_no_whole(self):
         collector = StatusCollector()

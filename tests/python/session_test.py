@@ -7,6 +7,7 @@ from bushd import Outcome, messages
 from bushd.errors import NoDaemon, Refused, ResultUnknown, TwoDaemons
 from bushd import codec, requests
 from bushd.session import Session, Timing
+from bushd.status import StatusCollector
 
 ACCEPTED, REFUSED, RESULT = (messages.reply_header_t.ACCEPTED, messages.reply_header_t.REFUSED,
                              messages.reply_header_t.RESULT)
@@ -275,6 +276,28 @@ class OverLcm(unittest.TestCase):
         self.daemon.tell("STATE", state(run=2))
         self.assertIsInstance(exchange.error, ResultUnknown)
         self.assertIn("restarted", str(exchange.error))
+
+    def test_who_watches_hears_the_newest_state_of_the_newest_daemon(self):
+        watching = [StatusCollector(), StatusCollector()]
+        self.daemon.session.watch(watching[0])
+        self.daemon.tell("DESCRIPTION", messages.mcu_description_t(parts=1, run=1).encode())
+        self.daemon.tell("STATE", state(sequence=1))
+        self.daemon.session.watch(watching[1])  # that has to read what the other one puts off
+        self.daemon.tell("DESCRIPTION", messages.mcu_description_t(parts=1, run=1).encode())
+        for sequence in (2, 4, 3):
+            self.daemon.tell("STATE", state(sequence=sequence))
+            self.daemon.tell("STATE", state(sequence=9)[:-1])
+            self.daemon.tell("STATE", b"no state")
+        self.assertEqual([collector.status().sequence for collector in watching], [4, 4])
+        query = self.daemon.session.begin_status(self.daemon.now, 1.0)
+        self.daemon.tell("STATE", state(sequence=5))
+        self.assertEqual([collector.status().sequence for collector in watching], [5, 5])
+        self.daemon.session.abandon_status(query)
+        exchange = self.daemon.begin_with_session()
+        self.daemon.tell("STATE", state(sequence=6))
+        self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
+        self.daemon.tell("STATE", state(run=2))
+        self.assertIsInstance(exchange.error, ResultUnknown)
 
     def test_a_daemon_that_falls_silent(self):
         exchange = self.daemon.begin_with_session()

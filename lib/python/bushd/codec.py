@@ -11,6 +11,7 @@ import datetime
 import enum
 import functools
 import operator
+import struct
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
@@ -103,6 +104,10 @@ class State(Part):
     pass
 
 
+class Unread(Part):
+    """A State of which only this has been looked at; `content` is the message's bytes."""
+
+
 class Description(Part):
     pass
 
@@ -134,11 +139,15 @@ def decode(channel: str, payload: bytes) -> Message | None:
         return None
 
 
-def run_of(channel: str, payload: bytes) -> int | None:
-    """Which run of the daemon a STATE is of, from its first fields alone."""
-    if channel != "STATE" or len(payload) < 24 or payload[:8] != messages.mcu_state_t.FINGERPRINT:
+_FIRST_FIELDS = struct.Struct(">8sqqqii")  # the fingerprint, and what mcu_state_t begins with
+
+
+def unread(payload: bytes) -> Unread | None:
+    """A STATE, by its first fields alone: reading all of it takes time. None: it is none."""
+    if len(payload) < _FIRST_FIELDS.size:
         return None
-    return int.from_bytes(payload[16:24], "big", signed=True)
+    fingerprint, utime_us, run, sequence, part, parts = _FIRST_FIELDS.unpack_from(payload)
+    return Unread(run, sequence, utime_us, part, parts, payload) if fingerprint == messages.mcu_state_t.FINGERPRINT else None
 
 
 def at(utime_us: int) -> datetime.datetime:
@@ -173,7 +182,13 @@ def made(kind: Callable[..., T], message: Any, **others: Any) -> T:
     others.update(zip(names, read(message)))
     for name in arrays:
         others[name] = tuple(others[name])
-    return kind(**others)
+    if len(others) != len(_names(kind)):
+        return kind(**others)
+    # As its __init__ does, which sets field by field: states of motors have many.
+    bare: Any = kind
+    value: T = object.__new__(bare)
+    value.__dict__.update(others)
+    return value
 
 
 def table_ref(message: Any) -> model.TableRef:

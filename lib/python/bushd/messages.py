@@ -25,6 +25,8 @@ _SIZE = struct.Struct(">I")
 # Told again and again, mostly as before, of each MCU: their motors, which are the rest of the message, are not read again then.
 REPEATED = ("mcu_state_t", "mcu_description_t")
 MOST_REMEMBERED = 256
+MOST_TEXTS = 4096
+LONGEST_KNOWN_TEXT = 32  # bytes: names of motors, and words
 
 
 class Field:
@@ -163,13 +165,23 @@ def _reader(cls: Any) -> Callable[[bytes, int], tuple[Any, int]]:
     return read
 
 
+_known_texts: dict[bytes, str] = {}
+
+
 def _read_text(data: bytes, at: int) -> tuple[str, int]:
     begin = at + 4
     (size,) = _SIZE.unpack_from(data, at)
     coded = data[begin : begin + size]
+    if len(coded) == size and coded in _known_texts:
+        return _known_texts[coded], begin + size
     if size == 0 or len(coded) != size or coded.find(b"\0") != size - 1:
         raise ValueError("a text that does not end where it should")
-    return coded[:-1].decode(), begin + size
+    read = coded[:-1].decode()
+    if size <= LONGEST_KNOWN_TEXT:
+        if len(_known_texts) >= MOST_TEXTS:
+            _known_texts.clear()
+        _known_texts[coded] = read
+    return read, begin + size
 
 
 def _read_array(data: bytes, at: int, count: int, layout: str) -> tuple[tuple[Any, ...], int]:

@@ -215,10 +215,14 @@ class Session:
 
     def receive(self, channel: str, payload: bytes, now: float) -> None:
         """`channel` without the prefix. Whatever it is: what is no message of the daemon to this client is dropped."""
-        if channel in STATE_CHANNELS and not (self._queries or self._collectors):
-            run = codec.run_of(channel, payload)  # decoding all of it takes time
-            if run is not None:
-                self._on_state(run, now)
+        if channel == "STATE" and not self._queries:
+            unread = codec.unread(payload)
+            if unread is None:
+                return
+            put_off = [collector.put_off(unread) for collector in self._collectors]
+            if all(put_off):
+                return self._on_state(unread.run, now)
+        elif channel in STATE_CHANNELS and not (self._queries or self._collectors):
             return
         message = codec.decode(channel, payload)
         if isinstance(message, Reply):

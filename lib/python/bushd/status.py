@@ -6,7 +6,9 @@ import operator
 from typing import Any
 
 from . import codec, model
-from .codec import MAX_PARTS, Description, Health, Part
+from .codec import MAX_PARTS, Description, Health, Part, Unread
+
+MOST_PUT_OFF = 16  # states of an MCU
 
 
 class StatusCollector:
@@ -16,6 +18,7 @@ class StatusCollector:
         self.states_heard = 0  # so many were used
         self._run: int | None = None
         self._states: dict[int, Part] = {}
+        self._unread: dict[int, list[Unread]] = {}  # that came after those
         self._descriptions: dict[int, Part] = {}
         self._healths: dict[int, Part] = {}
         self._made: dict[int, tuple[Part, Part, list[model.Motor]]] = {}  # of what was asked for last
@@ -27,6 +30,7 @@ class StatusCollector:
         if part.run != self._run:  # of another daemon
             self._run = part.run
             self._states.clear()
+            self._unread.clear()
             self._descriptions.clear()
             self._healths.clear()
         if isinstance(part, Health):
@@ -34,7 +38,28 @@ class StatusCollector:
         if isinstance(part, Description):
             return self._put(self._descriptions, part)
         self.states_heard += 1
+        self._read(part.part)
         return self._put(self._states, part)
+
+    def put_off(self, unread: Unread) -> bool:
+        """Whether that is to be read once the whole is asked for: states come more often. What begins anew is not."""
+        known = self._states.get(unread.part)
+        if known is None or (unread.run, unread.parts) != (self._run, known.parts) or unread.sequence < known.sequence:
+            return False
+        waiting = self._unread.setdefault(unread.part, [])
+        if len(waiting) >= MOST_PUT_OFF:
+            return False
+        waiting.append(unread)
+        self.states_heard += 1
+        return True
+
+    def _read(self, index: int) -> None:
+        """Of what was put off of this MCU the newest one that is a state: others may hold anything."""
+        for unread in sorted(self._unread.pop(index, []), key=operator.attrgetter("sequence"), reverse=True):
+            state = codec.decode("STATE", unread.content)
+            if isinstance(state, Part):
+                self._put(self._states, state)
+                return
 
     def _put(self, parts: dict[int, Part], part: Part) -> bool:
         # Maybe of another configuration.
@@ -68,6 +93,8 @@ class StatusCollector:
 
     def status(self) -> model.Status:
         """Only when it has_motors()."""
+        for index in list(self._unread):
+            self._read(index)
         motors: dict[str, model.Motor] = {}
         mcus: dict[str, model.Mcu] = {}
         for index, state in sorted(self._states.items()):

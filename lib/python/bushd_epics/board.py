@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from typing import Any
 
 from . import alarms, events
@@ -20,6 +19,7 @@ class Board:
         self.name = name
         self.values: dict[str, Value] = {field: spec.initial for field, spec in FIELDS.items()}
         self.values["NAME"] = name
+        self.shown: set[str] | None = None  # fields whose values are told; None: all
         self._out: list[Event] = []
         self._alarm: Alarm | None = None
 
@@ -40,7 +40,8 @@ class Board:
             return
         if always or not _same(was, value):
             self.values[field] = value
-            self._out.append(events.Post(field, value))
+            if self.shown is None or field in self.shown:
+                self._out.append(events.Post(field, value))
 
     def post_all(self, values: dict[str, Value]) -> None:
         for field, value in values.items():
@@ -81,6 +82,6 @@ class Board:
 
 
 def _same(a: Value, b: Value) -> bool:
-    if isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b):
-        return True
-    return a == b and type(a) is type(b)
+    if a == b:
+        return type(a) is type(b)
+    return a != a and b != b  # neither is a number

@@ -21,6 +21,7 @@ from .record import Putter
 
 LONG_TEXT = 512
 MOST_CHARS = 256
+EPOCH_S = 631152000  # seconds of EPICS begin in 1990
 EVENTS = caproto.SubscriptionType.DBE_VALUE | caproto.SubscriptionType.DBE_LOG | caproto.SubscriptionType.DBE_ALARM
 
 PutFunction = Callable[[Value, Putter], None]
@@ -45,7 +46,8 @@ class Channel:
 
     def set_value(self: Any, value: Any) -> None:
         self._data["value"] = value
-        self._data["timestamp"] = caproto.TimeStamp.from_flexible_value(time.time())
+        seconds, nanoseconds = divmod(time.time_ns(), 1_000_000_000)
+        self._data["timestamp"] = caproto.TimeStamp(seconds - EPOCH_S, nanoseconds)
         self.tell_again()
 
     def tell_again(self: Any) -> None:

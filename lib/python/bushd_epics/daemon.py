@@ -263,10 +263,12 @@ class Daemon:
         await stopping
 
     def _set_timer(self, record: Record) -> None:
+        wake_at = record.wake_at()
+        if wake_at is None and record not in self._timers:  # as nearly always
+            return
         timer = self._timers.pop(record, None)
         if timer is not None:
             timer.cancel()
-        wake_at = record.wake_at()
         if wake_at is not None:
             loop = asyncio.get_running_loop()
             self._timers[record] = loop.call_at(wake_at, self._tick, record)

@@ -25,6 +25,7 @@ LOG = logging.getLogger("bushd-epics")
 LOOK_UP_EVERY_S = 10.0
 JOGS_ARE_LOOKED_AT_S = 0.25
 ABLE = ("Enable", "Disable")
+DESCRIBING = ("EGU", "PREC", "HLM", "LLM")  # what positions are told with
 
 
 class Pages:
@@ -39,6 +40,7 @@ class Pages:
             status=int(record.alarm.status), severity=int(record.alarm.severity), alarm_string=record.alarm.reason
         )
         self._fields: dict[str, Any] = {}
+        record.shown = set(DESCRIBING)
         self._able: Any = None
         self._compare: Leaves | None = None
         self._held = False
@@ -52,6 +54,7 @@ class Pages:
             channel.putter = lambda value, by: self._put(name, value, by)
             channel.reason = self._reason
             self._fields[name] = channel
+            self.record.shown = {*DESCRIBING, *self._fields}
             if spec.is_position and isinstance(channel, channels.Double):
                 self._describe(name, channel)
         return channel
@@ -78,7 +81,7 @@ class Pages:
         channel = self._fields.get(event.field)
         if channel is not None:
             channel.show(event.value)
-        if event.field in ("EGU", "PREC", "HLM", "LLM"):
+        if event.field in DESCRIBING:
             for name, described in self._fields.items():
                 if FIELDS[name].is_position and isinstance(described, channels.Double):
                     self._describe(name, described)

@@ -38,6 +38,7 @@ class View(Board):
         self.top = 1.0  # speed, in units a second: VMAX
         self.slipped = False
         self._scale_shown: Any = None
+        self._switches_shown: Any = None
 
     # -- what the shell tells
 
@@ -84,23 +85,22 @@ class View(Board):
 
     def show_status(self) -> None:
         """MSTA, of what the other fields say."""
-        seen, bits = self.seen, Msta()
-        up = bool(self.number("TDIR")) != seen.scale.negative
-        set_bits = (
-            (bits.DIRECTION, up),
-            (bits.DONE, self.values["DMOV"] == 1),
-            (bits.PLUS_LIMIT, seen.plus_limit),
-            (bits.AT_HOME, seen.at_home),
-            (bits.ENABLED, seen.enabled),
-            (bits.SLIP, self.slipped),
-            (bits.PROBLEM, self.alarm.severity >= Severity.MAJOR),
-            (bits.MOVING, self.values["MOVN"] == 1),
-            (bits.CAN_ENABLE, not self.is_axis),
-            (bits.COMM_ERROR, bool(self.silent) or not seen.live),
-            (bits.MINUS_LIMIT, seen.minus_limit),
-            (bits.HOMED, seen.user is not None and not seen.uncertain),
+        seen, values = self.seen, self.values
+        self.post(
+            "MSTA",
+            Msta.DIRECTION * (bool(values["TDIR"]) != seen.scale.negative)
+            | Msta.DONE * (values["DMOV"] == 1)
+            | Msta.PLUS_LIMIT * seen.plus_limit
+            | Msta.AT_HOME * seen.at_home
+            | Msta.ENABLED * seen.enabled
+            | Msta.SLIP * self.slipped
+            | Msta.PROBLEM * (self.alarm.severity >= Severity.MAJOR)
+            | Msta.MOVING * (values["MOVN"] == 1)
+            | Msta.CAN_ENABLE * (not self.is_axis)
+            | Msta.COMM_ERROR * (bool(self.silent) or not seen.live)
+            | Msta.MINUS_LIMIT * seen.minus_limit
+            | Msta.HOMED * (seen.user is not None and not seen.uncertain),
         )
-        self.post("MSTA", sum(bit for bit, is_set in set_bits if is_set))
 
     def _alarm_now(self) -> Alarm:
         """The worst of what is so. A number that nobody has heard of lately is INVALID, whatever else is so."""
@@ -150,7 +150,10 @@ class View(Board):
         self.post("UDF", int(seen.user is None))
         self.post("MOVN", int(seen.moving))
         if seen.steps is not None:
-            self.post_all({"RRBV": _long(seen.steps), "RMP": _long(seen.steps), "REP": _long(seen.steps)})
+            steps = _long(seen.steps)
+            self.post("RRBV", steps)
+            self.post("RMP", steps)
+            self.post("REP", steps)
         self.post("RVEL", _long(round(seen.steps_per_s)))
         self.post("DRBV", math.nan if seen.dial is None else seen.dial)
         self.post("RBV", math.nan if seen.user is None else seen.user)
@@ -160,6 +163,10 @@ class View(Board):
 
     def _show_switches(self, seen: Seen) -> None:
         high, low = seen.plus_limit, seen.minus_limit
+        now = (high, low, seen.at_home, seen.scale.negative)
+        if now == self._switches_shown:
+            return
+        self._switches_shown = now
         self.post_all({"RHLS": int(high), "RLLS": int(low), "ATHM": int(seen.at_home)})
         if seen.scale.negative:
             high, low = low, high
