@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, Hashable
 from typing import Any
 
 import bushd
@@ -126,10 +126,10 @@ class Asks:
 
     async def _stop_again(self, turn: Turn, client: bushd.aio.Client) -> None:
         """What was sent meanwhile to stop it may have overtaken it."""
-        again: set[Any] = set()
+        again: set[Hashable] = set()
         while late := turn.stopped - again:
             again |= late
-            await client.stop(*sorted(self._names[record] for record in late), wait=False, check=False)
+            await client.stop(*sorted(name for record, name in self._names.items() if record in late), wait=False, check=False)
 
     async def _move_ended(self, client: bushd.aio.Client, group: list[Waiting], result: model.MoveResult) -> None:
         status = None

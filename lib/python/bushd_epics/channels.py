@@ -1,3 +1,4 @@
+# mypy: allow-subclassing-any
 """Process variables as caproto has them. Their values are those of records; a put goes to whoever owns it, never straight to the value."""
 
 from __future__ import annotations
@@ -97,7 +98,8 @@ class Channel:
             value = converted if isinstance(converted, (str, bytes)) else converted[0]
             if isinstance(value, bytes):
                 value = value.decode("latin-1")
-            return self.to_value(value if text else float(value))
+            taken: Value = self.to_value(value if text else float(value))
+            return taken
         except (LookupError, ValueError, TypeError, OverflowError, caproto.CaprotoError) as error:
             raise BadPut(f"no value of this field: {error}") from None
 
@@ -151,7 +153,7 @@ class Doubles(Channel, caproto.ChannelDouble):
         if field != "PROC":
             return super().get_field(field)
         processed = Short(value=0)
-        processed.putter = lambda value, by: by.token("")
+        processed.putter = _take
         return processed
 
     def show(self, value: Any) -> None:
@@ -181,6 +183,11 @@ class Doubles(Channel, caproto.ChannelDouble):
 class Chars(Channel, caproto.ChannelChar):
     def show(self, value: Value) -> None:
         self.set_value(str(value).encode("latin-1", "replace")[: MOST_CHARS - 1].decode("latin-1"))
+
+
+def _take(value: Value, by: Putter) -> None:
+    """A put that nothing more comes of."""
+    by.token("")
 
 
 def _whole(value: str | float, limit: int) -> int:

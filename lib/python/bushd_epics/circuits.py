@@ -1,3 +1,4 @@
+# mypy: allow-subclassing-any
 """Channel Access circuits: puts go to records, and their answers wait their turn behind the values that were told before.
 
 caproto answers a put as soon as it is over, while monitors wait in queues: a client would hear that a move is done before it hears of
@@ -27,12 +28,13 @@ from .values import Event, Ready
 
 AT_ONCE = 256  # of what waits, in one packet
 MOST_WAITING = 8000
+TCP_USER_TIMEOUT = 18  # of Linux; type stubs do not name it
 ALIVE = (
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
     (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 1),
     (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1),
     (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3),
-    (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 3000),  # milliseconds
+    (socket.IPPROTO_TCP, TCP_USER_TIMEOUT, 3000),  # milliseconds
 )
 BYTES_ACKNOWLEDGED = struct.Struct("=120xQ")  # in what Linux tells by TCP_INFO
 
@@ -65,14 +67,15 @@ class Circuit(caproto_server.VirtualCircuit):
         None either where the PC has acknowledged any since this was asked last: to a client that reads often something is always on the way.
         """
         try:
-            unsent = struct.unpack("i", fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, b"\0\0\0\0"))[0]
+            unsent: int = struct.unpack("i", fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, b"\0\0\0\0"))[0]
             told = self._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, BYTES_ACKNOWLEDGED.size)
         except (OSError, ValueError):
             return 0  # it is closed: its end is told
         before, (self._acknowledged,) = self._acknowledged, BYTES_ACKNOWLEDGED.unpack(told)
         if self._acknowledged != before:
             return 0
-        return unsent + self.client.writer.transport.get_write_buffer_size()
+        here: int = self.client.writer.transport.get_write_buffer_size()
+        return unsent + here
 
     def show_life(self) -> None:
         """An answer to an echo that nobody has asked for: clients take it, and nothing follows."""

@@ -116,7 +116,8 @@ class Pages:
 
     def _put(self, name: str, value: Value, by: Putter) -> None:
         if name in ("JOGF", "JOGR") and value and self._jogs.renew(self.record, name, by.circuit, _now()):
-            return by.token("")
+            by.token("")
+            return
         if self._flights.flies(self.record) and (name == "STOP" and value or name == "SPMG" and not value):
             self._flights.stop(self.record, by)
             by = dataclasses.replace(by, token=None)
@@ -221,7 +222,8 @@ class Server(Context):
         """Of hosts that may put, as long as some were not found: at boot the network may not be there yet."""
         while True:
             await asyncio.sleep(LOOK_UP_EVERY_S)
-            if self.access.unknown and await asyncio.to_thread(self.access.look_up):
+            found = bool(self.access.unknown) and await asyncio.to_thread(self.access.look_up)
+            if found:
                 for circuit in self.circuits:
                     circuit.tell_rights()
 
