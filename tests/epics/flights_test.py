@@ -7,13 +7,17 @@ import types
 import unittest
 
 from bench import REST
-from bushd import Refused, model
-from bushd_epics.events import Speeds
+from bushd import NoDaemon, Refused, model
+from bushd_epics.events import Post, Speeds
 from bushd_epics.flights import Flights
 from bushd_epics.people import People
 from bushd_epics.profile import Profile
 from bushd_epics.record import Putter, Record
 
+RESULT = model.MotorResult(
+    motor="theta", outcome=model.Outcome.REACHED, position=1.5, dial=1.5, position_steps=150, unit="deg", precision=3,
+    table=model.TableRef("own", 1, "12345678"), asked_by="me", legs=1, most_steps_per_s=100.0,
+)  # fmt: skip
 START = {"theta": 0.0, "phi": 5.0}
 
 
@@ -25,11 +29,12 @@ async def settle():
 
 class Motion:
     def __init__(self):
+        self.motors = ()  # of its result
         self.ends = asyncio.get_running_loop().create_future()
 
     async def wait(self, *, check=True):
         outcome = await self.ends
-        return model.MoveResult(outcome, "" if outcome is model.Outcome.REACHED else f"it has ended: {outcome.value}")
+        return model.MoveResult(outcome, "" if outcome is model.Outcome.REACHED else f"it has ended: {outcome.value}", self.motors)
 
 
 class Client:
@@ -55,6 +60,9 @@ class Client:
         self.world.motions.append(Motion())
         return self.world.motions[-1]
 
+    async def status(self):
+        raise NoDaemon("it has gone")
+
     async def stop(self, *names, wait=True, check=True):
         self.world.sent.append((self.who, "stop", names))
 
@@ -62,6 +70,12 @@ class Client:
         self.world.sent.append((self.who, "compare", (name, position, positive, negative, width_us)))
         if self.world.refuses:
             raise Refused(self.world.refuses)
+
+
+    async def arm(self, motors, *, edge, delay_us, speed, while_connected):
+        if self.world.refuses:
+            raise Refused(self.world.refuses)
+        return await self._begin("arm", (dict(motors), edge, delay_us, speed, while_connected))
 
 
 class World:
@@ -76,7 +90,8 @@ class World:
             place = f"@hall:{1 + number // 2} {number % 2}"
             record.observe(dataclasses.replace(REST, place=place), 0.0)
             record.speeds(Speeds(top=25.0, least=1.0, ramp_s=0.2))
-        self.flights = Flights(People(self.connect), self.records)
+        self.posts = []  # of records, and answers
+        self.flights = Flights(People(self.connect), self.records, self.deliver)
         self.profile = Profile("LAB:pm1:", ["theta", "phi"])
         self.flights.add(self.profile, self.shown.__setitem__)
         for field, value in (
@@ -84,11 +99,18 @@ class World:
         ):  # fmt: skip
             self.put(field, value)
 
+    def deliver(self, record):
+        self.posts += [(event.field, event.value) for event in record.take() if isinstance(event, Post)]
+
     async def connect(self, program):
         return Client(self, program.removeprefix("epics:"))
 
     def by(self, token, who="me:pc"):
-        return Putter(who=who, token=lambda error: self.answers.__setitem__(token, error))
+        def answer(error):
+            self.answers[token] = error
+            self.posts.append(("answer", token))
+
+        return Putter(who=who, token=answer)
 
     def put(self, field, value, who="me:pc"):
         self.flights.put(self.profile, field, value, self.by(field, who))
@@ -263,6 +285,77 @@ class Compares(unittest.IsolatedAsyncioTestCase):
         with self.assertLogs("bushd-epics", "WARNING"):
             await self.put("theta", "PCOEnable", 1)
         self.assertEqual((self.world.answers["theta"], self.on()), (self.world.refuses, []))
+
+
+class Triggers(unittest.IsolatedAsyncioTestCase):
+    async def asyncSetUp(self):
+        self.world = World()
+        self.record = self.world.records["theta"]
+        self.values = self.world.flights.add_trigger(self.record, lambda field, value: None).values
+        self.record.put("VELO", 2.0, Putter(), 0.0)
+        self.put("_trgDistance", 1.5)
+
+    def put(self, field, value):
+        self.world.flights.put_trigger(self.record, field, value, self.world.by(f"{field} {value}"))
+
+    def whats(self):
+        return [what for _, what, _ in self.world.sent]
+
+    async def arm(self):
+        self.put("_trgArm", 1)
+        await settle()
+
+    async def test_it_waits_as_long_as_the_bridge_lives_and_keeps_velo(self):
+        await self.arm()
+        self.assertEqual(self.world.sent, [("me:pc", "arm", ({"theta": 1.5}, "rising", 50, 2.0, True))])
+        self.record.observe(dataclasses.replace(REST, armed=True), 0.0)
+        self.world.flights.look(self.record)
+        self.assertEqual((self.values["_trgState"], "_trgArm 1" in self.world.answers), (2, False))
+        self.world.end()
+        await settle()
+        self.assertEqual((self.values["_trgArm"], self.world.answers["_trgArm 1"]), (0, ""))
+        self.assertFalse(self.world.flights.flies(self.record))
+
+    async def test_the_last_position_is_told_before_the_end_and_no_state_of_before_makes_it_move_again(self):
+        await self.arm()
+        moving = dataclasses.replace(REST, user=1.0, dial=1.0, steps=100, moving=True, busy=True)
+        self.record.observe(moving, 0.0)
+        self.world.deliver(self.record)
+        self.world.posts.clear()
+        self.world.motions[-1].motors = (RESULT,)
+        self.world.end()
+        await settle()
+        self.assertEqual(self.world.answers["_trgArm 1"], "")
+        told = [post for post in self.world.posts if post[0] in ("RBV", "DMOV", "answer")]
+        self.assertEqual(told, [("RBV", 1.5), ("DMOV", 1), ("answer", "_trgArm 1")])
+        self.record.observe(moving, asyncio.get_running_loop().time())
+        self.world.deliver(self.record)
+        self.assertEqual((self.record.values["DMOV"], self.record.values["RBV"]), (1, 1.5))
+
+    async def test_stops_take_it_back_at_any_moment(self):
+        self.put("_trgArm", 1)
+        self.world.flights.no_more()
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await settle()
+        self.assertEqual((self.world.sent, self.values["_trgArm"], self.values["_trgMessage"]), ([], 0, "stopped before it began"))
+        self.world.accepts.clear()
+        await self.arm()
+        self.put("_trgArm", 0)
+        await settle()
+        self.assertEqual((self.whats(), self.world.answers["_trgArm 0"]), (["arm", "stop"], ""))
+        self.world.accepts.set()
+        await settle()
+        self.assertEqual(self.whats(), ["arm", "stop", "stop"])  # the first one may have overtaken it
+        self.world.end(model.Outcome.STOPPED)
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await settle()
+        self.assertEqual((self.values["_trgArm"], self.values["_trgState"]), (0, 0))
+
+    async def test_a_refusal_fails_the_put(self):
+        self.world.refuses = "theta is held"
+        with self.assertLogs("bushd-epics", "WARNING"):
+            await self.arm()
+        self.assertEqual((self.world.answers["_trgArm 1"], self.values["_trgMessage"]), (self.world.refuses,) * 2)
 
 
 if __name__ == "__main__":

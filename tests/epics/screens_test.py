@@ -8,13 +8,14 @@ import tempfile
 import unittest
 import xml.etree.ElementTree as ET
 
-from bushd_epics import screens
+from bushd_epics import screens, trigger
 from bushd_epics.fields import FIELDS
 
 PREFIX = "LAB:"
 MOTORS = ("theta", "hall:slit<1>", "Theta", "a-b")
 RECORDS = [PREFIX + motor for motor in MOTORS]
 VARIABLES = {f"{record}.{field}" for record in RECORDS for field in FIELDS} | {f"{record}_able" for record in RECORDS} | {"LAB:allstop", "LAB:deferMoves"}
+VARIABLES |= {f"{record}{field}" for record in RECORDS for field in trigger.FIELDS}
 # What widgets of Phoebus there are, with the version of each whose properties these are.
 WIDGETS = {
     "label": "2.0.0", "textupdate": "2.0.0", "textentry": "3.0.0", "choice": "2.0.0", "led": "2.0.0", "byte_monitor": "2.0.0",
@@ -76,8 +77,8 @@ class Screens(unittest.TestCase):
         named = {name.removeprefix("ca://").removesuffix("$") for name in reader.variables}
         self.assertEqual(named - VARIABLES, set())
         for record in RECORDS:
-            for field in ("VAL", "RBV", "STOP", "MSTA", "AMSG"):
-                self.assertIn(f"{record}.{field}", named)
+            for field in (".VAL", ".RBV", ".STOP", ".MSTA", ".AMSG", "_trgArm"):
+                self.assertIn(f"{record}{field}", named)
         self.assertEqual({file for file, _ in reader.opened}, set(self.names()), "one is opened by nobody")
 
     def test_each_motor_has_a_screen_whatever_its_name(self):
@@ -110,7 +111,7 @@ class Screens(unittest.TestCase):
     def test_what_is_written_again_follows_the_installation(self):
         self.write()
         self.write(["LAB:phi"])
-        self.assertEqual(self.names(), ["motor-phi.bob", "motor.bob", "overview.bob", "row.bob"])
+        self.assertEqual(self.names(), ["motor-phi.bob", "motor.bob", "overview.bob", "row.bob", "trigger.bob"])
         (embedded,) = ET.fromstring((self.folder / "overview.bob").read_bytes()).iterfind("widget[@type='embedded']")
         self.assertEqual(macros_of(embedded)["M"], "phi")
         self.assertEqual((self.folder / "motor.bob").stat().st_mode & 0o777, 0o644)

@@ -79,6 +79,10 @@ class LabTest(EndToEndTest):
         self.assertIsNotNone(value, name)
         return value
 
+    def get_anew(self, name):
+        """By a client that connects only now: one that has lost its connection may look for the bridge some seconds later."""
+        return caproto_client.read(f"LAB:{name}", timeout=GIVE_UP_S, repeater=False).data[0]
+
     def put(self, name, value, wait=True):
         self.assertIsNotNone(pyepics().caput(f"LAB:{name}", value, wait=wait, timeout=GIVE_UP_S), name)
 

@@ -134,7 +134,7 @@ class Asks:
     async def _move_ended(self, client: bushd.aio.Client, group: list[Waiting], result: model.MoveResult) -> None:
         status = None
         if not result.outcome.succeeded:
-            status = await _status(client)
+            status = await status_of(client)
         for record, ask in group:
             one = result[self._names[record]]
             if status is None:
@@ -179,7 +179,7 @@ class Asks:
 
     async def _stop_and_look(self, client: bushd.aio.Client, record: Record) -> None:
         await client.stop(self._names[record])
-        self._observe(record, await _status(client))
+        self._observe(record, await status_of(client))
 
     async def _end_jog(self, record: Record, ask: events.EndJog) -> None:
         """A jog whose beginning is not answered yet ends as soon as it is, or never begins."""
@@ -214,7 +214,7 @@ class Asks:
             except bushd.RequestFailed as error:
                 outcome, reason = ENDS[error.result.outcome], error.result.reason
             turn.taken()
-            self._observe(record, await _status(client))
+            self._observe(record, await status_of(client))
             self._tell(record, record.ended, ask.number, outcome, reason)
         except bushd.BushdError as error:
             self._failed(record, ask, error, turn.was_sent)
@@ -296,7 +296,7 @@ def _end_of(result: model.MoveResult, name: str) -> tuple[str, str]:
     return ENDS[outcome], "" if outcome.succeeded else result.reason
 
 
-async def _status(client: bushd.aio.Client) -> model.Status | None:
+async def status_of(client: bushd.aio.Client) -> model.Status | None:
     """As it is now; None where nobody answers, which the watch will tell as well."""
     try:
         return await client.status()

@@ -50,7 +50,7 @@ class Daemon:
         self._speeds_of: dict[str, Any] = {}
         self._timers: dict[Record, asyncio.TimerHandle] = {}
         self._asks = Asks(self._people, self._names, self.deliver)
-        self.flights = Flights(self._people, self.records)
+        self.flights = Flights(self._people, self.records, self.deliver)
         self.deferred = Deferred()
         self._heard_at = 0.0
         self._silent = False
@@ -120,6 +120,7 @@ class Daemon:
                 record.observe(motor.seen(told), now)
                 self._shown.held(record, told.held)
                 self.deliver(record)
+                self.flights.look(record)
         for name in self.records.keys() - status.motors.keys():
             self._last.pop(name, None)
             self._silence(self.records[name], GONE)

@@ -30,6 +30,7 @@ class Seen:
     target: float | None = None
     moving: bool = False
     busy: bool = False  # a motion is open, though the motor may stand at the moment
+    armed: bool = False  # it waits for an edge at the trigger input, as its MCU has confirmed
     live: bool = True  # its MCU tells where it is
     uncertain: str = ""  # why the position is not to be trusted; "": it is
     steps_per_s: float = 0.0

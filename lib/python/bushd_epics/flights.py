@@ -1,4 +1,4 @@
-"""Carries out what profiles and position compares of one daemon ask for, by `bushd.aio`."""
+"""Carries out what profiles, position compares and triggers of one daemon ask for, by `bushd.aio`."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ import bushd.aio
 from bushd import model
 from bushd.motion import Motion
 
-from . import compare, events, profile
-from .asks import ENDS, NEVER_BEGAN
+from . import compare, events, motor, profile, trigger
+from .asks import ENDS, NEVER_BEGAN, Deliver, status_of
 from .compare import Compare
 from .events import End, Seen
 from .people import People
 from .profile import BadProfile, Profile, Trajectory
 from .record import Putter, Record
+from .trigger import Trigger
 
 LOG = logging.getLogger("bushd-epics")
 POINTS_ARE_TOLD_EVERY_S = 0.1
@@ -33,13 +34,15 @@ class Flight:
 
 
 class Flights:
-    def __init__(self, people: People, records: Mapping[str, Record]) -> None:
-        """`records`: by motor."""
+    def __init__(self, people: People, records: Mapping[str, Record], deliver: Deliver) -> None:
+        """`records`: by motor. `deliver`: what a record has to say."""
         self._people = people
         self._records = records
-        self._under_way: dict[Profile, Flight] = {}
-        self._shows: dict[Profile | Compare, Show] = {}
+        self._deliver_record = deliver
+        self._under_way: dict[Profile | Trigger, Flight] = {}
+        self._shows: dict[Profile | Compare | Trigger, Show] = {}
         self._compares: dict[Record, Compare] = {}
+        self._triggers: dict[Record, Trigger] = {}
         self._comparing = asyncio.Lock()  # what was put last holds
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -48,6 +51,11 @@ class Flights:
 
     def add_compare(self, record: Record, show: Show) -> Compare:
         made = self._compares[record] = Compare(record.name)
+        self._shows[made] = show
+        return made
+
+    def add_trigger(self, record: Record, show: Show) -> Trigger:
+        made = self._triggers[record] = Trigger(record.name)
         self._shows[made] = show
         return made
 
@@ -60,6 +68,18 @@ class Flights:
         one.put(field, value, by)
         self._deliver_compare(record, one)
 
+    def put_trigger(self, record: Record, field: str, value: Any, by: Putter) -> None:
+        one = self._triggers[record]
+        one.put(field, value, by)
+        self._deliver_trigger(record, one)
+
+    def look(self, record: Record) -> None:
+        """Its motor may wait for an edge, or have begun to move by one."""
+        one = self._triggers.get(record)
+        if one is not None:
+            one.see(record.seen)
+            self._deliver_trigger(record, one)
+
     async def finish(self) -> None:
         """Once nothing is under way any more."""
         while self._tasks:
@@ -68,13 +88,13 @@ class Flights:
     # -- stops
 
     def flies(self, record: Record) -> bool:
-        motor = self._motor(record)
-        return any(motor in flight.motors for flight in self._under_way.values())
+        name = self._motor(record)
+        return any(name in flight.motors for flight in self._under_way.values())
 
     def stop(self, record: Record, by: Putter) -> None:
         """The flights of this record's motor, with all their motors; the put is answered when the daemon has answered."""
-        motor = self._motor(record)
-        flights = [flight for flight in self._under_way.values() if motor in flight.motors]
+        name = self._motor(record)
+        flights = [flight for flight in self._under_way.values() if name in flight.motors]
         for flight in flights:
             flight.stopped = True
         motors = sorted({name for flight in flights for name in flight.motors})
@@ -120,18 +140,18 @@ class Flights:
                     self._under_way[one] = Flight(event.trajectory.motors)
                     self._spawn(self._fly(one, event))
                 case profile.Abort():
-                    self._abort(one, event.by)
+                    self._abort(one, event.by, lambda: self._deliver(one))
 
-    def _abort(self, one: Profile, by: Putter) -> None:
+    def _abort(self, one: Profile | Trigger, by: Putter, deliver: Callable[[], None]) -> None:
         flight = self._under_way.get(one)
         if flight is None:
             one.aborted(by)
-            return self._deliver(one)
+            return deliver()
         flight.stopped = True
 
         def answer(error: str) -> None:
             one.aborted(by, error)
-            self._deliver(one)
+            deliver()
 
         self._spawn(self._stop(list(flight.motors), str(by.who), answer))
 
@@ -156,8 +176,10 @@ class Flights:
             async def follow() -> Motion:
                 return await client.follow(made.motors, made.time_s, made.rows, cubic=True, wait=False)
 
-            end, reason = await self._leg(flight, client, move)
-            return await self._leg(flight, client, follow, one) if end == End.REACHED else (end, reason)
+            result = await self._leg(flight, client, move)
+            if result is not None and result.outcome.succeeded:
+                result = await self._leg(flight, client, follow, one)
+            return await self._ended(flight, client, result)
 
         end, reason = await self._over(str(ask.who), flies)
         del self._under_way[one]
@@ -166,10 +188,10 @@ class Flights:
 
     async def _leg(
         self, flight: Flight, client: bushd.aio.Client, begin: Callable[[], Awaitable[Motion]], one: Profile | None = None
-    ) -> tuple[str, str]:
-        """`one`: this is what the profile calls its execution."""
+    ) -> model.MoveResult | None:
+        """None: it never began. `one`: this is what the profile calls its execution."""
         if flight.stopped:
-            return End.STOPPED, NEVER_BEGAN
+            return None
         motion = await begin()
         if flight.stopped:  # the stop may have overtaken it
             await client.stop(*flight.motors, wait=False, check=False)
@@ -179,10 +201,30 @@ class Flights:
             self._deliver(one)
             telling = asyncio.create_task(self._tell_points(one))
         try:
-            result = await motion.wait(check=False)
+            return await motion.wait(check=False)
         finally:
             if telling is not None:
                 telling.cancel()
+
+    async def _ended(self, flight: Flight, client: bushd.aio.Client, result: model.MoveResult | None) -> tuple[str, str]:
+        """Who hears of the end has heard where the motors stand."""
+        if result is None:
+            return End.STOPPED, NEVER_BEGAN
+        rest = {one.motor: one for one in result} if result.outcome.succeeded else {}
+        status = None if result.outcome.succeeded else await status_of(client)
+        now = asyncio.get_running_loop().time()
+        for name, record in self._records.items():
+            if name in rest:
+                record.comes_to_rest(motor.seen_at_end(record.seen, rest[name]), now)
+            elif name in flight.motors and status is not None and name in status.motors:
+                seen = motor.seen(status.motors[name])
+                if seen.moving or seen.busy:
+                    record.observe(seen, now)
+                else:
+                    record.comes_to_rest(seen, now)
+            else:
+                continue
+            self._deliver_record(record)
         return ENDS[result.outcome], "" if result.outcome.succeeded else result.reason
 
     async def _tell_points(self, one: Profile) -> None:
@@ -224,7 +266,7 @@ class Flights:
             raise BadProfile(f"{motor}: {record.silent or 'its MCU is offline'}")
         return record.seen
 
-    def _tell(self, one: Profile | Compare, event: events.Post | events.Done, where: str = "") -> None:
+    def _tell(self, one: Profile | Compare | Trigger, event: events.Post | events.Done, where: str = "") -> None:
         """`where`: begins the line of the log, where the error does not say it."""
         if isinstance(event, events.Post):
             self._shows[one](event.field, event.value)
@@ -262,6 +304,41 @@ class Flights:
                 if other is not record and its.is_on and _mcu(other) == _mcu(record):
                     its.replaced()
                     self._deliver_compare(other, its)
+
+    # -- triggers
+
+    def _deliver_trigger(self, record: Record, one: Trigger) -> None:
+        for event in one.take():
+            match event:
+                case events.Post() | events.Done():
+                    self._tell(one, event, f"{one.name}: ")
+                case trigger.Arm():
+                    self._under_way[one] = Flight((self._motor(record),))
+                    self._spawn(self._arm(record, one, event))
+                case trigger.Disarm():
+                    self._abort(one, event.by, lambda: self._deliver_trigger(record, one))
+
+    async def _arm(self, record: Record, one: Trigger, ask: trigger.Arm) -> None:
+        """The daemon disarms it when this process has ended: nobody would be told of the move any more."""
+        flight = self._under_way[one]
+        (name,) = flight.motors
+
+        async def waits(client: bushd.aio.Client) -> tuple[str, str]:
+            async def arm() -> Motion:
+                return await client.arm(
+                    {name: ask.distance},
+                    edge="falling" if ask.falling else "rising",
+                    delay_us=ask.delay_us,
+                    speed=record.floor("VELO"),
+                    while_connected=True,
+                )
+
+            return await self._ended(flight, client, await self._leg(flight, client, arm))
+
+        end, reason = await self._over(str(ask.who), waits)
+        del self._under_way[one]
+        one.over(End.STOPPED if flight.stopped and end != End.REACHED else end, reason)
+        self._deliver_trigger(record, one)
 
     def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(coroutine)

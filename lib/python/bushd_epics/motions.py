@@ -224,6 +224,10 @@ class Motions(View):
         elif rests:
             self._follow_target()
 
+    def expect_late(self, now: float) -> None:
+        """It has come to rest, as somebody else has told who may be faster than its states."""
+        self._late_until = now + LATE_STATE_S
+
     def is_late(self, moves: bool, now: float) -> bool:
         """A state from before the end of the last motion: it is not to be shown."""
         if self._late_until is None:
@@ -360,7 +364,7 @@ class Motions(View):
         self._follow_target()
         self.post_all({"MOVN": 0, "MIP": 0, "JOGF": 0, "JOGR": 0, "HOMF": 0, "HOMR": 0})
         if now is not None:
-            self._late_until = now + LATE_STATE_S
+            self.expect_late(now)
         self.show()
         self.post("MOVN", 0)
         self.post("DMOV", 1)

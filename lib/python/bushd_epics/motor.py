@@ -23,6 +23,7 @@ def seen(motor: model.Motor) -> Seen:
         target_steps=motor.target_steps,
         moving=motor.moving,
         busy=motor.activity in (model.Activity.MOVE, model.Activity.HOME),
+        armed=motor.activity is model.Activity.ARMED,
         live=motor.trust not in (model.Trust.UNKNOWN, model.Trust.STALE),
         uncertain="" if motor.trust in TRUSTED else motor.uncertain_reason or motor.trust.value,
         steps_per_s=motor.velocity_steps_per_s,
@@ -52,6 +53,7 @@ def seen_at_end(before: Seen, result: model.MotorResult) -> Seen:
         target_steps=result.position_steps,
         moving=False,
         busy=False,
+        armed=False,
         steps_per_s=0.0,
     )
 

@@ -78,6 +78,11 @@ class Record(Motions):
         self.show()
         self.follow(now)
 
+    def comes_to_rest(self, seen: Seen, now: float) -> None:
+        """At the end of a motion that the record has not asked for."""
+        self.observe(seen, now)
+        self.expect_late(now)
+
     def fall_silent(self, why: str, now: float) -> None:
         """Nothing is heard of the motor any more; what was asked for is told by `lost` and `refused`."""
         self.silent = why

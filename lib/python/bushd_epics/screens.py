@@ -39,7 +39,7 @@ class NotOurs(Exception):
 def make(prefix: str, records: Iterable[str]) -> dict[str, bytes]:
     """Files by name, for records whose names begin with the prefix; the overview is the last one, as it needs the others."""
     motors = sorted(name.removeprefix(prefix) for name in records)
-    screens = {"motor.bob": _motor(), "row.bob": _row()}
+    screens = {"motor.bob": _motor(), "row.bob": _row(), "trigger.bob": _trigger()}
     for motor, file in _files(motors).items():
         screens[file] = _wrapper(prefix, motor)
     screens["overview.bob"] = _overview(prefix, motors)
@@ -179,6 +179,10 @@ def _field(name: str) -> str:
     return f"ca://$(P)$(M).{name}"
 
 
+def _trg(name: str) -> str:
+    return f"ca://$(P)$(M)_trg{name}"
+
+
 REASON = _field("AMSG") + "$"  # as long as it is: a text of Channel Access has 40 characters
 ALL_STOP = "ca://$(P)allstop"
 ABLE = "ca://$(P)$(M)_able"
@@ -221,11 +225,28 @@ def _row() -> bytes:
 def _motor() -> bytes:
     page = Page("$(P)$(M)", 640, 640)
     page.label("$(P)$(M)", (10, 8, 300, 28), 20, bold=True)
-    page.shows(_field("DESC"), (320, 10, 310, 24), text=True)
+    page.shows(_field("DESC"), (320, 10, 220, 24), text=True)
+    page.opens("Trigger", "trigger.bob", (550, 8, 80, 28))
     _add_positions(page, 46)
     _add_moves(page, 204)
     _add_settings(page, 300)
     _add_state(page, 460)
+    return page.bytes()
+
+
+def _trigger() -> bytes:
+    page = Page("Trigger of $(P)$(M)", 420, 190)
+    page.label("Trigger of $(P)$(M)", (10, 8, 400, 28), 20, bold=True)
+    page.label("Edge", (10, 46, 105, 24))
+    page.chooses(_trg("Edge"), (120, 46, 160, 24))
+    for row, (title, name) in enumerate((("Delay, us", "Delay"), ("Distance", "Distance"))):
+        at = 76 + 26 * row
+        page.label(title, (10, at, 105, 22))
+        page.takes(_trg(name), (120, at, 160, 22))
+    page.shows(_trg("State"), (300, 46, 110, 24))
+    page.puts("Arm", _trg("Arm"), (300, 76, 110, 28))
+    page.puts("Stop", _field("STOP"), (300, 110, 110, 28), RED)
+    page.shows(_trg("Message"), (10, 156, 400, 24), text=True)
     return page.bytes()
 
 

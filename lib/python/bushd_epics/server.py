@@ -10,7 +10,7 @@ from typing import Any
 
 import caproto
 
-from . import channels, compare, events
+from . import channels, compare, events, trigger
 from .access import Access
 from .circuits import Circuit, Context
 from .daemon import Daemon
@@ -43,6 +43,7 @@ class Pages:
         record.shown = set(DESCRIBING)
         self._able: Any = None
         self._compare: Leaves | None = None
+        self._trigger: Leaves | None = None
         self._held = False
 
     def field(self, name: str) -> Any:
@@ -77,6 +78,16 @@ class Pages:
         self._compare.describe(str(self.record.values["EGU"]), int(self.record.values["PREC"]))
         return channel
 
+    def trigger(self, name: str) -> Any:
+        """`NAME_trgArm` and what belongs to it. Raises KeyError."""
+        if self._trigger is None:
+            made = self._flights.add_trigger(self.record, lambda field, value: leaves.show(field, value))
+            leaves = Leaves(trigger.FIELDS, made.values, self._put_trigger, self._alarm)
+            self._trigger = leaves
+        channel = self._trigger.find(name)
+        self._trigger.describe(str(self.record.values["EGU"]), int(self.record.values["PREC"]))
+        return channel
+
     def post(self, event: events.Post) -> None:
         channel = self._fields.get(event.field)
         if channel is not None:
@@ -93,8 +104,9 @@ class Pages:
         )
         for channel in [*self._fields.values(), *([] if self._able is None else [self._able])]:
             channel.take_alarm()
-        if self._compare is not None:
-            self._compare.alarm_has_changed()
+        for leaves in (self._compare, self._trigger):
+            if leaves is not None:
+                leaves.alarm_has_changed()
 
     def held(self, held: bool) -> None:
         if held != self._held:
@@ -126,6 +138,9 @@ class Pages:
 
     def _put_compare(self, name: str, value: Any, by: Putter) -> None:
         self._flights.put_compare(self.record, name, value, by)
+
+    def _put_trigger(self, name: str, value: Any, by: Putter) -> None:
+        self._flights.put_trigger(self.record, name, value, by)
 
     def _put_able(self, value: Value, by: Putter) -> None:
         self.record.hold(bool(value), by)
@@ -176,8 +191,9 @@ class Server(Context):
         """All of them."""
         records = [f"{name}.{field}" for name in sorted(self._pages) for field in FIELDS]
         able = [f"{name}_able" for name in sorted(self._pages)]
-        compares = [f"{name}{field}" for name, pages in sorted(self._pages.items()) if not pages.record.is_axis for field in compare.FIELDS]
-        return [*records, *able, *compares, *all_fields(profile for profile, _ in self._profiles.values()), *self._common]
+        motors = [name for name, pages in sorted(self._pages.items()) if not pages.record.is_axis]
+        beside = [f"{name}{field}" for name in motors for field in (*compare.FIELDS, *trigger.FIELDS)]
+        return [*records, *able, *beside, *all_fields(profile for profile, _ in self._profiles.values()), *self._common]
 
     def records(self) -> list[str]:
         """The names of motors and axes that are shown."""
@@ -209,14 +225,15 @@ class Server(Context):
         return self._find_beside(record).get_field(field)
 
     def _find_beside(self, name: str) -> Any:
-        """A variable of a profile or of a position compare. Raises KeyError."""
+        """A variable of a profile, of a position compare or of a trigger. Raises KeyError."""
         begins, colon, field = name.rpartition(":")
         if begins + colon in self._profiles:
             return self._profiles[begins + colon][1].find(field)
-        motor, pco, field = name.rpartition("PCO")
-        if not pco or self._pages[motor].record.is_axis:
-            raise KeyError(name)
-        return self._pages[motor].compare(pco + field)
+        for begin, find in (("PCO", Pages.compare), ("_trg", Pages.trigger)):
+            motor, _, field = name.rpartition(begin)
+            if motor in self._pages and not self._pages[motor].record.is_axis:
+                return find(self._pages[motor], begin + field)
+        raise KeyError(name)
 
     async def look_up_names(self) -> None:
         """Of hosts that may put, as long as some were not found: at boot the network may not be there yet."""
