@@ -73,6 +73,37 @@ class Faults(BlueskyTest):
         self.assertEqual((positions["a0"], positions["b1"]), (10, FAR))
         self.assertIn((0, found), self.rests_in_trace("a0", "b1"))
 
+    def test_a_killed_daemon_fails_a_flight_of_which_nothing_is_told(self):
+        import bluesky.plan_stubs as bps
+        import bluesky.plans as bp
+
+        import bushd
+        from bushd.ophyd_async import Path, PathFlyer, UntrustedPosition
+
+        self.bring_up_lab()
+        (flyer,) = self.connected(PathFlyer(self.daemon, "flyer"))
+        (b1,) = self.motors_of("b1")
+        self.when_moving("b1", 300, lambda: self.bushd.send(signal.SIGKILL))
+
+        def plan():
+            yield from bps.prepare(flyer, Path(["b1"], [(0.0,), (FAR / 2,), (FAR,)]), wait=True)
+            yield from bp.fly([flyer])
+
+        cause = self.cause_of(plan())
+        self.assertIsInstance(cause, bushd.ResultUnknown)
+        self.assertIn("the daemon has ended", str(cause))
+        self.assertEqual([kind for kind, _ in self.documents if kind.startswith("event")], [])
+
+        self.bushd = self.start_bushd("moves-after.jsonl")
+        self.wait_until_ready()
+        self.wait_until("b1 to rest", lambda: not self.motors()["b1"]["moving"])
+        with self.assertRaisesRegex(UntrustedPosition, "its position is uncertain"):
+            self.in_loop(b1.read)
+        stands = self.positions()["b1"]
+        self.assertLess(stands, FAR)
+        self.end_programs()
+        self.assertEqual(self.traced_positions()["b1"], stands)
+
 
 if __name__ == "__main__":
     main()

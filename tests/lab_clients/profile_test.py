@@ -2,10 +2,12 @@
 """Profile moves and position compare as clients of the motor module have them, by pyepics against the real programs."""
 
 import re
+import signal
+import threading
 import unittest
 
-from lab import PLACES, STEPS, LabTest, pyepics
-from rig import Trace
+from lab import PLACES, STEPS, LabTest, caproto_client, pyepics
+from rig import GIVE_UP_S, Trace
 
 NAMES = '[profiles]\npm1 = ["theta", "phi"]\n'
 SUCCESS, FAILURE, ABORT = 1, 2, 3
@@ -15,7 +17,7 @@ SPEED = 5.0  # of theta, in degrees a second
 SLOT_NS = 20_000
 
 
-class Profiles(LabTest):
+class ProfileTest(LabTest):
     def bring_up_profile(self, *options):
         self.file("names.toml").write_text(NAMES)
         self.bring_up_lab(bridge=["--names", self.file("names.toml"), *options])
@@ -46,6 +48,8 @@ class Profiles(LabTest):
                 arrivals[at] = edge.time_ns
         return arrivals
 
+
+class Profiles(ProfileTest):
     def test_positions_are_passed_at_their_times(self):
         self.bring_up_profile()
         self.assertEqual((self.get("pm1:NumAxes"), self.get("pm1:BuildStatus", as_string=True)), (2, "Undefined"))
@@ -157,6 +161,72 @@ class Profiles(LabTest):
             variable = pyepics().PV(f"LAB:{name}")
             self.assertTrue(variable.wait_for_connection(timeout=20))
             self.assertEqual((variable.read_access, variable.write_access), (True, False), name)
+
+
+class ProfileFaults(ProfileTest):
+    """Far from its end something fails. The put is caproto's, which tells how it was answered, or that it never will be."""
+
+    def begin_flight(self):
+        self.bring_up_profile()
+        self.prepare([0.0, 20.0, 40.0], [0.0, 5.0, 20.0], period_s=4.0)
+        self.assertEqual(self.ends("Build")[0], SUCCESS, self.text("BuildMessage"))
+        self.came = []  # of the put
+        self.putting = threading.Thread(target=self.execute)
+        self.putting.start()
+        self.wait_until_travelled(600, "theta")
+
+    def execute(self):
+        try:
+            response = caproto_client.write("LAB:pm1:Execute", 1, notify=True, timeout=GIVE_UP_S, repeater=False)
+            self.came.append(response.status.name)
+        except Exception as error:
+            self.came.append(type(error).__name__)
+
+    def wait_for_rest(self):
+        self.wait_until("the motors to rest", lambda: not any(motor["moving"] for motor in self.motors().values()))
+
+    def assert_steps(self, stand):
+        """By the trace, all motors stand where the daemon has said."""
+        self.end_all()
+        self.assertEqual({name: self.steps_made(name) for name in stand}, stand)
+
+    def test_the_bridge_is_killed_and_the_flight_goes_on(self):
+        self.begin_flight()
+        self.bridge.end(signal.SIGKILL)
+        self.putting.join()
+        self.assertNotEqual(self.came, ["ECA_NORMAL"])
+        self.bridge = self.start_bridge("--names", self.file("names.toml"))
+        # It does not know how that flight goes, nor how it ends.
+        words = ("Execute", "ExecuteState", "ExecuteStatus", "ReadbackStatus")
+        self.assertEqual([self.get_anew(f"pm1:{name}") for name in words], [b"Done", b"Done", b"Undefined", b"Undefined"])
+        self.assertEqual(self.get_anew("theta.DMOV"), 0)
+        self.wait_for_rest()
+        self.wait_until("theta to be done", lambda: self.get_anew("theta.DMOV") == 1)
+        run_s = 0.25 + 0.5 / 64  # behind the last point, by its speed
+        stand = self.positions()
+        self.assertEqual((stand["theta"], stand["phi"]), (round((40 + 5 * run_s) * STEPS), round((20 + 3.75 * run_s) * STEPS)))
+        self.assertEqual(self.get_anew("theta.SEVR"), b"NO_ALARM")
+        self.assertEqual(caproto_client.write("LAB:pm1:Readback", 1, notify=True, repeater=False).status.name, "ECA_PUTFAIL")
+        self.assert_steps(stand)
+
+    def test_the_daemon_is_killed_and_the_motors_run_down(self):
+        self.begin_flight()
+        self.bushd.end(signal.SIGKILL)
+        self.putting.join()
+        self.assertEqual(self.came, ["ECA_PUTFAIL"])
+        self.assertEqual(self.ends("Execute"), (FAILURE, 0, 0))
+        self.assertIn("the daemon has ended", self.text("ExecuteMessage"))
+        self.bushd = self.start_bushd("moves-after.jsonl")
+        self.wait_until_ready()
+        self.wait_for_rest()
+        for name in ("theta", "phi"):
+            self.wait_for(f"{name}.DMOV", lambda done: done == 1)
+            self.wait_for(f"{name}.SEVR", lambda severity: severity == 2)  # nobody has seen how it came to rest
+        self.assertTrue(self.put_fails("pm1:Readback", 1))
+        stand = self.positions()
+        self.assertLess(stand["theta"], 4000)
+        self.assertEqual([round(self.get(f"{name}.RBV") * STEPS) for name in stand], list(stand.values()))
+        self.assert_steps(stand)
 
 
 class PositionCompare(LabTest):
