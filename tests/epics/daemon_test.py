@@ -2,10 +2,13 @@
 """The motors of a daemon as records: ones that are gone, faults of the bridge itself, and a stop of all."""
 
 import asyncio
+import itertools
 import types
 import unittest
+from unittest import mock
 
 from bench import REST
+from bushd import NoDaemon
 from bushd_epics import daemon as module
 from bushd_epics.daemon import Daemon
 
@@ -64,6 +67,27 @@ class Records(unittest.IsolatedAsyncioTestCase):
             await asyncio.sleep(module.AGAIN_AFTER_S / 10)
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
+
+    async def test_a_daemon_that_has_gone_is_looked_for_twice_a_second_or_oftener_however_long_it_is_gone(self):
+        """On a clock that the pauses between tries wind."""
+        self.daemon._take(told("theta"), 0.0)
+        now, tries = 0.0, []
+
+        async def sleep(delay_s):
+            nonlocal now
+            now += delay_s
+            if now > 60:
+                raise asyncio.CancelledError
+
+        async def connect(socket, program):
+            tries.append(now)
+            raise NoDaemon("there is none")
+
+        with mock.patch.object(module, "connect", connect), mock.patch.object(asyncio, "sleep", sleep), self.assertLogs("bushd-epics", "WARNING") as log:
+            with self.assertRaises(asyncio.CancelledError):
+                await self.daemon._keep_following()
+        self.assertLessEqual(max(later - one for one, later in itertools.pairwise([*tries, 60.0])), 0.5)
+        self.assertEqual((len(log.output), self.daemon.records["theta"].values["SEVR"]), (1, 3))
 
     async def test_it_ends_when_nobody_looks_any_more_whether_it_is_silent(self):
         async def follow():
