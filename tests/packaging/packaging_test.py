@@ -51,7 +51,7 @@ class Layout(Installation):
             if file.name == "bushd-firmware.install":
                 continue
             for line in file.read_text().split():
-                if line == "usr/share/bushd-web":  # the page, which tools/package builds
+                if line == "usr/share/bushd-web/page":  # the page, which tools/package builds
                     continue
                 yield line.removeprefix("usr/").replace("lib/*/", "lib/").replace("${env:SYSTEM_LIBDIR}", "lib")
 
