@@ -8,9 +8,12 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <exception>
 #include <iterator>
 #include <utility>
 #include <vector>
+
+#include "base/printable.h"
 
 namespace bushweb {
 namespace {
@@ -93,7 +96,13 @@ int on_library_event(lws* wsi, lws_callback_reasons reason, void* /*user*/, void
                         (reason == LWS_CALLBACK_CLIENT_CONNECTION_ERROR && in != nullptr);
   const std::string_view text =
       has_text ? std::string_view(static_cast<const char*>(in), length) : std::string_view();
-  return server->on_event(wsi, static_cast<int>(reason), text);
+  // Nothing may pass through the library, which is C. One connection ends, and nobody else's.
+  try {
+    return server->on_event(wsi, static_cast<int>(reason), text);
+  } catch (const std::exception& fault) {
+    fmt::print(stderr, "bushd-web: a connection is closed: {}\n", bushd::printable(fault.what()));
+    return reason == LWS_CALLBACK_RAW_RX_FILE ? 0 : -1;  // that one is ours
+  }
 }
 
 const std::array<lws_protocols, 5> kProtocols{

@@ -185,8 +185,9 @@ Answer Site::log_out(const Visit& /*visit*/) const {
 Answer Site::cookie(int status, const std::string& token, std::int64_t seconds) const {
   Answer answer = json_answer(status, "{}");
   answer.headers.emplace_back(
-      "set-cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", kCookie,
-                                token, seconds, options_.access.tls ? "; Secure" : ""));
+      "set-cookie",
+      fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", kCookie, token, seconds,
+                  options_.access.tls || options_.access.behind_proxy ? "; Secure" : ""));
   return answer;
 }
 
