@@ -6,6 +6,8 @@
 namespace bushd::daemon {
 namespace {
 
+constexpr std::uint32_t kBitsPerByte = 10;  // a start bit, 8 bits, a stop bit
+
 api::McuHealth health_of(const Mcu& mcu) {
   const link::McuView& view = mcu.view();
   const link::McuHealth& health = mcu.bus().health(mcu.on_bus());
@@ -48,6 +50,8 @@ api::HealthSnapshot HealthPublisher::health_of(std::int64_t now_us, const Bus& b
   out.stray_frames = health.stray_frames;
   out.recent_latency_us = health.latency.recent_us;
   out.start_margin_us = bus.master.start_margin_us(now_us);
+  out.line_bytes = health.line_bytes;
+  out.line_bytes_per_s = bus.config.baud / kBitsPerByte;
   for (std::size_t i = 0; i < health.latency.count.size(); ++i) {
     const bool last = i == link::Latency::kBoundsUs.size();
     out.latency.push_back({.below_us = last ? INT64_MAX : link::Latency::kBoundsUs[i],

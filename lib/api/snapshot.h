@@ -249,7 +249,9 @@ struct HealthSnapshot {
   std::uint64_t crc_errors = 0;
   std::uint64_t stray_frames = 0;
   std::int64_t recent_latency_us = 0;
-  std::int64_t start_margin_us = 0;  // left to the daemon at a start; 0: a bus without MCUs
+  std::int64_t start_margin_us = 0;   // left to the daemon at a start; 0: a bus without MCUs
+  std::uint64_t line_bytes = 0;       // sent and received; 0: a bus without MCUs
+  std::int64_t line_bytes_per_s = 0;  // that its line can carry
   std::vector<Latency> latency{};
   std::vector<McuHealth> mcus{};
   static void fields(auto& self, auto& visit) {
@@ -260,6 +262,8 @@ struct HealthSnapshot {
     visit("stray_frames", self.stray_frames);
     visit("recent_latency_us", self.recent_latency_us);
     visit("start_margin_us", self.start_margin_us);
+    visit("line_bytes", self.line_bytes);
+    visit("line_bytes_per_s", self.line_bytes_per_s);
     visit.list("latency_count", "latency", self.latency);
     visit.list("mcu_count", "mcus", self.mcus);
   }

@@ -21,6 +21,7 @@ TEST(Health, OfAQuietBus) {
   EXPECT_EQ(health.port_state, "open");
   EXPECT_FALSE(health.two_masters);
   EXPECT_EQ(health.crc_errors, 0);
+  EXPECT_EQ(health.line_bytes_per_s, 50'000);
   EXPECT_EQ(health.latency.back().below_us, INT64_MAX);
   std::uint64_t answers = 0;
   for (const auto& latency : health.latency) answers += latency.answers;

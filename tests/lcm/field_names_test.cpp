@@ -475,6 +475,8 @@ TEST(FieldNames, Health) {
                                         .stray_frames = 7,
                                         .recent_latency_us = 8,
                                         .start_margin_us = 15,
+                                        .line_bytes = 16,
+                                        .line_bytes_per_s = 17,
                                         .latency = {{.below_us = 9, .answers = 10}},
                                         .mcus = {{.mcu = "m",
                                                   .address = 1,
@@ -502,6 +504,8 @@ TEST(FieldNames, Health) {
   EXPECT_EQ(health.stray_frames, 7);
   EXPECT_EQ(health.recent_latency_us, 8);
   EXPECT_EQ(health.start_margin_us, 15);
+  EXPECT_EQ(health.line_bytes, 16);
+  EXPECT_EQ(health.line_bytes_per_s, 17);
   EXPECT_EQ(health.latency.at(0).below_us, 9);
   EXPECT_EQ(health.latency.at(0).answers, 10);
   const mcu_health_t& mcu = health.mcus.at(0);

@@ -179,6 +179,15 @@ std::string open_metrics(const std::vector<Measured>& daemons) {
   each_bus(daemons, [&](const std::string& labels, const api::HealthSnapshot& bus) {
     out.sample("_total", labels, bus.crc_errors);
   });
+  out.family("bushd_bus_line_bytes", "counter", "Bytes sent and received on the line");
+  each_bus(daemons, [&](const std::string& labels, const api::HealthSnapshot& bus) {
+    out.sample("_total", labels, bus.line_bytes);
+  });
+  out.family("bushd_bus_line_bytes_per_second", "gauge",
+             "Bytes that the line can carry in a second");
+  each_bus(daemons, [&](const std::string& labels, const api::HealthSnapshot& bus) {
+    out.sample("", labels, bus.line_bytes_per_s);
+  });
   tell_latencies(out, daemons);
   return std::move(out).end();
 }

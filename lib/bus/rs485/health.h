@@ -55,6 +55,7 @@ struct Latency {
 struct BusHealth {
   std::uint64_t crc_errors = 0;    // frames that reached the master broken
   std::uint64_t stray_frames = 0;  // valid frames that nobody had been asked for
+  std::uint64_t line_bytes = 0;    // sent and received
   Latency latency;
 };
 

@@ -88,6 +88,7 @@ void Rs485Master::port_lost(std::int64_t now_us, const std::string& cause) {
 
 void Rs485Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
   notice_standing_still(now_us);
+  transactions_.count_bytes(bytes.size());
   transactions_.receive(now_us, bytes);
 }
 
@@ -123,6 +124,7 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   }
   while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
   }
+  transactions_.count_bytes(writer_.bytes().size());
   return writer_.bytes();
 }
 

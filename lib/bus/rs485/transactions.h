@@ -92,6 +92,7 @@ class Transactions {
   std::int64_t patience_us() const { return patience_us_; }
 
   const BusHealth& health() const { return health_; }
+  void count_bytes(std::size_t bytes) { health_.line_bytes += bytes; }
 
  private:
   struct Awaited {

@@ -259,6 +259,8 @@ class BusHealth:
     stray_frames: int
     recent_latency_us: int
     start_margin_us: int
+    line_bytes: int  # sent and received
+    line_bytes_per_s: int  # that the line can carry
     latency: tuple[tuple[int | None, int], ...]  # (below so many us, answers); None: above all bounds
     mcus: tuple[McuHealth, ...]
 

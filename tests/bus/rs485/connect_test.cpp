@@ -41,6 +41,19 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
   EXPECT_EQ(bus.master->bus_health().crc_errors, 0u);
 }
 
+TEST(Connect, WhatTheLineCarriesIsCounted) {
+  FakeBus bus(2);
+  bus.connect();
+  bus.run_for(1'000'000);
+  // An answer may be on its way.
+  const auto all_counted = [&] {
+    return static_cast<std::int64_t>(bus.master->bus_health().line_bytes) ==
+           bus.master_bytes + bus.slave_bytes;
+  };
+  EXPECT_TRUE(bus.run_until(all_counted, 1'000'000));
+  EXPECT_GT(bus.master_bytes, 0);
+}
+
 TEST(Connect, ClearsTheFaultsThatItHasReadOf) {
   for (const bool named : {false, true}) {
     for (const std::uint8_t faults : Bytes{0, BUSHD_FAULT_LINK | BUSHD_FAULT_SYNC}) {

@@ -36,6 +36,7 @@ export interface Bus {
   health: BusHealth;
   heardMs: number;
   crc: Rate;
+  line: Rate; // bytes
   mcus: Map<string, { crc: Rate; repeats: Rate }>;
 }
 
@@ -134,13 +135,14 @@ export class Model {
       if (!bus) {
         bus = {
           key: keyOf(daemon.name, health.bus), daemon: daemon.name, name: health.bus, health,
-          heardMs: nowMs, crc: new Rate(), mcus: new Map(),
+          heardMs: nowMs, crc: new Rate(), line: new Rate(), mcus: new Map(),
         };
         daemon.buses.set(health.bus, bus);
       }
       bus.health = health;
       bus.heardMs = nowMs;
       bus.crc.take(health.crc_errors, nowMs);
+      bus.line.take(health.line_bytes, nowMs);
       for (const mcu of health.mcus) {
         const rates = bus.mcus.get(mcu.mcu) ?? { crc: new Rate(), repeats: new Rate() };
         rates.crc.take(mcu.crc_errors, nowMs);

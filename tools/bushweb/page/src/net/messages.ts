@@ -110,6 +110,8 @@ export interface BusHealth {
   stray_frames: number;
   recent_latency_us: number;
   start_margin_us: number;
+  line_bytes: number;
+  line_bytes_per_s: number;
   latency: LatencyBin[];
   mcus: McuHealth[];
 }

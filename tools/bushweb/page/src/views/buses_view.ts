@@ -68,6 +68,7 @@ export class BusesView implements View {
       ["Tick", mcus[0]?.about ? microseconds(mcus[0].about.tick_ns / 1000) : "–"],
       ["Errors at the PC", `${health.crc_errors}, ${perSecond(bus.crc.perSecond())}`],
       ["Stray frames", String(health.stray_frames)],
+      ["Line busy", busy(bus.line.perSecond(), health.line_bytes_per_s)],
       ["Recent latency", microseconds(health.recent_latency_us)],
       ["Start margin", health.start_margin_us === 0 ? "–" : microseconds(health.start_margin_us)],
     ] : [["Health", "not reported yet"]];
@@ -111,6 +112,10 @@ export class BusesView implements View {
   private heard(mcu: Mcu): string {
     return this.app.model.isOld(mcu) ? `${age(this.app.model.ageMs(mcu))} ago` : "now";
   }
+}
+
+function busy(bytesPerSecond: number | undefined, most: number): string {
+  return bytesPerSecond === undefined || most === 0 ? "–" : `${short((100 * bytesPerSecond) / most, 3)} %`;
 }
 
 function perSecond(rate: number | undefined): string {
