@@ -77,7 +77,14 @@ bool is_served(const std::string& path) {
   return served;
 }
 
-std::string why_closed(const std::string& path) {
+// `looks`: it may take a moment to find out.
+std::string why_closed(const std::string& path, bool looks) {
+  if (!looks) {
+    return fmt::format(
+        "the daemon has ended, or has closed this connection at {}: it has restarted, or this "
+        "client did not read what it was sent; its log tells why",
+        path);
+  }
   if (!is_served(path)) return fmt::format("the daemon has ended; it was at {}", path);
   return fmt::format(
       "bushd has closed this connection at {}: too many clients are connected, this one did not "
@@ -116,7 +123,7 @@ class SocketLink : public Link {
       header.msg_iovlen = 1;
       const ssize_t n = ::recvmsg(fd_, &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
       if (n < 0 && (errno == EAGAIN || errno == EINTR)) return {};
-      if (n <= 0) return fail(why_closed(path_));
+      if (n <= 0) return fail(why_closed(path_, send_within_ms_ > 0));
       if ((header.msg_flags & MSG_TRUNC) != 0) continue;
       const auto view = control::view_of({buffer_.data(), static_cast<std::size_t>(n)});
       if (!view) continue;

@@ -1,6 +1,7 @@
 """Who may what, by what a browser says of itself."""
 
 import json
+import socket
 
 from lab import WebTest, main
 from websocket import Ended, Refused
@@ -45,6 +46,26 @@ class WebAccess(WebTest):
         page.take_until(lambda: not page.hello["may_command"])
         self.assertFalse(self.open_page(cookie=headers["set-cookie"].partition(";")[0]).hello["may_command"])
 
+    def test_who_logs_out_commands_from_no_tab_any_more(self):
+        self.bring_up_web()
+        cookie = self.log_in(self.make_token())
+        tabs = [self.open_page(cookie=cookie) for _ in range(2)]
+        other = self.open_page(self.make_token("bert"))
+        self.assertEqual(self.http("POST", "/api/logout", "{}", Cookie=cookie)[0], 200)
+        for tab in tabs:
+            tab.take_until(lambda tab=tab: not tab.hello["may_command"])
+        self.assertTrue(other.hello["may_command"])
+
+    def test_one_request_has_one_answer(self):
+        self.bring_up_web()
+        with socket.create_connection(("127.0.0.1", self.port), timeout=30) as raw:
+            raw.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\nabcd")
+            answer = b""
+            while part := raw.recv(65536):
+                answer += part
+        self.assertEqual(answer.count(b"HTTP/1.1 "), 1)
+        self.assertTrue(answer.startswith(b"HTTP/1.1 405"), answer[:40])
+
     def test_wrong_tokens_are_refused_and_soon_not_even_tried(self):
         self.bring_up_web()
         good = self.make_token()
@@ -53,7 +74,7 @@ class WebAccess(WebTest):
         self.assertEqual(statuses[:10], [403] * 10)
         # One more is taken each ten seconds.
         self.assertIn(429, statuses[10:])
-        self.assertIn(self.http("POST", "/api/login", json.dumps({"token": good}))[0], (200, 429))
+        self.assertEqual(self.http("POST", "/api/login", json.dumps({"token": good}))[0], 200)
         for body in ("", "{}", "[]", "{\"token\": 7}", "x" * 4096):
             self.assertIn(self.http("POST", "/api/login", body)[0], (400, 429))
         self.assertFalse(self.open_page(cookie=f"bushd_web={wrong}").hello["may_command"])

@@ -3,7 +3,7 @@
 import json
 import signal
 
-from lab import WebTest, main
+from lab import WebTest, free_port, main
 
 FAR = 200_000  # 80 s: under way until something ends it
 
@@ -130,6 +130,19 @@ class WebPage(WebTest):
         self.assertIn(f"http://127.0.0.1:{there_port}", hutch.daemons["hutch"]["why"])
         self.assertTrue(hutch.daemons["bushd"]["connected"])
 
+    def test_a_far_page_that_is_away_keeps_nobody_out(self):
+        nobody = free_port()
+        self.bring_up_web("--remote", f"hutch=http://localhost:{nobody}")
+        watcher = self.open_page(daemon="hutch")
+        causes = []
+        while len(causes) < 4:  # attempts that failed
+            told = watcher.take()
+            if told["kind"] == "alive":
+                # Two seconds apart: twenty messages.
+                causes.append(self.http("GET", "/metrics")[0])
+        self.assertEqual(set(causes), {200})
+        self.open_page()
+
     def test_programs_read_state_and_metrics(self):
         self.bring_up_web()
         page = self.open_page()
@@ -144,6 +157,10 @@ class WebPage(WebTest):
         self.assertIn('bushd_motor_trust{daemon="bushd",mcu="hall:1",motor="a0",bushd_motor_trust="known"} 1\n', body)
         self.assertRegex(body, r'bushd_daemon_cpu_seconds_total\{daemon="bushd"\} 0\.\d+\n')
         self.assertTrue(body.endswith("# EOF\n"))
+        self.bushd.send(signal.SIGSTOP)
+        self.wait_until("it to be old", lambda: self.http("GET", "/api/state")[0] == 503)
+        self.assertIn('bushd_up{daemon="bushd"} 0\n', self.http("GET", "/metrics")[2])
+        self.bushd.send(signal.SIGCONT)
 
 
 if __name__ == "__main__":

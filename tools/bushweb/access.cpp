@@ -52,10 +52,12 @@ std::string why_not_host(const Visit& visit, const AccessOptions& options) {
          "--host NAME";
 }
 
-bool is_foreign(const Visit& visit) {
+bool is_foreign(const Visit& visit, const AccessOptions& options) {
   if (visit.origin.empty()) return false;
   const std::size_t scheme = visit.origin.find("://");
   if (scheme == std::string::npos) return true;
+  const bool secure = options.tls || options.behind_proxy;
+  if (secure && lower(visit.origin.substr(0, scheme)) != "https") return true;
   return lower(visit.origin.substr(scheme + 3)) != lower(visit.host);
 }
 

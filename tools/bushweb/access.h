@@ -41,8 +41,8 @@ inline constexpr std::string_view kCookie = "bushd_web";
 // Why a request is not answered, whatever it asks for; "": it is.
 std::string why_not_host(const Visit& visit, const AccessOptions& options);
 // What changes something is to come from a page of ours. Programs that are no browsers name no
-// origin.
-bool is_foreign(const Visit& visit);
+// origin. Where pages have TLS, one without is somebody else's too.
+bool is_foreign(const Visit& visit, const AccessOptions& options);
 
 // "127.0.0.1" and its like, "::1".
 bool is_loopback(std::string_view address);

@@ -15,6 +15,8 @@ namespace tables = bushd::tables;
 namespace profiles = tables::profiles;
 using nlohmann::ordered_json;
 
+constexpr std::size_t kMostCodes = 2 * 65535;
+
 ordered_json index_of(const std::optional<std::size_t>& index) {
   return index ? ordered_json(*index) : ordered_json(nullptr);
 }
@@ -26,6 +28,9 @@ Text told(std::int64_t id, const char* outcome, const std::string& reason, order
 }  // namespace
 
 Text checked(std::int64_t id, const api::TableFile& table) {
+  const std::size_t codes =
+      table.content.accel.size() + (table.content.decel ? table.content.decel->size() : 0);
+  if (codes > kMostCodes) return refused(id, "a table has at most 65535 codes on each side");
   if (const auto fault = tables::check(table.content)) {
     return told(id, "fault", fault->message,
                 {{{"severity", "error"},

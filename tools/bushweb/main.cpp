@@ -181,8 +181,7 @@ int serve(const Wanted& wanted) {
   fmt::print("bushd-web: the page is at {}://{}/\n", wanted.certificate.empty() ? "http" : "https",
              bushd::printable(wanted.listen));
   std::fflush(stdout);
-  server.run(site);
-  return 0;
+  return server.run(site) ? 0 : kFailed;
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "base/json_text.h"
 #include "base/overloaded.h"
 #include "base/printable.h"
+#include "shallow_json.h"
 
 namespace bushweb {
 namespace {
@@ -54,7 +55,7 @@ std::optional<std::string> text_at(const json& object, const char* name) {
 const json& object_at(const json& object, const char* name) {
   static const json kNone = json::object();
   const auto found = object.find(name);
-  return found == object.end() ? kNone : *found;
+  return found == object.end() || found->is_null() ? kNone : *found;
 }
 
 Result<Ask> ask_of(const json& told) {
@@ -64,7 +65,10 @@ Result<Ask> ask_of(const json& told) {
   auto request =
       request_of(std::type_identity<api::Request::variant>{}, *name, object_at(told, "fields"));
   if (!request) return bushd::fail(fmt::format("{}: {}", *name, request.error().text()));
-  return Ask{.daemon = *daemon, .request = std::move(*request)};
+  Ask ask{.daemon = *daemon, .request = std::move(*request)};
+  const auto heard = told.find("heard");
+  if (heard != told.end() && heard->is_number_integer()) ask.heard = heard->get<std::int64_t>();
+  return ask;
 }
 
 template <class What>
@@ -119,7 +123,7 @@ ordered_json detail_json(const api::Detail& detail) {
 }  // namespace
 
 FromPage parse(std::string_view text) {
-  const json told = json::parse(text, nullptr, false);
+  const json told = shallow_json(text);
   if (!told.is_object()) return {.id = 0, .what = Wrong{"a JSON object is expected"}};
   const auto number = told.find("id");
   if (number == told.end() || !number->is_number_integer() || number->get<std::int64_t>() <= 0) {
@@ -157,8 +161,8 @@ Text hello(std::string_view version, const Rights& rights,
                   {"daemons", daemons}});
 }
 
-Text alive() {
-  return std::make_shared<const std::string>(R"({"kind":"alive"})");
+Text alive(std::int64_t at) {
+  return std::make_shared<const std::string>(fmt::format(R"({{"kind":"alive","at":{}}})", at));
 }
 
 Text reply(std::int64_t id, const api::Reply& reply) {

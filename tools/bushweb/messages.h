@@ -24,6 +24,8 @@ using Text = std::shared_ptr<const std::string>;
 struct Ask {
   std::string daemon{};
   api::Request request{};
+  // The newest `alive` that the page has heard; none: it does not say, as programs.
+  std::optional<std::int64_t> heard{};
 };
 // What is to be said of a table that is not stored yet.
 struct Check {
@@ -58,8 +60,8 @@ struct Rights {
 };
 
 Text hello(std::string_view version, const Rights& rights, const std::vector<std::string>& daemons);
-// That bushd-web is there, where there is nothing else to say.
-Text alive();
+// That bushd-web is there; `at` grows.
+Text alive(std::int64_t at);
 Text reply(std::int64_t id, const api::Reply& reply);
 Text refused(std::int64_t id, std::string_view reason);
 // A result of bushd-web's own: `detail` is an object of one member.

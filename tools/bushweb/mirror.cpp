@@ -81,6 +81,7 @@ void Mirror::hear_state(const lcm::StateMessage& message) {
   const lcm::Part& part = message.part;
   hear_from(part);
   collector_.add(message);
+  heard_ = true;
   utime_us_ = std::max(utime_us_, part.utime_us);
   Mcu& mcu = mcus_[part.part];
   const auto& motors = message.snapshot.motors;

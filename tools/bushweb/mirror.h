@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/status.h"
@@ -27,6 +28,8 @@ class Mirror {
   void lose(std::string why);
   void hear(const bushd::lcm::DaemonMessage& message);
 
+  // A state has come since the last call.
+  bool take_heard() { return std::exchange(heard_, false); }
   // What has come since the last call, for those who have been told all that was before.
   std::vector<Text> news();
   // All that there is, for who has been told nothing; to be followed by news() made later.
@@ -67,6 +70,7 @@ class Mirror {
   std::string daemon_;
   std::string why_ = "bushd-web has just started";
   bool connection_fresh_ = true;
+  bool heard_ = false;
   bool full_ = true;  // what comes next replaces all that was told
   std::int64_t run_ = 0;
   std::int32_t part_count_ = 0;

@@ -31,8 +31,9 @@ class Surroundings {
   virtual ~Surroundings() = default;
   virtual void tell(const Text& text) = 0;
   virtual bool has_daemon(const std::string& daemon) const = 0;
-  // `program`: what history calls it.
+  // `link`: what on_reply() and on_end() call it. `program`: what history calls it.
   virtual bushd::Result<std::unique_ptr<Connection>> connect(const std::string& daemon,
+                                                             const std::string& link,
                                                              const std::string& program) = 0;
   // What `bushctl doctor` says of this daemon, later, as reply `id`.
   virtual void run_doctor(const std::string& daemon, std::int64_t id) = 0;
@@ -45,6 +46,13 @@ class Page {
   // Messages: so many at once, and so many a second.
   static constexpr double kBurst = 300;
   static constexpr double kPerSecond = 100;
+  // Those larger than this, which only who may command sends: so many bytes at once, and a second.
+  static constexpr std::size_t kSmall = 4096;
+  static constexpr double kByteBurst = 2'000'000;
+  static constexpr double kBytesPerSecond = 500'000;
+  // What a page asks that has not heard of bushd-web for so long comes late: a network has held it
+  // back, and whoever asked has given up.
+  static constexpr std::int64_t kLateUs = 2'000'000;
 
   Page(Surroundings& surroundings, Rights rights, std::int64_t now_us);
 
@@ -52,9 +60,9 @@ class Page {
   void set_rights(const Rights& rights);
 
   void hear(std::string_view text, std::int64_t now_us);
-  void on_reply(const std::string& daemon, std::int64_t number, const api::Reply& reply);
-  // The connection to this daemon has ended: what was under way is answered.
-  void on_end(const std::string& daemon, const std::string& why);
+  void on_reply(const std::string& link, std::int64_t number, const api::Reply& reply);
+  // The connection has ended: what was under way is answered.
+  void on_end(const std::string& link, const std::string& why);
 
  private:
   struct Link {
@@ -62,17 +70,19 @@ class Page {
     std::map<std::int64_t, std::int64_t> ids{};  // of open requests, by their numbers
   };
 
-  void ask(std::int64_t id, const Ask& ask);
-  void check(std::int64_t id, const api::TableFile& table);
+  void ask(std::int64_t id, const Ask& ask, std::int64_t now_us);
+  // Why it has not been sent; "": it has.
+  std::string send(std::int64_t id, const Ask& ask, const std::string& link);
   // "": it may.
-  std::string why_not(const api::Request& request) const;
+  std::string why_not(const Ask& ask, std::int64_t now_us) const;
   std::size_t open_requests() const;
-  bool is_within_rate(std::int64_t now_us);
+  bool is_within_rate(std::size_t bytes, std::int64_t now_us);
   std::string program() const;
 
   Surroundings& surroundings_;
   Rights rights_;
-  double tokens_ = kBurst;
+  double messages_left_ = kBurst;
+  double bytes_left_ = kByteBurst;
   std::int64_t filled_at_us_;
   std::map<std::string, Link> links_{};
 };

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/fields_from_json.h"
+#include "shallow_json.h"
 
 namespace bushweb {
 namespace {
@@ -18,6 +19,7 @@ namespace lcm = bushd::lcm;
 using nlohmann::json;
 
 constexpr std::int64_t kMostParts = 4096;
+constexpr std::size_t kMostMotors = 1024;  // of an MCU, or of the axes of a bus
 
 std::string text_in(const json& object, const char* name) {
   const auto found = object.find(name);
@@ -58,6 +60,7 @@ void take_motors(api::StateSnapshot& mcu, const json& told) {
     if (!motor) continue;
     const auto known = std::ranges::find(mcu.motors, motor->name, &api::MotorState::name);
     if (known == mcu.motors.end()) {
+      if (mcu.motors.size() >= kMostMotors) continue;
       mcu.motors.push_back(std::move(*motor));
     } else {
       *known = std::move(*motor);
@@ -97,6 +100,7 @@ bushd::Result<RemoteName> remote_name(const std::string& told) {
   if (colon == std::string_view::npos || colon == 0) return wrong();
   if (!is_port(place.substr(colon + 1), remote.port)) return wrong();
   remote.host = place.substr(0, colon);
+  std::erase_if(remote.host, [](char c) { return c == '[' || c == ']'; });
   return remote;
 }
 
@@ -121,14 +125,17 @@ void Remote::on_end(const std::string& why) {
 
 void Remote::on_text(std::string_view text) {
   heard_at_us_ = now_us_;
-  const json told = json::parse(text, nullptr, false);
+  const json told = shallow_json(text);
   if (!told.is_object()) return;
   const std::string kind = text_in(told, "kind");
-  if (kind == "hello" && name_.daemon.empty()) {
+  if (kind == "hello") {
     const json& daemons = list_in(told, "daemons");
-    if (!daemons.empty() && daemons[0].is_string()) name_.daemon = daemons[0].get<std::string>();
+    daemon_ = name_.daemon;
+    if (daemon_.empty() && !daemons.empty() && daemons[0].is_string()) {
+      daemon_ = daemons[0].get<std::string>();
+    }
   }
-  if (text_in(told, "daemon") != name_.daemon) return;
+  if (text_in(told, "daemon") != daemon_) return;
   if (kind == "daemon") {
     if (is_true(told, "connected")) {
       mirror_.connect();

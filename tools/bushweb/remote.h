@@ -61,6 +61,7 @@ class Remote : public Source {
   RemoteName name_;
   Dialer& dialer_;
   Mirror mirror_;
+  std::string daemon_{};  // as it is called there
   bool dialled_ = false;
   bool open_ = false;
   std::int64_t now_us_ = 0;

@@ -129,6 +129,7 @@ bushd::Result<void> Server::open(const ServerOptions& options) {
   info.user = this;
   info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
   info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;  // for TLS of either side
+  info.timeout_secs = kHandshakeSeconds;
   info.max_http_header_data2 = kHeaderBytes;
   info.max_http_header_pool2 = kMostConnections;
   context_ = lws_create_context(&info);
@@ -166,22 +167,23 @@ bushd::Result<void> Server::open(const ServerOptions& options) {
   return {};
 }
 
-void Server::run(Site& site) {
+bool Server::run(Site& site) {
   site_ = &site;
-  while (!ended_ && lws_service(context_, 0) >= 0) {
-  }
+  int result = 0;
+  while (!ended_ && result >= 0) result = lws_service(context_, 0);
   site_ = nullptr;
+  return ended_;
 }
 
 int Server::on_event(lws* wsi, int reason, std::string_view in) {
   switch (reason) {
     case LWS_CALLBACK_FILTER_NETWORK_CONNECTION:
-      return connections_ >= kMostConnections ? 1 : 0;
+      return connections_.size() >= kMostConnections ? 1 : 0;
     case LWS_CALLBACK_WSI_CREATE:
-      ++connections_;
+      connections_.insert(wsi);
       return 0;
-    case LWS_CALLBACK_WSI_DESTROY:
-      --connections_;
+    case LWS_CALLBACK_WSI_DESTROY:  // also of a connection to another bushd-web that never was
+      connections_.erase(wsi);
       exchanges_.erase(wsi);
       upgrading_.erase(wsi);
       return 0;
@@ -230,13 +232,17 @@ int Server::on_event(lws* wsi, int reason, std::string_view in) {
 
 int Server::on_http(lws* wsi, std::string_view path) {
   Exchange& exchange = exchanges_[wsi];
-  exchange = {.visit = visit_of(wsi, std::string(path))};
+  exchange = Exchange();
+  exchange.visit = visit_of(wsi, std::string(path));
   const std::string told = header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
   std::size_t length = 0;
   const auto read = std::from_chars(told.data(), told.data() + told.size(), length);
   const bool readable = told.empty() || read.ec == std::errc{};
   if (exchange.visit.method == "POST" && readable && length <= kMostBody && length > 0) return 0;
-  exchange.close = exchange.visit.method != "GET";
+  // A body that nobody has asked for would be answered again when it comes.
+  const bool bare = told.empty() && header(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING).empty();
+  exchange.close = exchange.visit.method != "GET" || !bare;
+  if (exchange.visit.method == "GET" && !bare) exchange.visit.method = "GET with a body";
   return begin_answer(wsi);
 }
 
@@ -249,6 +255,7 @@ int Server::on_body(lws* wsi, std::string_view bytes) {
 
 int Server::begin_answer(lws* wsi) {
   Exchange& exchange = exchanges_[wsi];
+  if (std::exchange(exchange.begun, true)) return -1;
   exchange.answer = site_->answer(exchange.visit);
   const Answer& answer = exchange.answer;
   std::vector<unsigned char> space(LWS_PRE + kHeaderBytes);
@@ -298,15 +305,16 @@ int Server::on_upgrade(lws* wsi) {
   const lws_protocols* protocol = lws_get_protocol(wsi);
   Visit visit = visit_of(wsi, header(wsi, WSI_TOKEN_GET_URI));
   const bool ours = protocol != nullptr && std::string_view(protocol->name) == kPageProtocol;
-  const std::string why = !ours                         ? "pages speak the protocol \"bushd\""
-                          : pages_.size() >= kMostPages ? "too many pages are open"
-                                                        : site_->why_no_page(visit);
+  const std::size_t most = site_->is_preferred(visit) ? kMostPages : kMostPages - kKeptPages;
+  const bool full = pages_.size() >= most;
+  const std::string why = !ours  ? "pages speak the protocol \"bushd\""
+                          : full ? "too many pages are open"
+                                 : site_->why_no_page(visit);
   if (why.empty()) {
     upgrading_[wsi] = std::move(visit);
     return 0;
   }
-  const unsigned status = pages_.size() >= kMostPages ? 503 : 403;
-  lws_return_http_status(wsi, status, why.c_str());
+  lws_return_http_status(wsi, full ? 503 : 403, why.c_str());
   return 1;
 }
 
@@ -363,14 +371,23 @@ void Server::close_deaf() {
   }
 }
 
+// The library would look the name up while everybody waits.
 void Server::dial(Remote& remote) {
+  lookup_.start(remote.name().host, [this, &remote](const bushd::Result<std::string>& address) {
+    if (site_ == nullptr) return;  // `remote` is the site's
+    if (!address) return remote.on_end(address.error().text());
+    connect(remote, *address);
+  });
+}
+
+void Server::connect(Remote& remote, const std::string& address) {
   const RemoteName& name = remote.name();
   const std::string host = fmt::format("{}:{}", name.host, name.port);
   lws* wsi = nullptr;
   lws_client_connect_info info{};
   info.context = context_;
   info.vhost = vhost_;
-  info.address = name.host.c_str();
+  info.address = address.c_str();
   info.port = name.port;
   info.ssl_connection = name.tls ? LCCSCF_USE_SSL : 0;
   info.path = "/api/live";

@@ -7,10 +7,12 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 
 #include "base/result.h"
+#include "host_lookup.h"
 #include "poller.h"
 #include "site.h"
 
@@ -32,6 +34,8 @@ class Server : public Outlet, public Dialer {
   // Connections, and pages among them.
   static constexpr std::size_t kMostConnections = 512;
   static constexpr std::size_t kMostPages = 200;
+  // Of these so many are for pages that may stop or command.
+  static constexpr std::size_t kKeptPages = 100;
   // What a page may send in one message, and a request over HTTP as its body.
   static constexpr std::size_t kMostMessage = 512 * 1024;
   static constexpr std::size_t kMostBody = 4096;
@@ -41,15 +45,16 @@ class Server : public Outlet, public Dialer {
   // A page that has not taken anything for so long is closed.
   static constexpr std::int64_t kDeafUs = 10'000'000;
 
-  explicit Server(Poller& poller) : poller_(poller) {}
+  explicit Server(Poller& poller) : poller_(poller), lookup_(poller) {}
   ~Server() override;
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   // Listens. Errors: the address or the port is taken or not of this PC; the files of TLS.
   bushd::Result<void> open(const ServerOptions& options);
-  // Serves `site`, which is there as long, until end().
-  void run(Site& site);
+  // Serves `site`, which is there as long, until end(). Returns false where something else has
+  // ended it.
+  bool run(Site& site);
   void end() { ended_ = true; }
   // Ends pages that take nothing.
   void close_deaf();
@@ -70,6 +75,7 @@ class Server : public Outlet, public Dialer {
     Answer answer{};
     std::size_t sent = 0;  // of the body
     bool close = false;    // afterwards
+    bool begun = false;    // the answer
   };
   struct OpenPage {
     lws* wsi = nullptr;
@@ -87,14 +93,16 @@ class Server : public Outlet, public Dialer {
   int on_message(lws* wsi, std::string_view bytes);
   int write_text(lws* wsi);
   void on_page_closed(lws* wsi);
+  void connect(Remote& remote, const std::string& address);
   int on_remote_event(lws* wsi, int reason, std::string_view in);
 
   Poller& poller_;
+  HostLookup lookup_;
   Site* site_ = nullptr;
   lws_context* context_ = nullptr;
   lws_vhost* vhost_ = nullptr;
   bool ended_ = false;
-  std::size_t connections_ = 0;
+  std::set<lws*> connections_{};  // of browsers
   std::map<lws*, Exchange> exchanges_{};
   std::map<lws*, Visit> upgrading_{};
   PageId last_page_ = 0;

@@ -14,6 +14,7 @@
 #include "base/printable.h"
 #include "client/status_json.h"
 #include "metrics.h"
+#include "shallow_json.h"
 
 namespace bushweb {
 namespace {
@@ -21,6 +22,8 @@ namespace {
 constexpr std::size_t kMostAddresses = 256;
 constexpr double kFailuresAtOnce = 10;
 constexpr double kFailuresPerSecond = 0.1;
+constexpr std::int64_t kOldUs = 2'000'000;
+constexpr std::int64_t kExaminationUs = 30'000'000;
 constexpr const char* kElsewhere =
     "this daemon is shown as another bushd-web shows it: open the page there to command it";
 
@@ -59,15 +62,15 @@ class Site::OpenPage : public Surroundings {
     return site_.source_of(daemon) != nullptr;
   }
   bushd::Result<std::unique_ptr<Connection>> connect(const std::string& daemon,
+                                                     const std::string& link,
                                                      const std::string& program) override {
     const std::string socket = site_.source_of(daemon)->socket();
     if (socket.empty()) return bushd::fail(kElsewhere);
     auto opened = DaemonLink::open(
         site_.poller_, socket, program,
-        {.reply = [this, daemon](
-                      std::int64_t number,
-                      const api::Reply& reply) { page_.on_reply(daemon, number, reply); },
-         .ended = [this, daemon](const std::string& why) { page_.on_end(daemon, why); }});
+        {.reply = [this, link](std::int64_t number,
+                               const api::Reply& reply) { page_.on_reply(link, number, reply); },
+         .ended = [this, link](const std::string& why) { page_.on_end(link, why); }});
     if (!opened) return bushd::fail(opened.error());
     return std::unique_ptr<Connection>(std::move(*opened));
   }
@@ -78,6 +81,7 @@ class Site::OpenPage : public Surroundings {
   PageId id() const { return id_; }
   const Visit& visit() const { return visit_; }
   Page& page() { return page_; }
+  void log_out() { visit_.cookies.clear(); }
   void greet() { tell(hello(site_.options_.version, page_.rights(), names())); }
   bool behind = false;  // what was told last is not all that there was
 
@@ -129,7 +133,8 @@ Answer Site::answer(const Visit& visit) {
     return text_answer(421, why);
   }
   if (visit.method == "POST") {
-    if (is_foreign(visit)) return error_answer(403, "this comes from a page of somebody else's");
+    if (is_foreign(visit, options_.access))
+      return error_answer(403, "this comes from a page of somebody else's");
     if (visit.path == "/api/login") return log_in(visit);
     if (visit.path == "/api/logout") return log_out(visit);
     return error_answer(404, "there is nothing to be sent here");
@@ -157,28 +162,34 @@ bool Site::may_fail_again(const std::string& peer, std::int64_t now_us) {
   return left >= 1;
 }
 
+// What is right is taken however much was wrong before: nobody keeps others from logging in.
 Answer Site::log_in(const Visit& visit) {
-  if (!may_fail_again(visit.peer, steady_us())) {
-    return error_answer(429, "too many wrong tokens came from this address: wait a minute");
-  }
   refresh_tokens();
-  const auto told = nlohmann::json::parse(visit.body, nullptr, false);
+  const auto told = shallow_json(visit.body);
   const auto member = told.is_object() ? told.find("token") : told.end();
   if (!told.is_object() || member == told.end() || !member->is_string()) {
     return error_answer(400, "a JSON object with \"token\" is expected");
   }
   const auto typed = member->get<std::string>();
   const std::int64_t now_s = unix_s();
-  const auto token = tokens_.find(typed, now_s);
-  if (!token) {
-    failures_[visit.peer].left -= 1;
-    return error_answer(403,
-                        "there is no such token, or it has ended: 'bushctl web-token' makes one");
+  if (const auto token = tokens_.find(typed, now_s)) {
+    return cookie(200, cookie_value(typed), token->expires_s - now_s);
   }
-  return cookie(200, cookie_value(typed), token->expires_s - now_s);
+  if (!may_fail_again(visit.peer, steady_us())) {
+    return error_answer(429, "too many wrong tokens came from this address: wait a minute");
+  }
+  failures_[visit.peer].left -= 1;
+  return error_answer(403,
+                      "there is no such token, or it has ended: 'bushctl web-token' makes one");
 }
 
-Answer Site::log_out(const Visit& /*visit*/) const {
+// All pages of this browser that are open lose the right with it.
+Answer Site::log_out(const Visit& visit) {
+  const std::string token = token_of(visit.cookies);
+  for (const auto& [id, page] : pages_) {
+    if (!token.empty() && token_of(page->visit().cookies) == token) page->log_out();
+  }
+  check_rights();
   return cookie(200, "", 0);
 }
 
@@ -195,10 +206,17 @@ Answer Site::state(const Visit& visit) {
   Source* source = visit.daemon.empty() ? sources_.front().get() : source_of(visit.daemon);
   if (source == nullptr) return error_answer(404, "there is no such daemon");
   const auto status = source->mirror().status();
-  if (!source->mirror().connected() || status.states.empty() || status.descriptions.empty()) {
-    return error_answer(503, "the daemon has not told its state");
+  if (!is_heard(*source) || status.states.empty() || status.descriptions.empty()) {
+    return error_answer(503, "the daemon has not told its state for more than 2 s");
   }
   return json_answer(200, bushd::client::json(status));
+}
+
+// A daemon that hangs is connected, and what it told last is old.
+bool Site::is_heard(Source& source) const {
+  const auto heard = heard_at_us_.find(source.mirror().daemon());
+  return source.mirror().connected() && heard != heard_at_us_.end() &&
+         steady_us() - heard->second < kOldUs;
 }
 
 Answer Site::metrics() {
@@ -206,7 +224,7 @@ Answer Site::metrics() {
   for (const auto& source : sources_) {
     Mirror& mirror = source->mirror();
     Measured& measured = daemons.emplace_back(
-        Measured{.daemon = source->mirror().daemon(), .connected = mirror.connected()});
+        Measured{.daemon = source->mirror().daemon(), .connected = is_heard(*source)});
     if (!measured.connected) continue;
     measured.cpu_s = source->cpu_s();
     measured.status = mirror.status();
@@ -220,7 +238,12 @@ Answer Site::metrics() {
 std::string Site::why_no_page(const Visit& visit) const {
   if (visit.path != "/api/live") return "pages open /api/live";
   if (std::string why = why_not_host(visit, options_.access); !why.empty()) return why;
-  return is_foreign(visit) ? "this comes from a page of somebody else's" : "";
+  return is_foreign(visit, options_.access) ? "this comes from a page of somebody else's" : "";
+}
+
+bool Site::is_preferred(const Visit& visit) const {
+  const Rights rights = rights_for(visit);
+  return rights.may_command || rights.may_stop;
 }
 
 void Site::open(PageId id, const Visit& visit) {
@@ -248,11 +271,13 @@ void Site::close(PageId id) {
 void Site::tick() {
   std::vector<Text> news;
   for (const auto& source : sources_) {
-    source->tick(steady_us());
+    const std::int64_t now_us = steady_us();
+    source->tick(now_us);
+    if (source->mirror().take_heard()) heard_at_us_[source->mirror().daemon()] = now_us;
     std::ranges::move(source->mirror().news(), std::back_inserter(news));
   }
   const bool second = ++ticks_ % kTicksPerSecond == 0;
-  if (second) news.push_back(alive());
+  news.push_back(alive(steady_us()));
   for (const auto& [id, page] : pages_) {
     if (outlet_.is_behind(id)) {
       page->behind = page->behind || !news.empty();
@@ -263,7 +288,12 @@ void Site::tick() {
     }
   }
   if (!second) return;
+  end_examinations();
   refresh_tokens();
+  check_rights();
+}
+
+void Site::check_rights() {
   for (const auto& [id, page] : pages_) {
     const Rights rights = rights_for(page->visit());
     if (rights == page->page().rights()) continue;
@@ -281,8 +311,13 @@ void Site::run_doctor(Source& source, PageId page, std::int64_t id) {
   if (source.socket().empty()) return outlet_.send(page, refused(id, kElsewhere));
   const std::string daemon = source.mirror().daemon();
   Examination& examination = examinations_[daemon];
+  const auto waits = [&](const auto& one) { return one.first == page; };
+  if (std::ranges::any_of(examination.waiting, waits)) {
+    return outlet_.send(page, refused(id, "the doctor is at work for this page: wait for him"));
+  }
   examination.waiting.emplace_back(page, id);
   if (examination.run) return;
+  examination.since_us = steady_us();
   examination.run = std::make_unique<ProgramRun>(
       poller_,
       [this, daemon](const bushd::Result<std::string>& output) { tell_findings(daemon, output); });
@@ -291,7 +326,14 @@ void Site::run_doctor(Source& source, PageId page, std::int64_t id) {
   if (!started) tell_findings(daemon, bushd::fail(started.error()));
 }
 
-void Site::tell_findings(const std::string& daemon, const bushd::Result<std::string>& output) {
+void Site::end_examinations() {
+  for (const auto& [daemon, examination] : examinations_) {
+    if (steady_us() - examination.since_us < kExaminationUs) continue;
+    return tell_findings(daemon, bushd::fail("bushctl doctor has not ended within 30 s"));
+  }
+}
+
+void Site::tell_findings(std::string daemon, const bushd::Result<std::string>& output) {
   const Examination examination = std::move(examinations_[daemon]);
   examinations_.erase(daemon);
   const auto told =

@@ -56,6 +56,8 @@ class Site {
   Answer answer(const Visit& visit);
   // Why there is to be no WebSocket; "": there may.
   std::string why_no_page(const Visit& visit) const;
+  // It comes from this PC, or has a token: places are kept for it.
+  bool is_preferred(const Visit& visit) const;
   void open(PageId page, const Visit& visit);
   void hear(PageId page, std::string_view text);
   void close(PageId page);
@@ -67,7 +69,7 @@ class Site {
   class OpenPage;
 
   Answer log_in(const Visit& visit);
-  Answer log_out(const Visit& visit) const;
+  Answer log_out(const Visit& visit);
   Answer cookie(int status, const std::string& token, std::int64_t seconds) const;
   Answer state(const Visit& visit);
   Answer metrics();
@@ -77,8 +79,11 @@ class Site {
   Source* source_of(const std::string& daemon) const;
   void catch_up(OpenPage& page);
   void refresh_tokens();
+  void check_rights();
+  bool is_heard(Source& source) const;
   void run_doctor(Source& source, PageId page, std::int64_t id);
-  void tell_findings(const std::string& daemon, const bushd::Result<std::string>& output);
+  void end_examinations();
+  void tell_findings(std::string daemon, const bushd::Result<std::string>& output);
 
   SiteOptions options_;
   Poller& poller_;
@@ -97,8 +102,10 @@ class Site {
   struct Examination {
     std::unique_ptr<ProgramRun> run;
     std::vector<std::pair<PageId, std::int64_t>> waiting{};
+    std::int64_t since_us = 0;
   };
   std::map<std::string, Examination> examinations_{};
+  std::map<std::string, std::int64_t> heard_at_us_{};  // of each daemon's last state
   int ticks_ = 0;
 };
 

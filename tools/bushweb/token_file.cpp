@@ -1,26 +1,42 @@
 #include "token_file.h"
 
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
 #include "tokens/token_file.h"
 
 namespace bushweb {
+namespace {
 
+bool is_same(const timespec& a, const timespec& b) {
+  return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec;
+}
+
+}  // namespace
+
+// Remembered is only what could be read: rights that are mended make no file look new.
 std::string TokenFile::refresh() {
   struct stat status{};
   if (::stat(path_.c_str(), &status) != 0) {
-    tokens_.clear();
-    inode_ = 0;
-    return "";
+    const int error = errno;
+    return forget(error == ENOENT ? "" : path_ + ": " + std::strerror(error));
   }
-  const bool same = status.st_ino == inode_ && status.st_mtim.tv_sec == changed_.tv_sec &&
-                    status.st_mtim.tv_nsec == changed_.tv_nsec;
+  const bool same = status.st_ino == seen_.st_ino && is_same(status.st_mtim, seen_.st_mtim) &&
+                    is_same(status.st_ctim, seen_.st_ctim);
   if (same) return "";
-  inode_ = status.st_ino;
-  changed_ = status.st_mtim;
-  tokens_.clear();
   auto read = bushd::tokens::read(path_);
-  if (!read) return read.error().text();
+  if (!read) return forget(read.error().text());
+  seen_ = status;
+  wrong_.clear();
   tokens_ = std::move(*read);
   return "";
+}
+
+std::string TokenFile::forget(const std::string& why) {
+  tokens_.clear();
+  seen_ = {};
+  return std::exchange(wrong_, why) == why ? "" : why;
 }
 
 std::optional<bushd::tokens::Token> TokenFile::find(const std::string& token,

@@ -23,9 +23,12 @@ class TokenFile {
   std::optional<bushd::tokens::Token> find(const std::string& token, std::int64_t now_s) const;
 
  private:
+  // There are no tokens; what is to be said.
+  std::string forget(const std::string& why);
+
   std::string path_;
-  struct timespec changed_{};
-  ino_t inode_ = 0;
+  struct stat seen_{};
+  std::string wrong_{};  // what was said last
   std::vector<bushd::tokens::Token> tokens_{};
 };
 

@@ -24,12 +24,20 @@ TEST(WebAccess, AddressesAndNamesOfThisPcAreAnswered) {
 }
 
 TEST(WebAccess, AnOriginIsThePageThatWasAsked) {
-  EXPECT_FALSE(is_foreign(visit_to("pc:8260", "http://pc:8260")));
-  EXPECT_FALSE(is_foreign(visit_to("PC:8260", "https://pc:8260")));
-  EXPECT_FALSE(is_foreign(visit_to("pc:8260")));  // no browser
+  EXPECT_FALSE(is_foreign(visit_to("pc:8260", "http://pc:8260"), {}));
+  EXPECT_FALSE(is_foreign(visit_to("PC:8260", "https://pc:8260"), {}));
+  EXPECT_FALSE(is_foreign(visit_to("pc:8260"), {}));  // no browser
   for (const char* origin : {"null", "http://pc", "http://pc:8261", "http://evil.example",
                              "http://pc:8260.evil.example", "http://evil.example/pc:8260"}) {
-    EXPECT_TRUE(is_foreign(visit_to("pc:8260", origin))) << origin;
+    EXPECT_TRUE(is_foreign(visit_to("pc:8260", origin), {})) << origin;
+  }
+}
+
+TEST(WebAccess, WherePagesHaveTlsOneWithoutIsForeign) {
+  for (const AccessOptions& options :
+       {AccessOptions{.tls = true}, AccessOptions{.behind_proxy = true}}) {
+    EXPECT_TRUE(is_foreign(visit_to("pc:443", "http://pc:443"), options));
+    EXPECT_FALSE(is_foreign(visit_to("pc:443", "https://pc:443"), options));
   }
 }
 

@@ -14,22 +14,26 @@ using nlohmann::json;
 using testing::HasSubstr;
 
 struct FakeLine : Connection {
-  explicit FakeLine(std::vector<api::Request>& requests) : sent(requests) {}
+  FakeLine(std::vector<api::Request>& requests, const bool& is_full)
+      : sent(requests), full(is_full) {}
   bushd::Result<std::int64_t> send(const api::Request& request) override {
+    if (full) return bushd::fail("the daemon does not take messages");
     sent.push_back(request);
     return static_cast<std::int64_t>(sent.size());
   }
   std::vector<api::Request>& sent;
+  const bool& full;
 };
 
 struct FakeSite : Surroundings {
   void tell(const Text& text) override { told.push_back(json::parse(*text)); }
   bool has_daemon(const std::string& daemon) const override { return daemon == "hall"; }
   bushd::Result<std::unique_ptr<Connection>> connect(const std::string& /*daemon*/,
+                                                     const std::string& link,
                                                      const std::string& program) override {
     programs.push_back(program);
     if (!why_no_daemon.empty()) return bushd::fail(why_no_daemon);
-    return std::make_unique<FakeLine>(sent);
+    return std::make_unique<FakeLine>(sent, link == "hall" ? full : empty);
   }
   void run_doctor(const std::string& daemon, std::int64_t id) override {
     examined.emplace_back(daemon, id);
@@ -40,6 +44,8 @@ struct FakeSite : Surroundings {
   std::vector<api::Request> sent;
   std::vector<std::pair<std::string, std::int64_t>> examined;
   std::string why_no_daemon;
+  bool full = false;  // the connection for what is no stop
+  const bool empty = false;
 };
 
 const Rights kMayCommand{.user = "anna", .may_command = true, .may_stop = true};
@@ -80,7 +86,7 @@ TEST(OpenPage, WithoutATokenReadsAndStops) {
   page.hear(ask(4, "stop"), 0);
   page.hear(ask(5, "emergency stop"), 0);
   EXPECT_EQ(site.sent.size(), 3U);
-  EXPECT_EQ(site.programs, (std::vector<std::string>{"web:anyone"}));
+  EXPECT_EQ(site.programs, (std::vector<std::string>{"web:*"}));
 }
 
 TEST(OpenPage, WhereStopsNeedATokenItReadsOnly) {
@@ -120,6 +126,51 @@ TEST(OpenPage, TooManyRequestsUnderWayAreRefusedButWhatEndsMotion) {
   EXPECT_EQ(site.sent.size(), Page::kMostOpen + 1);
 }
 
+TEST(OpenPage, AStopDoesNotWaitBehindWhatThePageHasAskedBefore) {
+  FakeSite site;
+  Page page(site, kMayCommand, 0);
+  site.full = true;
+  page.hear(ask(1, "list tables"), 0);
+  EXPECT_THAT(site.told.back()["reason"].get<std::string>(), HasSubstr("does not take messages"));
+  page.hear(ask(2, "stop"), 0);
+  EXPECT_EQ(site.sent.size(), 1U);
+  page.on_reply("hall\n", 1, api::Completed{.outcome = api::Outcome::kDone, .reason = "done"});
+  EXPECT_EQ(site.told.back()["id"], 2);
+}
+
+TEST(OpenPage, WhatANetworkHasHeldBackBeginsNoMotion) {
+  FakeSite site;
+  Page page(site, kMayCommand, 0);
+  const auto late_by = [&](const std::string& request, std::int64_t us) {
+    json message = json::parse(ask(1, request));
+    message["heard"] = 5'000'000;
+    page.hear(message.dump(), 5'000'000 + us);
+  };
+  late_by("home", Page::kLateUs);
+  EXPECT_EQ(site.sent.size(), 1U);
+  late_by("home", Page::kLateUs + 1);
+  EXPECT_EQ(site.sent.size(), 1U);
+  EXPECT_THAT(site.told.back()["reason"].get<std::string>(), HasSubstr("came late"));
+  late_by("stop", 100 * Page::kLateUs);
+  EXPECT_EQ(site.sent.size(), 2U);
+}
+
+TEST(OpenPage, LargeMessagesAreForWhoMayCommandAndHaveARateInBytes) {
+  const std::string large = R"({"id":1,"kind":"x","y":")" + std::string(400'000, ' ') + "\"}";
+  FakeSite site;
+  Page looks(site, kMayStop, 0);
+  looks.hear(large, 0);
+  EXPECT_THAT(site.told.back()["reason"].get<std::string>(), HasSubstr("above 4 KiB"));
+  EXPECT_EQ(site.told.back()["id"], 0);  // it was not even read
+  Page commands(site, kMayCommand, 0);
+  for (int i = 0; i < 4; ++i) commands.hear(large, 0);
+  EXPECT_THAT(site.told.back()["reason"].get<std::string>(), HasSubstr("no message of the kind"));
+  commands.hear(large, 0);
+  EXPECT_THAT(site.told.back()["reason"].get<std::string>(), HasSubstr("too many messages"));
+  commands.hear(ask(2, "stop"), 0);
+  EXPECT_EQ(site.sent.size(), 1U);
+}
+
 TEST(OpenPage, ADaemonThatIsNotThereIsNamed) {
   FakeSite site;
   Page page(site, kMayCommand, 0);
@@ -157,7 +208,7 @@ TEST(OpenPage, RightsThatEndEndTheConnection) {
   page.hear(ask(2, "jog", R"({"motor":"a","renew":true})"), 0);
   EXPECT_EQ(site.sent.size(), 1U);
   page.hear(ask(3, "stop"), 0);
-  EXPECT_EQ(site.programs, (std::vector<std::string>{"web:anna", "web:anyone"}));
+  EXPECT_EQ(site.programs, (std::vector<std::string>{"web:anna", "web:*"}));
 }
 
 TEST(OpenPage, ChecksTablesAndRunsTheDoctor) {
