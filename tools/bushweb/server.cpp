@@ -255,7 +255,7 @@ int Server::on_body(lws* wsi, std::string_view bytes) {
 
 int Server::begin_answer(lws* wsi) {
   Exchange& exchange = exchanges_[wsi];
-  if (std::exchange(exchange.begun, true)) return -1;
+  if (std::exchange(exchange.begun, true)) return 0;  // a body that nobody has waited for has ended
   exchange.answer = site_->answer(exchange.visit);
   const Answer& answer = exchange.answer;
   std::vector<unsigned char> space(LWS_PRE + kHeaderBytes);

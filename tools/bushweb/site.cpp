@@ -213,10 +213,11 @@ Answer Site::state(const Visit& visit) {
 }
 
 // A daemon that hangs is connected, and what it told last is old.
-bool Site::is_heard(Source& source) const {
-  const auto heard = heard_at_us_.find(source.mirror().daemon());
-  return source.mirror().connected() && heard != heard_at_us_.end() &&
-         steady_us() - heard->second < kOldUs;
+bool Site::is_heard(Source& source) {
+  std::int64_t& heard_at_us = heard_at_us_[source.mirror().daemon()];  // 0: never
+  const std::int64_t now_us = steady_us();
+  if (source.mirror().take_heard()) heard_at_us = now_us;
+  return source.mirror().connected() && heard_at_us > 0 && now_us - heard_at_us < kOldUs;
 }
 
 Answer Site::metrics() {
@@ -271,9 +272,8 @@ void Site::close(PageId id) {
 void Site::tick() {
   std::vector<Text> news;
   for (const auto& source : sources_) {
-    const std::int64_t now_us = steady_us();
-    source->tick(now_us);
-    if (source->mirror().take_heard()) heard_at_us_[source->mirror().daemon()] = now_us;
+    source->tick(steady_us());
+    is_heard(*source);
     std::ranges::move(source->mirror().news(), std::back_inserter(news));
   }
   const bool second = ++ticks_ % kTicksPerSecond == 0;

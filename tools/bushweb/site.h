@@ -80,7 +80,7 @@ class Site {
   void catch_up(OpenPage& page);
   void refresh_tokens();
   void check_rights();
-  bool is_heard(Source& source) const;
+  bool is_heard(Source& source);
   void run_doctor(Source& source, PageId page, std::int64_t id);
   void end_examinations();
   void tell_findings(std::string daemon, const bushd::Result<std::string>& output);
