@@ -2,6 +2,7 @@
 import "uplot/dist/uPlot.min.css";
 import "./page.css";
 import { short } from "./logic/format";
+import { PathSender } from "./logic/path_sender";
 import { browserSocket, browserTimers, Connection } from "./net/connection";
 import type { FromServer } from "./net/messages";
 import { isGood, Requests, type Answer, type Options } from "./net/requests";
@@ -21,12 +22,13 @@ const kTickMs = 250;
 const nowMs = (): number => performance.now();
 const model = new Model(nowMs);
 const connection = new Connection(browserSocket, browserTimers);
-const requests = new Requests((message) => connection.send(message), nowMs);
+const requests = new Requests(connection, nowMs);
 const log = new EventLog();
 const notices = new Notices();
 const recorder = new Recorder(model);
 const scroller = el("main", { id: "main", tabindex: "-1" });
 const app: App = {
+  paths: new PathSender(),
   model, connection, requests, log, recorder, scroller, nowMs,
   notice: (level, text) => notices.add(level, text),
 };

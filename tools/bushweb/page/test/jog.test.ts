@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Jog, kKeepaliveMs, kRenewMs, type JogPort } from "../src/logic/jog";
+import { HeldKey, Jog, kKeepaliveMs, kRenewMs, type JogPort } from "../src/logic/jog";
 
 type Answered = (good: boolean, reason: string) => void;
 
@@ -131,4 +131,32 @@ test("speed 0 and what is no number begin nothing", () => {
   const jog = new Jog(world);
   for (const speed of [0, NaN, Infinity]) jog.start("theta", speed);
   assert.equal(world.sent.length, 0);
+});
+
+test("a key begins once, and again after its jog has ended otherwise", () => {
+  const key = new HeldKey();
+  let begun = 0;
+  const press = (name: string, repeats = false): void => key.press(name, repeats, () => { begun += 1; });
+  press("ArrowRight", true);
+  assert.equal(begun, 0);
+  press("ArrowRight");
+  press("ArrowRight", true);
+  press("ArrowLeft");
+  assert.equal(begun, 1);
+  assert.ok(!key.release("ArrowLeft"));
+  key.clear();
+  assert.ok(!key.release("ArrowRight"));
+  press("ArrowLeft");
+  assert.equal(begun, 2);
+  assert.ok(key.release("ArrowLeft"));
+  assert.ok(!key.release("ArrowLeft"));
+});
+
+test("a key that takes the place of another jog ends its own when it is let go", () => {
+  const { jog } = begin();
+  const key = new HeldKey();
+  jog.onChange = (state) => { if (!state) key.clear(); };
+  key.press("ArrowRight", false, () => jog.start("theta", 1));
+  assert.deepEqual(jog.running, { motor: "theta", speed: 1 });
+  assert.ok(key.release("ArrowRight"));
 });

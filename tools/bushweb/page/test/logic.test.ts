@@ -2,9 +2,9 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { parseNumbers, writeCsv } from "../src/logic/csv";
 import { TableEditor } from "../src/logic/editor";
-import { age, duration, fixed, parseNumber, roundDown125, short } from "../src/logic/format";
+import { age, duration, fixed, parseNumber, parseSpeed, roundDown125, short } from "../src/logic/format";
 import { located, parsePath, pathRequests, planeSpeeds } from "../src/logic/path";
-import { codeOf, decelOf, delaysOf, diffOf, moveTimeS, placeOf, speedOf } from "../src/logic/table";
+import { codeOf, decelOf, delaysOf, diffOf, moveTimeS, placeOf, speedOf, tooLong } from "../src/logic/table";
 import type { TableFile } from "../src/net/messages";
 
 test("positions have their decimals and no minus before nothing", () => {
@@ -217,4 +217,21 @@ test("what differs between two tables", () => {
   });
   // Sides that mirror each other are the same as if they were written out.
   assert.deepEqual(diffOf(before, table({ accel: [100, 80, 60], decel: [60, 80, 100] })), { codes: [], extra: [] });
+});
+
+test("a greatest speed is above 0, or left out", () => {
+  assert.deepEqual(["", " ", "2,5", "1e-3"].map(parseSpeed), [0, 0, 2.5, 0.001]);
+  for (const text of ["0", "-0", "0.0", "-1", "1e-400", "fast"]) assert.equal(parseSpeed(text), undefined, text);
+});
+
+test("a table of more bytes than a message takes is not sent", () => {
+  const of = (accel: number, decel: number): string => tooLong({
+    name: "t", description: "", revision: 1, hash: "", time_unit_ns: 1000, cruise: null,
+    accel: Array<number>(accel).fill(9), decel: Array<number>(decel).fill(9),
+  });
+  assert.equal(of(15_000, 0), "");
+  assert.equal(of(7500, 7500), "");
+  for (const [accel, decel] of [[15_001, 0], [7500, 7501]] as const) {
+    assert.ok(/at most about 15000 codes; use bushtab on the daemon's PC/.test(of(accel, decel)));
+  }
 });

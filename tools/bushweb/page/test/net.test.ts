@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Connection, type Socket, type Timers } from "../src/net/connection";
 import { parseMessage, type Reply } from "../src/net/messages";
-import { isGood, Requests } from "../src/net/requests";
+import { isGood, Requests, type Link } from "../src/net/requests";
 
 class Clock implements Timers {
   ms = 0;
@@ -131,6 +131,14 @@ test("what is no message of ours is dropped", () => {
   assert.equal(parseMessage(kHello)?.kind, "hello");
 });
 
+function linkOf(
+  send: (message: object) => boolean,
+  silent: () => boolean = () => false,
+  heard: () => number | undefined = () => undefined,
+): Link {
+  return { send, isSilent: silent, get heard() { return heard(); } };
+}
+
 function reply(id: number, phase: Reply["phase"], outcome = "", reason = ""): Reply {
   return { kind: "reply", id, phase, outcome, reason, detail: null };
 }
@@ -138,7 +146,8 @@ function reply(id: number, phase: Reply["phase"], outcome = "", reason = ""): Re
 test("a request has one answer: refused, or accepted and its result", async () => {
   const sent: { id: number; request: string }[] = [];
   let ms = 0;
-  const requests = new Requests((message) => { sent.push(message as never); return true; }, () => ms);
+  const requests = new Requests(
+    linkOf((message) => { sent.push(message as never); return true; }), () => ms);
   let accepted = 0;
   const one = requests.ask("bushd", "stop", { motors: [] }, { onAccepted: () => { accepted += 1; } });
   const two = requests.ask("bushd", "move");
@@ -161,7 +170,7 @@ test("a request has one answer: refused, or accepted and its result", async () =
 
 test("what the connection takes with it is lost, and what cannot be sent says so", async () => {
   let open = true;
-  const requests = new Requests(() => open, () => 0);
+  const requests = new Requests(linkOf(() => open), () => 0);
   const lost = requests.ask("bushd", "move");
   requests.lose();
   assert.equal((await lost).phase, "lost");
@@ -169,4 +178,73 @@ test("what the connection takes with it is lost, and what cannot be sent says so
   const unsent = await requests.ask("bushd", "stop");
   assert.equal(unsent.phase, "not sent");
   assert.ok(/no connection/.test(unsent.reason));
+});
+
+test("the newest sign of life of a connection is kept, and none of the one before", () => {
+  const { clock, sockets, connection } = world();
+  sockets[0]?.onopen?.();
+  assert.equal(connection.heard, undefined);
+  for (const at of ["7", "9", "8", '"10"', "1.5", "null", "1e300"]) {
+    sockets[0]?.onmessage?.({ data: `{"kind":"alive","at":${at}}` });
+  }
+  sockets[0]?.onmessage?.({ data: '{"kind":"alive"}' });
+  assert.equal(connection.heard, 9);
+  sockets[0]?.onclose?.();
+  clock.pass(500);
+  sockets[1]?.onopen?.();
+  assert.equal(connection.heard, undefined);
+  sockets[1]?.onmessage?.({ data: '{"kind":"alive","at":2}' });
+  assert.equal(connection.heard, 2);
+});
+
+test("signs of life that fail to come are silence, by the clock and before a check", () => {
+  const { clock, sockets, connection } = world();
+  sockets[0]?.onopen?.();
+  sockets[0]?.onmessage?.({ data: '{"kind":"alive","at":2}' });
+  clock.pass(1500);
+  assert.ok(!connection.isSilent());
+  clock.pass(1);
+  assert.ok(connection.isSilent());
+  assert.equal(connection.state, "open");
+  connection.check();
+  assert.equal(connection.state, "silent");
+  sockets[0]?.onmessage?.({ data: '{"kind":"alive","at":3}' });
+  assert.ok(!connection.isSilent());
+});
+
+test("each request says what was heard last, and nothing before anything was", () => {
+  const sent: { heard?: number }[] = [];
+  let heard: number | undefined;
+  const requests = new Requests(
+    linkOf((message) => { sent.push(message); return true; }, () => false, () => heard), () => 0);
+  void requests.ask("bushd", "stop");
+  heard = 41;
+  void requests.ask("bushd", "move");
+  heard = 42;
+  void requests.ask("bushd", "stop");
+  assert.deepEqual(sent.map((one) => one.heard), [undefined, 41, 42]);
+  assert.ok(!("heard" in (sent[0] ?? {})));
+});
+
+test("in silence nothing is sent that begins a motion, and what ends one is", async () => {
+  const sent: [string, object][] = [];
+  const requests = new Requests(linkOf((message) => {
+    const { request, fields } = message as { request: string; fields: object };
+    sent.push([request, fields]);
+    return true;
+  }, () => true), () => 0);
+  const begin: [string, object][] = [
+    ["move", { kind: 2 }], ["move path", { dry_run: false }], ["home", {}], ["resume", {}],
+    ["jog", { speed: 1 }], ["jog", { renew: true }],
+  ];
+  for (const [request, fields] of begin) {
+    const answer = await requests.ask("bushd", request, fields);
+    assert.equal(answer.phase, "not sent", request);
+    assert.ok(/silent/.test(answer.reason));
+  }
+  const end: [string, object][] = [
+    ["stop", {}], ["emergency stop", {}], ["pause", {}], ["jog", { speed: 0 }], ["move path", { dry_run: true }],
+  ];
+  for (const [request, fields] of end) void requests.ask("bushd", request, fields);
+  assert.deepEqual(sent, end);
 });

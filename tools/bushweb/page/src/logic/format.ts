@@ -67,6 +67,18 @@ export function parseNumber(text: string): number | undefined {
   return Number.isFinite(value) ? value : undefined;
 }
 
+// A greatest speed that somebody has typed: 0, no limit, only where nothing stands. undefined: it is
+// none, such as a 0, which would be no limit to the daemon.
+export function parseSpeed(text: string): number | undefined {
+  if (text.trim() === "") return 0;
+  const speed = parseNumber(text);
+  return speed !== undefined && speed > 0 ? speed : undefined;
+}
+
+export function noSpeed(text: string): string {
+  return `"${text}" is no speed; allowed: a number above 0`;
+}
+
 // 1, 2 or 5 times a power of ten, not above the value.
 export function roundDown125(value: number): number {
   if (!(value > 0) || !Number.isFinite(value)) return 1;

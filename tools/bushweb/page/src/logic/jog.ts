@@ -7,6 +7,30 @@ export const kRenewMs = 100;
 const kLateMs = 300; // a timer so late: the page was suspended, or the PC is too busy to be trusted
 const kUnansweredMs = 500;
 
+// The key by which a jog is held. Keys that repeat themselves begin nothing.
+export class HeldKey {
+  private key = "";
+
+  press(key: string, repeats: boolean, begin: () => void): void {
+    if (repeats || this.key !== "") return;
+    // The end of a jog before this one clears the key, so it is kept afterwards.
+    begin();
+    this.key = key;
+  }
+
+  // Whether it was the one.
+  release(key: string): boolean {
+    if (this.key === "" || key !== this.key) return false;
+    this.key = "";
+    return true;
+  }
+
+  // The jog has ended otherwise, and its key may be let go where nobody tells the page.
+  clear(): void {
+    this.key = "";
+  }
+}
+
 export interface JogPort {
   // False: it was not sent. `answered` is called with what came of it.
   send(fields: object, answered: (good: boolean, reason: string) => void): boolean;

@@ -8,6 +8,16 @@ import type { TableFile } from "../net/messages";
 export const kMostCode = 65_535;
 export type Side = "accel" | "decel";
 
+// Of a message that sets a table; a code takes 4 bytes.
+const kMostBytes = 60_000;
+
+// Why a table cannot be set over the control socket; "": it can.
+export function tooLong(table: TableFile): string {
+  const bytes = 4 * (table.accel.length + table.decel.length);
+  return bytes <= kMostBytes ? ""
+    : "a table that is set over the control socket has at most about 15000 codes; use bushtab on the daemon's PC";
+}
+
 export function cruiseOf(table: TableFile): number {
   return table.cruise || (table.accel[table.accel.length - 1] ?? 0);
 }

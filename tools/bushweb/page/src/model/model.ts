@@ -193,6 +193,13 @@ export class Model {
     return this.ageMs(mcu) > kOldMs;
   }
 
+  // A connected daemon with MCUs, of which none has been heard lately. Pseudo-axes are no MCUs.
+  isDeaf(name: string): boolean {
+    const daemon = this.daemons.get(name);
+    const mcus = [...(daemon?.mcus.values() ?? [])].filter((mcu) => mcu.about?.address !== 0);
+    return daemon?.connected === true && mcus.length > 0 && mcus.every((mcu) => this.isOld(mcu));
+  }
+
   statesAreDue(): boolean {
     return [...this.daemons.values()].some((daemon) => daemon.connected && daemon.mcus.size > 0);
   }

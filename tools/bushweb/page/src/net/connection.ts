@@ -31,6 +31,7 @@ export class Connection {
   onState: (state: LinkState) => void = () => {};
   onMessage: (message: FromServer) => void = () => {};
 
+  private newest: number | undefined;
   private socket: Socket | undefined;
   private tries = 0;
   private cancelTimer: () => void = () => {};
@@ -69,10 +70,21 @@ export class Connection {
     return this.state === "open" || this.state === "silent";
   }
 
+  // Nothing has come for so long that what the page shows is no ground to move anything. By the
+  // clock and not by the last check(), as timers of a page may be late.
+  isSilent(): boolean {
+    return this.isOpen() && this.somethingIsDue() && this.silentMs() > kSilentMs;
+  }
+
+  // The newest `at` of this connection.
+  get heard(): number | undefined {
+    return this.newest;
+  }
+
   // Called several times a second.
   check(): void {
-    if (!this.isOpen() || !this.statesAreDue) return;
-    const silentMs = this.timers.nowMs() - this.lastHeardMs;
+    if (!this.isOpen() || !this.somethingIsDue()) return;
+    const silentMs = this.silentMs();
     if (silentMs > kGiveUpMs) {
       this.drop();
       this.closed();
@@ -81,9 +93,18 @@ export class Connection {
     }
   }
 
+  private silentMs(): number {
+    return this.timers.nowMs() - this.lastHeardMs;
+  }
+
+  private somethingIsDue(): boolean {
+    return this.statesAreDue || this.newest !== undefined;
+  }
+
   private connect(): void {
     this.cancelTimer();
     this.statesAreDue = false;
+    this.newest = undefined; // another bushd-web may count from anew
     this.set("connecting");
     const socket = this.open();
     this.socket = socket;
@@ -103,11 +124,17 @@ export class Connection {
       this.tries = 0;
       if (this.state === "silent") this.set("open");
       const message = typeof event.data === "string" ? parseMessage(event.data) : undefined;
-      if (message) this.onMessage(message);
+      if (message?.kind === "alive") this.takeAlive(message.at);
+      else if (message) this.onMessage(message);
     };
     socket.onclose = () => {
       if (this.socket === socket) this.closed();
     };
+  }
+
+  private takeAlive(at: unknown): void {
+    if (typeof at !== "number" || !Number.isSafeInteger(at)) return;
+    this.newest = Math.max(this.newest ?? at, at);
   }
 
   private closed(): void {

@@ -154,6 +154,13 @@ export interface HealthMessage {
   buses: BusHealth[];
 }
 
+// Ten times a second. `at` grows; what was heard last goes with each request, so that bushd-web knows
+// how old the page's view of the motors was.
+export interface Alive {
+  kind: "alive";
+  at?: number;
+}
+
 export interface MotorResult {
   motor: string;
   outcome: string;
@@ -251,13 +258,14 @@ export interface Reply {
 
 export type FromServer =
   | Hello
+  | Alive
   | DaemonMessage
   | StateMessage
   | DescriptionMessage
   | HealthMessage
   | Reply;
 
-const kKinds = new Set(["hello", "daemon", "state", "description", "health", "reply"]);
+const kKinds = new Set(["hello", "alive", "daemon", "state", "description", "health", "reply"]);
 
 // A text as a message; nothing if it is none. A newer bushd-web may send kinds that this page does
 // not know.

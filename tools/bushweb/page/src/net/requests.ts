@@ -1,5 +1,6 @@
 // Requests and their answers. A request is sent at once or not at all: it never waits behind
 // others, and none is sent a second time, as it may have been carried out.
+import { beginsMotion } from "../logic/motion";
 import type { Reply } from "./messages";
 
 // "lost": the connection ended before the answer came.
@@ -20,6 +21,12 @@ export interface Options {
   onAccepted?: () => void;
 }
 
+export interface Link {
+  readonly heard: number | undefined; // the newest sign of life of bushd-web
+  isSilent(): boolean;
+  send(message: object): boolean;
+}
+
 interface Waiting {
   answer: Answer;
   options: Options;
@@ -33,12 +40,14 @@ export class Requests {
   private readonly waiting = new Map<number, Waiting>();
 
   constructor(
-    private readonly send: (message: object) => boolean,
+    private readonly link: Link,
     private readonly nowMs: () => number,
   ) {}
 
   ask(daemon: string, request: string, fields: object = {}, options: Options = {}): Promise<Answer> {
-    return this.put({ kind: "ask", daemon, request, fields }, daemon, request, fields, options);
+    const { heard } = this.link;
+    const message = { kind: "ask", daemon, request, fields, ...(heard === undefined ? {} : { heard }) };
+    return this.put(message, daemon, request, fields, options);
   }
 
   // Those that are not requests of the daemon: "check" and "doctor".
@@ -82,15 +91,18 @@ export class Requests {
     options: Options,
   ): Promise<Answer> {
     const id = ++this.count;
+    const isTooLate = beginsMotion(request, fields) && this.link.isSilent();
     const answer: Answer = {
       id, daemon, request, fields, phase: "not sent", outcome: "", detail: {}, tookMs: 0,
-      reason: "not sent: there is no connection to bushd-web",
+      reason: isTooLate
+        ? "not sent: bushd-web is silent, and what the page shows may be old"
+        : "not sent: there is no connection to bushd-web",
     };
     return new Promise((settle) => {
       const waiting = { answer, options, sentMs: this.nowMs(), settle };
       // Before it is sent, so that no answer can come too early.
       this.waiting.set(id, waiting);
-      if (this.send({ ...message, id })) {
+      if (!isTooLate && this.link.send({ ...message, id })) {
         answer.phase = "lost";
         answer.reason = "";
         return;

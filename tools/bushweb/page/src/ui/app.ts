@@ -1,4 +1,5 @@
 // What all views use.
+import type { PathSender } from "../logic/path_sender";
 import type { Answer, Options, Requests } from "../net/requests";
 import type { Connection } from "../net/connection";
 import type { Changes, Model, Motor } from "../model/model";
@@ -18,6 +19,7 @@ export interface App {
   readonly model: Model;
   readonly connection: Connection;
   readonly requests: Requests;
+  readonly paths: PathSender; // outlives the view: so does a path that runs
   readonly log: EventLog;
   readonly recorder: Recorder;
   readonly scroller: HTMLElement; // what the views stand in
@@ -26,7 +28,17 @@ export interface App {
 }
 
 export function mayCommand(app: App): boolean {
+  return mayEnd(app) && !app.connection.isSilent();
+}
+
+// For what ends motions and needs the right to command: also while bushd-web is silent.
+export function mayEnd(app: App): boolean {
   return app.model.hello?.may_command === true && app.connection.isOpen();
+}
+
+// Also without a connection: a stop is always tried.
+export function mayStop(app: App): boolean {
+  return app.model.hello?.may_command === true || app.model.hello?.may_stop === true;
 }
 
 // Asks for something of one motor.

@@ -1,5 +1,6 @@
 // Buttons and arrow keys that move a motor for as long as they are held.
-import { Jog } from "../logic/jog";
+import { HeldKey, Jog } from "../logic/jog";
+import { beginsMotion } from "../logic/motion";
 import { parseNumber, roundDown125, short } from "../logic/format";
 import { recall, remember } from "../logic/persist";
 import type { Motor } from "../model/model";
@@ -13,20 +14,17 @@ export class JogPad {
   private readonly plus: HTMLButtonElement;
   private readonly said = el("p", { class: "said quiet", testid: "jog-said", role: "status" });
   private readonly jog: Jog;
-  private heldKey = "";
+  private readonly heldKey = new HeldKey();
   readonly root: HTMLElement;
 
-  private readonly endByBlur = (): void => this.jog.end("the window lost the focus");
-  private readonly endByPage = (): void => this.jog.end("the page is left");
+  private readonly endByBlur = (): void => this.end("the window lost the focus");
+  private readonly endByPage = (): void => this.end("the page is left");
   private readonly endIfHidden = (): void => {
-    if (document.visibilityState === "hidden") this.jog.end("the page is hidden");
+    if (document.visibilityState === "hidden") this.end("the page is hidden");
   };
   private readonly keyDown = (event: KeyboardEvent): void => this.takeKey(event);
   private readonly keyUp = (event: KeyboardEvent): void => {
-    if (event.key === this.heldKey) {
-      this.heldKey = "";
-      this.jog.end("");
-    }
+    if (this.heldKey.release(event.key)) this.jog.end("");
   };
 
   constructor(private readonly app: App, private readonly motor: Motor) {
@@ -46,6 +44,7 @@ export class JogPad {
       },
     });
     this.jog.onChange = (state, why) => {
+      if (!state) this.heldKey.clear();
       mark(this.minus, "held", state !== undefined && state.speed < 0);
       mark(this.plus, "held", state !== undefined && state.speed > 0);
       if (state) put(this.said, `moves at ${short(state.speed)} ${unitOf(motor)}/s while held`);
@@ -70,15 +69,17 @@ export class JogPad {
     this.minus.disabled = this.plus.disabled = !may;
     put(this.label, `Jog speed (${unitOf(this.motor)}/s)`);
     if (!this.app.connection.isOpen()) this.jog.lose();
+    else if (this.app.connection.isSilent()) this.jog.end("bushd-web is silent");
     else if (!may) this.jog.end("this page may only read now");
   }
 
   end(why: string): void {
+    this.heldKey.clear(); // also where the jog had not begun
     this.jog.end(why);
   }
 
   close(): void {
-    this.jog.end("another view");
+    this.end("another view");
     window.removeEventListener("blur", this.endByBlur);
     window.removeEventListener("pagehide", this.endByPage);
     document.removeEventListener("visibilitychange", this.endIfHidden);
@@ -94,7 +95,7 @@ export class JogPad {
     label: string,
   ): HTMLButtonElement {
     const hold = button(text, () => {}, { class: "jog-button", testid, "aria-label": label });
-    const letGo = (): void => this.jog.end("");
+    const letGo = (): void => this.end("");
     hold.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       event.preventDefault();
@@ -114,9 +115,7 @@ export class JogPad {
     hold.addEventListener("keydown", (event) => {
       if (event.key !== " " && event.key !== "Enter") return;
       event.preventDefault();
-      if (event.repeat || this.heldKey !== "") return;
-      this.heldKey = event.key;
-      this.begin(sign);
+      this.heldKey.press(event.key, event.repeat, () => this.begin(sign));
     });
     hold.addEventListener("blur", letGo);
     return hold;
@@ -124,19 +123,18 @@ export class JogPad {
 
   private takeKey(event: KeyboardEvent): void {
     const sign = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
-    if (event.key === "Escape") this.jog.end("stop");
+    if (event.key === "Escape") this.end("stop");
     if (sign === 0 || event.ctrlKey || event.altKey || event.metaKey) return;
     // Where an arrow key means something else.
     const at = event.target instanceof Element ? event.target : null;
     if (at?.closest("input, select, textarea, [data-arrows], .u-wrap")) return;
     if (!mayCommand(this.app)) return;
     event.preventDefault();
-    if (event.repeat || this.heldKey !== "") return;
-    this.heldKey = event.key;
-    this.begin(sign);
+    this.heldKey.press(event.key, event.repeat, () => this.begin(sign));
   }
 
   private begin(sign: number): void {
+    if (!mayCommand(this.app)) return;
     const speed = parseNumber(this.speed.value);
     if (speed === undefined || speed <= 0) {
       put(this.said, `"${this.speed.value}" is no speed; allowed: a number above 0, such as 2.5`);
@@ -148,7 +146,10 @@ export class JogPad {
   }
 
   private send(fields: object, answered: (good: boolean, reason: string) => void): boolean {
-    if (!this.app.connection.isOpen()) return false;
+    const { connection } = this.app;
+    if (!connection.isOpen()) return false;
+    // Nothing that moves; what ends a jog is always sent.
+    if (beginsMotion("jog", fields) && connection.isSilent()) return false;
     const quiet = "renew" in fields;
     void this.app.requests
       .ask(this.motor.daemon, "jog", fields, { quiet, onAccepted: () => this.jog.accept() })

@@ -1,7 +1,7 @@
 // What can be asked of a motor from its view: go to, by, stop, pause, home, set, confirm, hold.
-import { parseNumber } from "../logic/format";
+import { noSpeed, parseNumber, parseSpeed } from "../logic/format";
 import type { Motor } from "../model/model";
-import { askMotor, mayCommand, unitOf, type App } from "./app";
+import { askMotor, mayCommand, mayEnd, unitOf, type App } from "./app";
 import { button, el, field, put, section, show, attribute } from "./dom";
 
 type Field = ReturnType<typeof field>;
@@ -13,7 +13,7 @@ export class MotorCommands {
   private readonly atSpeed: Field;
   private readonly set: Field;
   private readonly said = el("p", { class: "said error-text", role: "alert", testid: "input-error" });
-  private readonly guarded: HTMLButtonElement[] = [];
+  private readonly guarded: [HTMLButtonElement, may: (app: App) => boolean][] = [];
   private readonly pause: HTMLButtonElement;
   private readonly resume: HTMLButtonElement;
   private readonly hold: HTMLButtonElement;
@@ -34,9 +34,9 @@ export class MotorCommands {
     onEnter(this.goTo.input, () => this.move(this.goTo.input, 2));
     onEnter(this.by.input, () => this.move(this.by.input, 1));
     const ask = (request: string) => (): void => void askMotor(app, motor, request);
-    this.pause = this.guard("Pause", ask("pause"), "pause");
+    this.pause = this.guard("Pause", ask("pause"), "pause", mayEnd);
     this.resume = this.guard("Resume", ask("resume"), "resume");
-    this.hold = this.guard("Hold", ask("hold"), "hold");
+    this.hold = this.guard("Hold", ask("hold"), "hold", mayEnd);
     this.release = this.guard("Release", ask("release"), "release");
     this.confirm = this.guard("Confirm position", ask("confirm"), "confirm");
     const home = this.guard("Home", ask("home"), "home");
@@ -65,8 +65,10 @@ export class MotorCommands {
   }
 
   update(): void {
-    const may = mayCommand(this.app);
-    for (const one of this.guarded) if (one.disabled === may) one.disabled = !may;
+    for (const [one, may] of this.guarded) {
+      const disabled = !may(this.app);
+      if (one.disabled !== disabled) one.disabled = disabled;
+    }
     const unit = unitOf(this.motor);
     put(this.goTo.label, `Go to (${unit})`);
     put(this.by.label, `Move by (${unit})`);
@@ -81,11 +83,11 @@ export class MotorCommands {
     show(this.confirm, state !== undefined && state.trust !== "known");
   }
 
-  private guard(text: string, run: () => void, testid: string): HTMLButtonElement {
+  private guard(text: string, run: () => void, testid: string, may = mayCommand): HTMLButtonElement {
     const made = button(text, () => {
-      if (mayCommand(this.app)) run();
+      if (may(this.app)) run();
     }, { testid });
-    this.guarded.push(made);
+    this.guarded.push([made, may]);
     return made;
   }
 
@@ -100,13 +102,16 @@ export class MotorCommands {
   }
 
   private move(input: HTMLInputElement, kind: 1 | 2, sign = 1): void {
+    if (!mayCommand(this.app)) return;
     const value = this.read(input);
     if (value === undefined) return;
-    let speed = 0;
-    if (this.atSpeed.input.value.trim() !== "") {
-      const told = this.read(this.atSpeed.input);
-      if (told === undefined) return;
-      speed = told;
+    const typed = this.atSpeed.input;
+    const speed = parseSpeed(typed.value);
+    attribute(typed, "aria-invalid", speed === undefined ? "true" : undefined);
+    if (speed === undefined) {
+      put(this.said, noSpeed(typed.value));
+      typed.focus();
+      return;
     }
     void askMotor(this.app, this.motor, "move", {
       kind, speed, speed_in_steps: false,
@@ -115,6 +120,7 @@ export class MotorCommands {
   }
 
   private setPosition(): void {
+    if (!mayCommand(this.app)) return;
     const value = this.read(this.set.input);
     if (value === undefined) return;
     void askMotor(this.app, this.motor, "set position", {

@@ -2,7 +2,7 @@
 import { age, fixed } from "../logic/format";
 import { stateWords } from "../logic/overview";
 import type { Motor } from "../model/model";
-import { askMotor, mayCommand, motorAddress, precisionOf, unitOf, type App } from "./app";
+import { askMotor, mayStop, motorAddress, precisionOf, unitOf, type App } from "./app";
 import { attribute, button, el, mark, put, show } from "./dom";
 import { Ruler } from "./ruler";
 
@@ -77,7 +77,7 @@ export class MotorRow {
     mark(this.root, "old", old);
     const ageMs = this.app.model.ageMs(this.motor.mcu);
     put(this.age, old ? (Number.isFinite(ageMs) ? `${age(ageMs)} old` : "never heard") : "");
-    show(this.stop, mayCommand(this.app) || this.app.model.hello?.may_stop === true);
+    show(this.stop, mayStop(this.app));
   }
 
   private setFavourite(on: boolean): void {

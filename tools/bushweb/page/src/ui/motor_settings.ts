@@ -61,6 +61,7 @@ export class MotorSettings {
   }
 
   private async change(key: string, value: string): Promise<void> {
+    if (!mayCommand(this.app)) return;
     const answer = await askMotor(this.app, this.motor, "configure", {
       kind: 2, changes: [{ motor: this.motor.name, key, value }],
     });

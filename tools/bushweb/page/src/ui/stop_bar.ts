@@ -2,6 +2,7 @@
 // question. Emergency stop is elsewhere and looks different: it latches until faults are cleared.
 import type { App } from "./app";
 import { button, el, mark, put } from "./dom";
+import { kUnansweredMs, StopRound } from "../logic/stop_round";
 import type { Answer } from "../net/requests";
 
 export class StopBar {
@@ -18,8 +19,7 @@ export class StopBar {
       "Stops all motors of all buses at once, and latches until faults are cleared",
   });
   private state = "";
-  private round = 0;
-  private answers = new Map<string, string>();
+  private round: StopRound | undefined;
 
   constructor(private readonly app: App) {
     // Before anything else gets the key.
@@ -44,43 +44,45 @@ export class StopBar {
     const open = this.app.connection.isOpen();
     const daemons = [...this.app.model.daemons.values()].filter((daemon) => daemon.told);
     const nobody = open && daemons.length > 0 && daemons.every((daemon) => !daemon.connected);
-    mark(this.root, "cut", !open || nobody);
+    const alarm = this.round?.isAlarm(this.app.nowMs()) === true;
+    mark(this.root, "cut", !open || nobody || alarm);
     put(this.stopButton,
       !open ? "STOP CANNOT BE SENT" : nobody ? "STOP REACHES NO DAEMON" : "STOP all motors");
     const may = this.app.model.hello?.may_stop ?? true;
     const state = !open ? "No connection to bushd-web. Use the emergency stop of the machine, or bushctl stop."
       : nobody ? "No daemon is connected. If motors move, use the emergency stop of the machine."
         : may ? "Esc stops too" : "This page may not stop motors: it has no token";
-    if (state === this.state) return;
-    // What came of the last stop stays until the state is another.
+    // What came of the last stop stays until the state is another; that nobody has answered it,
+    // until somebody does, or another stop is.
+    if (state !== this.state && !alarm) this.round = undefined;
     this.state = state;
-    put(this.said, state);
+    put(this.said, open && this.round ? this.round.words(this.app.nowMs()) : state);
   }
 
   private ask(request: string, fields: object, name: string): void {
     const daemons = [...this.app.model.daemons.keys()];
-    const round = ++this.round;
-    this.answers = new Map();
     if (daemons.length === 0) {
+      this.round = undefined;
       put(this.said, `${name}: not sent, as no daemon is known to this page`);
       return;
     }
+    const sentMs = this.app.nowMs();
+    const tell = (daemon: string, text: string, answered: boolean): void => {
+      round?.tell(daemon, text, answered);
+      this.update();
+    };
+    let round: StopRound | undefined;
     // All are sent before anything is waited for or drawn.
     const asked = daemons.map((daemon) => this.app.requests.ask(daemon, request, fields, {
-      onAccepted: () => this.tell(round, name, daemon, "accepted, motors ramp down"),
+      onAccepted: () => tell(daemon, "accepted, motors ramp down", true),
     }));
-    for (const daemon of daemons) this.tell(round, name, daemon, "sent");
+    round = this.round = new StopRound(name, daemons, sentMs, (daemon) => this.app.model.isDeaf(daemon));
+    this.update();
+    setTimeout(() => this.update(), kUnansweredMs);
     asked.forEach((answer, i) => {
-      void answer.then((told) => this.tell(round, name, daemons[i] ?? "", said(told)));
+      void answer.then((told) =>
+        tell(daemons[i] ?? "", said(told), told.phase === "result" || told.phase === "refused"));
     });
-  }
-
-  private tell(round: number, name: string, daemon: string, text: string): void {
-    if (round !== this.round) return;
-    this.answers.set(daemon, text);
-    const several = this.answers.size > 1;
-    const all = [...this.answers].map(([of, what]) => (several ? `${of}: ${what}` : what));
-    put(this.said, `${name}: ${all.join("; ")}`);
   }
 }
 

@@ -2,7 +2,7 @@
 // the revision in service, saving as the next revision, and putting it in service.
 import { TableEditor } from "../logic/editor";
 import { duration, parseNumber, short } from "../logic/format";
-import { codeOf, diffOf, isMirrored, moveTimeS, speedOf, type Side } from "../logic/table";
+import { codeOf, diffOf, isMirrored, moveTimeS, speedOf, tooLong, type Side } from "../logic/table";
 import type { Diagnostic, TableFile } from "../net/messages";
 import { isGood } from "../net/requests";
 import { mayCommand, type App } from "./app";
@@ -238,6 +238,11 @@ export class TablePanel {
       return;
     }
     const { table } = this.editor;
+    const why = tooLong(table);
+    if (why !== "") {
+      put(this.said, why);
+      return;
+    }
     const answer = await this.app.requests.ask(this.daemon, "set table", {
       table: name,
       expected_hash: name === this.file ? this.loaded.hash : "",

@@ -1,13 +1,13 @@
 // A path from a file: what it would be, where it is refused, and running it.
 import { CsvError } from "../logic/csv";
-import { duration, parseNumber, short } from "../logic/format";
+import { duration, noSpeed, parseSpeed, short } from "../logic/format";
 import {
   located, parsePath, pathRequests, planeSpeeds, pointOf, type Corners, type Path,
 } from "../logic/path";
 import type { Changes, Motor } from "../model/model";
 import type { MovePlan } from "../net/messages";
 import { isGood, type Answer } from "../net/requests";
-import { mayCommand, unitOf, type App, type View } from "../ui/app";
+import { mayCommand, mayEnd, unitOf, type App, type View } from "../ui/app";
 import { button, choice, el, field, put, section, show } from "../ui/dom";
 import { Plane } from "../ui/plane";
 
@@ -23,6 +23,10 @@ export class PathsView implements View {
   private readonly speed = field("No faster than (each motor's unit/s)", {
     inputmode: "decimal", placeholder: "as the tables", testid: "path-speed",
   });
+  private readonly file = el("input", {
+    type: "file", accept: ".csv,text/csv,text/plain", id: "path-file", testid: "path-file",
+  });
+  private readonly cornersChoice: HTMLSelectElement;
   private readonly check: HTMLButtonElement;
   private readonly run: HTMLButtonElement;
   private readonly pause: HTMLButtonElement;
@@ -36,20 +40,16 @@ export class PathsView implements View {
   private refused: number | undefined;
   private x = 0;
   private y = 0;
-  private round = 0;
 
   constructor(private readonly app: App) {
-    const file = el("input", {
-      type: "file", accept: ".csv,text/csv,text/plain", id: "path-file", testid: "path-file",
-    });
-    file.addEventListener("change", () => {
-      const [chosen] = file.files ?? [];
+    this.file.addEventListener("change", () => {
+      const [chosen] = this.file.files ?? [];
       if (chosen) void this.read(chosen);
-      file.value = "";
+      this.file.value = "";
     });
     const drop = el(
       "div", { class: "drop", testid: "path-drop" },
-      el("label", { for: "path-file", text: "Drop a CSV file here, or choose one: " }), file,
+      el("label", { for: "path-file", text: "Drop a CSV file here, or choose one: " }), this.file,
       el("p", { class: "quiet", text:
         "The first line names motors of one bus, each further one has a position of each, in its " +
         "unit. For one motor a column \"speed\" may say how fast it goes to each point." }),
@@ -68,6 +68,7 @@ export class PathsView implements View {
     const corners = choice("Corners", [
       ["continuous", "passed at the speed that tables allow"], ["exact", "rest at each point"],
     ], this.corners, (value) => { this.corners = value as Corners; void this.examine(); }, { testid: "corners" });
+    this.cornersChoice = corners.select;
     this.speed.input.addEventListener("change", () => void this.examine());
     this.check = button("Check", () => void this.examine(), { testid: "path-check" });
     this.run = button("Run", () => void this.begin(), { testid: "path-run", class: "primary" });
@@ -106,6 +107,10 @@ export class PathsView implements View {
 
   private async read(file: File): Promise<void> {
     show(this.shown, true);
+    if (this.app.paths.isRunning) {
+      put(this.error, `${file.name} is not read: a path runs. Choose it again when that has ended`);
+      return;
+    }
     this.path = this.plan = this.refused = undefined;
     put(this.error, "");
     put(this.said, "");
@@ -172,34 +177,45 @@ export class PathsView implements View {
     this.plane.mark(at(this.x), at(this.y));
   }
 
-  private async send(dryRun: boolean): Promise<Answer | undefined> {
-    const { path } = this;
-    if (!path) return undefined;
+  // Undefined, said why: it cannot be sent as it is.
+  private parts(path: Path, dryRun: boolean): object[] | undefined {
     const text = this.speed.input.value.trim();
-    const speed = text === "" ? 0 : parseNumber(text);
-    if (speed === undefined || speed < 0) {
-      put(this.error, `"${text}" is no speed; allowed: a number above 0`);
+    const speed = parseSpeed(text);
+    if (speed === undefined) {
+      put(this.error, noSpeed(text));
       return undefined;
     }
-    const round = ++this.round;
-    let answer: Answer | undefined;
-    for (const fields of pathRequests(path, { corners: this.corners, speed, dryRun })) {
-      answer = await this.app.requests.ask(this.daemon, "move path", fields, { quiet: true });
-      if (round !== this.round || !isGood(answer)) break;
-    }
-    return round === this.round ? answer : undefined;
+    return pathRequests(path, { corners: this.corners, speed, dryRun });
+  }
+
+  private async send(path: Path, dryRun: boolean): Promise<Answer | undefined> {
+    const parts = this.parts(path, dryRun);
+    if (!parts) return undefined;
+    const { daemon } = this;
+    const ask = (fields: object): Promise<Answer> =>
+      this.app.requests.ask(daemon, "move path", fields, { quiet: true });
+    const answer = dryRun ? this.app.paths.check(parts, ask) : this.app.paths.run(parts, ask);
+    this.writeButtons();
+    return answer;
   }
 
   private async examine(): Promise<void> {
+    const { path } = this;
+    if (!path || this.app.paths.isRunning) return;
+    // Run is of what was checked, and nothing else.
+    this.plan = undefined;
     put(this.error, "");
-    put(this.said, "Checking");
-    const answer = await this.send(true);
-    if (!answer || !this.path) return;
+    put(this.said, "");
+    const sent = this.send(path, true);
+    if (this.error.textContent === "") put(this.said, "Checking");
+    const answer = await sent;
+    this.writeButtons();
+    if (!answer || path !== this.path) return;
     this.plan = isGood(answer) ? answer.detail.plan : undefined;
     this.tellRefusal(answer);
     const { plan } = this;
     put(this.said, plan
-      ? `${this.path.rows.length} points of ${this.path.motors.join(", ")}: ${duration(plan.duration_us / 1e6)}` +
+      ? `${path.rows.length} points of ${path.motors.join(", ")}: ${duration(plan.duration_us / 1e6)}` +
         (plan.limited_by ? `, limited by ${plan.limited_by}` : "") + `; ${peaks(plan)}`
       : "");
     this.draw();
@@ -207,15 +223,17 @@ export class PathsView implements View {
   }
 
   private async begin(): Promise<void> {
-    if (!mayCommand(this.app)) return;
+    const { path } = this;
+    if (!path || !mayCommand(this.app)) return;
     put(this.error, "");
-    const answer = await this.send(false);
-    if (!answer || !this.path) return;
+    const answer = await this.send(path, false);
+    this.writeButtons();
+    if (!answer) return;
     this.tellRefusal(answer);
-    const reason = located(this.path, answer.reason);
+    const reason = located(path, answer.reason);
     const level = isGood(answer) ? "ok" : answer.outcome === "stopped" ? "warning" : "error";
     const why = reason === answer.outcome ? "" : `: ${reason}`;
-    const text = `path ${this.path.file} ${answer.outcome || answer.phase}${why}`;
+    const text = `path ${path.file} ${answer.outcome || answer.phase}${why}`;
     this.app.log.add(level, text);
     this.app.notice(level, text);
     this.draw();
@@ -235,9 +253,12 @@ export class PathsView implements View {
 
   private writeButtons(): void {
     const may = mayCommand(this.app) && this.path !== undefined;
-    for (const one of [this.pause, this.resume]) one.disabled = !may;
-    this.run.disabled = !may || this.plan === undefined;
-    this.check.disabled = this.path === undefined;
+    this.pause.disabled = !mayEnd(this.app) || this.path === undefined;
+    this.resume.disabled = !may;
+    const runs = this.app.paths.isRunning;
+    this.run.disabled = !may || this.plan === undefined || runs;
+    this.check.disabled = this.path === undefined || runs;
+    this.file.disabled = this.cornersChoice.disabled = this.speed.input.disabled = runs;
     this.stop.disabled = this.path === undefined;
     const paused = this.path?.motors.some((_, i) => this.motor(i)?.state?.paused === true) === true;
     show(this.resume, paused);
