@@ -7,7 +7,7 @@ import tempfile
 import unittest
 
 from bushd import model
-from bushd_epics import motor, names
+from bushd_epics import beside, compare, motor, names, trigger
 from bushd_epics.access import Access
 from bushd_epics.scale import Scale, resolution
 
@@ -53,6 +53,21 @@ class Names(unittest.TestCase):
                 file.write_bytes(content)
                 with self.assertRaisesRegex(names.BadNames, "names.toml"):
                     names.read(str(file))
+
+
+class Beside(unittest.TestCase):
+    """Variables of position compare and trigger."""
+
+    def test_a_motor_may_have_in_its_name_what_a_field_begins_with(self):
+        for name in ("m", "mPCO1", "mPCO", "PCO", "m_trg", "m_trg1", "m_trgPCO1", "mPCO1_trg", "pm1:m"):
+            for field in (*compare.FIELDS, *trigger.FIELDS):
+                with self.subTest(name=name, field=field):
+                    self.assertEqual(beside.split(name + field), (name, field))
+
+    def test_other_names_have_no_such_field(self):
+        for name in ("m", "mPCO1", "m_trg", "mPCO", "m_able", "mPCOEnable1", "mPCOenable", "m_trgArm ", "_trg", ""):
+            with self.subTest(name=name), self.assertRaises(KeyError):
+                beside.split(name)
 
 
 class Rights(unittest.TestCase):

@@ -10,7 +10,7 @@ from typing import Any
 
 import caproto
 
-from . import channels, compare, events, trigger
+from . import beside, channels, compare, events, trigger
 from .access import Access
 from .circuits import Circuit, Context
 from .daemon import Daemon
@@ -227,13 +227,13 @@ class Server(Context):
     def _find_beside(self, name: str) -> Any:
         """A variable of a profile, of a position compare or of a trigger. Raises KeyError."""
         begins, colon, field = name.rpartition(":")
-        if begins + colon in self._profiles:
+        if begins + colon in self._profiles and field in self._profiles[begins + colon][1]:
             return self._profiles[begins + colon][1].find(field)
-        for begin, find in (("PCO", Pages.compare), ("_trg", Pages.trigger)):
-            motor, _, field = name.rpartition(begin)
-            if motor in self._pages and not self._pages[motor].record.is_axis:
-                return find(self._pages[motor], begin + field)
-        raise KeyError(name)
+        motor, field = beside.split(name)
+        pages = self._pages[motor]
+        if pages.record.is_axis:
+            raise KeyError(name)
+        return pages.compare(field) if field in compare.FIELDS else pages.trigger(field)
 
     async def look_up_names(self) -> None:
         """Of hosts that may put, as long as some were not found: at boot the network may not be there yet."""
