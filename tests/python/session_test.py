@@ -2,6 +2,7 @@
 
 import random
 import unittest
+from unittest import mock
 
 from bushd import Outcome, messages
 from bushd.errors import NoDaemon, Refused, ResultUnknown, TwoDaemons
@@ -298,6 +299,19 @@ class OverLcm(unittest.TestCase):
         self.daemon.tell("REPLY", answer(self.daemon.request(), ACCEPTED))
         self.daemon.tell("STATE", state(run=2))
         self.assertIsInstance(exchange.error, ResultUnknown)
+
+    def test_who_has_put_a_state_off_is_not_given_it_again_for_one_that_has_not(self):
+        watching = [StatusCollector(), StatusCollector()]
+        for sequence, collector in enumerate(watching, start=1):
+            self.daemon.session.watch(collector)
+            self.daemon.tell("DESCRIPTION", messages.mcu_description_t(parts=1, run=1).encode())
+            with mock.patch.object(codec, "decode", wraps=codec.decode) as read:
+                self.daemon.tell("STATE", state(sequence=sequence))
+            self.assertEqual(read.call_count, 1)  # for the one that has begun to watch
+        self.assertEqual([collector.states_heard for collector in watching], [2, 1])
+        with mock.patch.object(codec, "decode", wraps=codec.decode) as read:
+            self.assertEqual([collector.status().sequence for collector in watching], [2, 2])
+        self.assertEqual(read.call_count, 1)  # what was put off
 
     def test_a_daemon_that_falls_silent(self):
         exchange = self.daemon.begin_with_session()

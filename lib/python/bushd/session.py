@@ -215,12 +215,13 @@ class Session:
 
     def receive(self, channel: str, payload: bytes, now: float) -> None:
         """`channel` without the prefix. Whatever it is: what is no message of the daemon to this client is dropped."""
+        collectors = self._collectors
         if channel == "STATE" and not self._queries:
             unread = codec.unread(payload)
             if unread is None:
                 return
-            put_off = [collector.put_off(unread) for collector in self._collectors]
-            if all(put_off):
+            collectors = [collector for collector in collectors if not collector.put_off(unread)]
+            if not collectors:
                 return self._on_state(unread.run, now)
         elif channel in STATE_CHANNELS and not (self._queries or self._collectors):
             return
@@ -230,7 +231,7 @@ class Session:
         elif isinstance(message, codec.Welcome):
             self._on_welcome(message, now)
         elif isinstance(message, codec.Part):
-            self._on_snapshot(message, now)
+            self._on_snapshot(message, collectors, now)
 
     def link_ended(self, why: str) -> None:
         """No message comes any more. What has come before counts."""
@@ -272,10 +273,11 @@ class Session:
         elif welcome.run != self._welcome_run:
             self._heard_two_at = now
 
-    def _on_snapshot(self, part: codec.Part, now: float) -> None:
+    def _on_snapshot(self, part: codec.Part, collectors: list[StatusCollector], now: float) -> None:
+        """`collectors`: those that have not put it off."""
         if isinstance(part, codec.State):
             self._on_state(part.run, now)
-        for collector in self._collectors:
+        for collector in collectors:
             collector.add(part)
         for query in self._queries:
             query.collector.add(part)
