@@ -29,7 +29,7 @@ class Setup(unittest.TestCase):
             pathlib.Path(self.path, name).symlink_to(f"/usr/bin/{name}")
 
     def test_without_apt_it_is_one_sentence_at_the_beginning(self):
-        for script, *arguments in (("setup",), ("setup", "--package"), ("setup", "--web"), ("demo",), ("package",), ("format",)):
+        for script, *arguments in (("setup",), ("setup", "--package"), ("setup", "--web"), ("setup", "--web-tests"), ("demo",), ("package",), ("format",)):
             with self.subTest(script=script, arguments=arguments):
                 ran = run(script, *arguments, path=self.path)
                 self.assertEqual(ran.returncode, 1)
