@@ -70,9 +70,11 @@ class WebDaemons(BrowserTest):
         tab.get_by_test_id("goto-input").fill(str(FAR))
         tab.get_by_test_id("goto").click()
         self.wait_until_travelled(300, "a0")
+        stays = self.open_tab("motor/bushd/a0", self.make_token("berta"))
+        self.wait_for_text(stays.get_by_test_id("fact-state"), "moving")
         self.bushd.end(signal.SIGKILL)
         self.wait_for_part(tab.get_by_test_id("notice").last, "the daemon has ended")
-        self.wait_for_part(tab.get_by_test_id("connection"), "bushd is not")
+        self.wait_for_part(tab.get_by_test_id("connection"), "no daemon: bushd")
         self.wait_for_class(tab.get_by_test_id("view-a0"), "old")
         self.wait_for_part(tab.get_by_test_id("age"), "old")
         self.go_to_view(tab, "")
@@ -90,6 +92,10 @@ class WebDaemons(BrowserTest):
         stands = self.positions()["a0"]
         self.wait_for_text(self.row(tab, "a0").get_by_test_id("position"), str(stands))
         self.assertGreaterEqual(stands, int(shown))
+        # So does a page that has shown this motor all the time.
+        self.wait_for_class(stays.get_by_test_id("view-a0"), "old", there=False)
+        self.wait_for_text(stays.get_by_test_id("position"), str(stands))
+        self.wait_for_text(stays.get_by_test_id("fact-state"), "at rest")
         self.go_to_view(tab, "motor/bushd/a1")
         tab.get_by_test_id("by-input").fill("7")
         tab.get_by_test_id("by").click()
