@@ -50,6 +50,12 @@ api::MovePlan::Motor plan_of_line(const std::string& name, const motion::LineSha
   return plan;
 }
 
+// A path may lead back to where it began.
+bool makes_steps(std::int64_t steps, const std::optional<motion::LineShare>& line) {
+  return steps != 0 ||
+         (line && line->track && line->track->path().most_steps_per_s(line->motor) > 0);
+}
+
 }  // namespace
 
 motion::Axis* DryRun::Bus::axis_of(link::McuIndex mcu, Output output) {
@@ -86,7 +92,7 @@ DryRun::DryRun(const Installation& installation, std::int64_t now_us,
       motors_.back().line_run = mcu.line_run(axis);
     }
     if (line) of_lines = std::max(of_lines, motors_.back().start);
-    if (steps == 0 || buses_.contains(mcu.config.bus)) continue;
+    if (!makes_steps(steps, line) || buses_.contains(mcu.config.bus)) continue;
     const link::SharedLine* shared = mcu.offers.shared_line;
     buses_.try_emplace(mcu.config.bus,
                        shared != nullptr ? std::optional(shared->snapshot(now_us)) : std::nullopt);
@@ -127,7 +133,7 @@ void DryRun::plan_motor(const Motor& motor, bool further_leg) {
   plan_.motors.push_back(
       motor.line ? plan_of_line(motor.name, *motor.line, motor.steps, motor.shortest_delay)
                  : plan_of(motor.name, motor.table->view(), motor.steps, motor.shortest_delay));
-  if (motor.steps == 0) return;
+  if (!makes_steps(motor.steps, motor.line)) return;
   motion::Axis axis(motor.table->view(), motor.tick_ns, motor.format);
   if (motor.line) {
     axis.start_line(motor.from_steps, *motor.line, motor.start, motor.shortest_delay);

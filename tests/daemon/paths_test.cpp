@@ -274,6 +274,20 @@ TEST(Paths, ADryRunTellsWhenEachPointIsReached) {
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
+TEST(Paths, ADryRunOfOneThatLeadsBackTellsHowLongItTakes) {
+  Lab lab(hall(1, 2));
+  lab.connect();
+  auto path = path_of({"m01", "m02"}, {500, 0, 0, 0});
+  path.dry_run = true;
+  const auto plan = lab.wait(lab.send(path)).plan;
+  ASSERT_TRUE(plan);
+  EXPECT_EQ(plan->motors[0].steps, 0);
+  EXPECT_GE(plan->duration_us, plan->points_us.back());
+  EXPECT_GT(plan->ticks, 0);
+  ASSERT_TRUE(plan->traffic);
+  EXPECT_GT(plan->traffic->frames, 0);
+}
+
 TEST(Paths, SpeedsOfPointsSlowASingleMotorDown) {
   Lab lab(hall(1, 1));
   lab.connect();
