@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { HeldKey, Jog, kKeepaliveMs, kRenewMs, type JogPort } from "../src/logic/jog";
+import { HeldKey, Jog, kFocusLost, kKeepaliveMs, kRenewMs, whyBlurred, type JogPort } from "../src/logic/jog";
 
 type Answered = (good: boolean, reason: string) => void;
 
@@ -150,6 +150,16 @@ test("a key begins once, and again after its jog has ended otherwise", () => {
   assert.equal(begun, 2);
   assert.ok(key.release("ArrowLeft"));
   assert.ok(!key.release("ArrowLeft"));
+});
+
+test("a jog whose button loses the focus with the window says so, and by Tab it is let go", () => {
+  for (const [stillActive, said] of [[true, "the window lost the focus"], [false, ""]] as const) {
+    const { jog, world, ends } = begin();
+    jog.end(whyBlurred(stillActive));
+    jog.end(kFocusLost); // the window's own blur comes after it
+    assert.deepEqual(ends, [said]);
+    assert.equal(world.last()["speed"], 0);
+  }
 });
 
 test("a key that takes the place of another jog ends its own when it is let go", () => {

@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { rulerOf, sections, stateWords, matcher, type Layout } from "../src/logic/overview";
+import { groupsWith } from "../src/logic/table";
 import { Lateness } from "../src/model/lateness";
 import { Model } from "../src/model/model";
 import { Rate } from "../src/model/rates";
@@ -61,6 +62,84 @@ test("what is not in a full state is gone", () => {
   model.takeState(state("a", 2, [mcu("h:1", 0, [motor("y")])], true));
   assert.deepEqual(model.allMotors().map((one) => one.name), ["y"]);
   assert.equal(model.find("a", "x"), undefined);
+});
+
+const described = (daemon: string, mcu: string, motors: MotorDescription[], full = false) => ({
+  kind: "description" as const, daemon, full, mcus: [
+    { part: 0, bus: "hall", mcu, address: 1, tick_ns: 1, emergency_stop: "ramp", port: "", motors }],
+});
+
+test("a motor is the same object after its daemon has been started again, and is told of anew", () => {
+  let ms = 0;
+  const model = new Model(() => ms);
+  model.takeDescription(described("a", "h:1", [about("x"), about("y")], true));
+  model.takeState(state("a", 0, [mcu("h:1", 0, [motor("x", { user_position: 1 }), motor("y")])], true));
+  const x = model.find("a", "x");
+  assert.ok(x?.there);
+  const before = x.mcu;
+  ms = 5000;
+  // What the daemon says of itself comes before the states of its MCUs.
+  model.takeDescription(described("a", "h:1", [about("x", { unit: "deg" })], true));
+  model.takeState(state("a", 5000, [], true));
+  assert.equal(model.find("a", "x"), undefined);
+  assert.deepEqual(model.allMotors(), []);
+  assert.equal(x.there, false);
+  assert.ok(model.isOldMotor(x));
+  model.takeChanges();
+  ms = 5100;
+  model.takeState(state("a", 5100, [mcu("h:1", 0, [motor("x", { user_position: 2 })])]));
+  assert.equal(model.find("a", "x"), x);
+  assert.equal(x.mcu, before);
+  assert.deepEqual(model.allMotors(), [x]);
+  assert.deepEqual([x.there, x.state?.user_position, x.about?.unit], [true, 2, "deg"]);
+  assert.equal(model.isOldMotor(x), false);
+  const changes = model.takeChanges();
+  assert.ok(changes.structure && changes.motors.has(x) && changes.mcus.has(before));
+});
+
+test("what a motor did before it was gone is not shown as what it does now", () => {
+  const model = new Model(() => 0);
+  model.takeState(state("a", 0, [mcu("h:1", 0, [motor("x", { user_position: 1 })])], true));
+  const x = model.find("a", "x");
+  assert.ok(x);
+  model.takeState(state("a", 0, [mcu("h:1", 0, [])], true));
+  // Its MCU is heard, and the motor is not among those that it has.
+  assert.equal(model.isOld(x.mcu), false);
+  assert.ok(model.isOldMotor(x));
+  assert.equal(x.state?.user_position, 1);
+  model.takeDescription(described("a", "h:1", [about("x")]));
+  assert.equal(model.find("a", "x"), x);
+  assert.equal(x.state, undefined);
+});
+
+test("motors of a daemon that bushd-web has no more are the same when it has it again", () => {
+  const hello = (daemons: string[]) => ({
+    kind: "hello" as const, version: "1", user: null, may_command: true, may_stop: true, daemons,
+  });
+  const model = new Model(() => 0);
+  model.takeHello(hello(["a"]));
+  model.takeState(state("a", 0, [mcu("h:1", 0, [motor("x")])], true));
+  const x = model.find("a", "x");
+  assert.ok(x);
+  model.takeHello(hello([]));
+  assert.ok(model.isOldMotor(x));
+  model.takeHello(hello(["a"]));
+  model.takeState(state("a", 0, [mcu("h:2", 0, [motor("x")])], true));
+  assert.equal(model.find("a", "x"), x);
+  assert.equal(x.mcu.name, "h:2");
+  assert.deepEqual(model.allMotors(), [x]);
+  assert.equal(model.isOldMotor(x), false);
+});
+
+test("groups with a table are those of now", () => {
+  const model = lab();
+  const groups = (table: string): string[] => groupsWith(model.allMotors(), table);
+  assert.deepEqual([groups("t"), groups("own")], [["stage", "slits"], []]);
+  const own = { name: "own", revision: 2, hash: "00000001" };
+  model.takeDescription(described("a", "h:1", [about("m10", { table: own }), about("m2", { table: own })]));
+  assert.deepEqual([groups("t"), groups("own")], [["slits"], ["stage"]]);
+  model.takeDescription(described("a", "h:1", [about("m10", { group: "" })]));
+  assert.deepEqual(groups("own"), ["stage"]);
 });
 
 test("a motor that is at another MCU by now is there once", () => {

@@ -31,6 +31,14 @@ export class HeldKey {
   }
 }
 
+export const kFocusLost = "the window lost the focus";
+
+// Why a button that held a jog lost the focus: it stays the active element where the window did. Tab
+// and the like are a way to let go, of which nothing is said.
+export function whyBlurred(stillActive: boolean): string {
+  return stillActive ? kFocusLost : "";
+}
+
 export interface JogPort {
   // False: it was not sent. `answered` is called with what came of it.
   send(fields: object, answered: (good: boolean, reason: string) => void): boolean;

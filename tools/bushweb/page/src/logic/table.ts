@@ -3,6 +3,7 @@
 //   delay before step j of N = max(A(j-1), D(N-j), c)
 //
 // A(i): code i of accel; D(i): the code i places before the end of decel; both c beyond their side.
+import type { Motor } from "../model/model";
 import type { TableFile } from "../net/messages";
 
 export const kMostCode = 65_535;
@@ -102,6 +103,13 @@ export function placeOf(
   if (code <= cruise * 1.001) return { part: "cruise", index: table.accel.length - 1 };
   const index = table.accel.findIndex((delay) => delay <= tolerance);
   return { part: "accel", index: index < 0 ? table.accel.length - 1 : index };
+}
+
+// Groups of which a motor has this table.
+export function groupsWith(motors: Iterable<Motor>, table: string): string[] {
+  const groups = new Set<string>();
+  for (const { about } of motors) if (about?.group && about.table.name === table) groups.add(about.group);
+  return [...groups];
 }
 
 export interface CodeChange {

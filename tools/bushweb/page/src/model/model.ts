@@ -1,6 +1,7 @@
 // What the page knows of all daemons: by daemon and name from the beginning, so that two daemons
 // may have motors of one name. What a daemon has said stays when its connection ends, and grows
-// old: heardMs of its MCUs tells.
+// old: heardMs of its MCUs tells. Motors and MCUs that a daemon tells of no more leave its lists, and
+// are the same objects when they come back, as after a restart: views may hold them.
 import type {
   BusHealth, DaemonMessage, DescriptionMessage, HealthMessage, Hello, McuDescription, McuState,
   MotorDescription, MotorState, StateMessage,
@@ -15,6 +16,7 @@ export interface Motor {
   mcu: Mcu;
   state: MotorState | undefined;
   about: MotorDescription | undefined;
+  there: boolean; // its daemon tells of it
 }
 
 export interface Mcu {
@@ -72,13 +74,20 @@ export class Model {
   // Each report of a motor's MCU, whether the motor has changed or not.
   onReport: (mcu: Mcu) => void = () => {};
   private readonly lateness = new Map<string, Lateness>();
+  // All that there have been since the page was opened, by key.
+  private readonly everMcus = new Map<string, Mcu>();
+  private readonly everMotors = new Map<string, Motor>();
 
   constructor(private readonly nowMs: () => number) {}
 
   takeHello(hello: Hello): void {
     this.hello = hello;
     const names = Array.isArray(hello.daemons) ? hello.daemons : [];
-    for (const name of [...this.daemons.keys()]) if (!names.includes(name)) this.daemons.delete(name);
+    for (const daemon of [...this.daemons.values()]) {
+      if (names.includes(daemon.name)) continue;
+      this.keepOnly(daemon, []);
+      this.daemons.delete(daemon.name);
+    }
     for (const name of names) this.daemon(name);
     this.changes.structure = this.changes.rights = true;
   }
@@ -193,6 +202,11 @@ export class Model {
     return this.ageMs(mcu) > kOldMs;
   }
 
+  // What is shown of it is not what it does now.
+  isOldMotor(motor: Motor): boolean {
+    return !motor.there || this.isOld(motor.mcu);
+  }
+
   // A connected daemon with MCUs, of which none has been heard lately. Pseudo-axes are no MCUs.
   isDeaf(name: string): boolean {
     const daemon = this.daemons.get(name);
@@ -220,10 +234,12 @@ export class Model {
   private mcu(daemon: Daemon, name: string, bus: string, part: number): Mcu {
     let mcu = daemon.mcus.get(name);
     if (!mcu) {
-      mcu = {
-        key: keyOf(daemon.name, name), daemon: daemon.name, name, bus, part,
+      const key = keyOf(daemon.name, name);
+      mcu = this.everMcus.get(key) ?? {
+        key, daemon: daemon.name, name, bus, part,
         heardMs: -Infinity, state: undefined, about: undefined, motors: [],
       };
+      this.everMcus.set(key, mcu);
       daemon.mcus.set(name, mcu);
       this.changes.structure = true;
     }
@@ -235,10 +251,16 @@ export class Model {
   private motor(daemon: Daemon, mcu: Mcu, name: string): Motor {
     let motor = daemon.motors.get(name);
     if (!motor) {
-      motor = {
-        key: keyOf(daemon.name, name), daemon: daemon.name, name, mcu, state: undefined,
-        about: undefined,
+      const key = keyOf(daemon.name, name);
+      motor = this.everMotors.get(key) ?? {
+        key, daemon: daemon.name, name, mcu, state: undefined, about: undefined, there: true,
       };
+      this.everMotors.set(key, motor);
+      motor.mcu = mcu;
+      motor.there = true;
+      // Its state is told anew. A description may have been told before the state without it, and is
+      // not told twice.
+      motor.state = undefined;
       daemon.motors.set(name, motor);
       mcu.motors.push(motor);
       this.changes.structure = true;
@@ -255,7 +277,7 @@ export class Model {
     const names = new Set(mcus.map((mcu) => mcu.mcu));
     for (const mcu of [...daemon.mcus.values()]) {
       if (names.has(mcu.name)) continue;
-      for (const motor of mcu.motors) daemon.motors.delete(motor.name);
+      this.keepMotors(daemon, mcu, []);
       daemon.mcus.delete(mcu.name);
       this.changes.structure = true;
     }
@@ -265,7 +287,10 @@ export class Model {
     const names = new Set(motors.map((motor) => motor.name));
     const gone = mcu.motors.filter((motor) => !names.has(motor.name));
     if (gone.length === 0) return;
-    for (const motor of gone) daemon.motors.delete(motor.name);
+    for (const motor of gone) {
+      motor.there = false;
+      daemon.motors.delete(motor.name);
+    }
     mcu.motors = mcu.motors.filter((motor) => names.has(motor.name));
     this.changes.structure = true;
   }

@@ -1,4 +1,5 @@
 // What all views use.
+import { age } from "../logic/format";
 import type { PathSender } from "../logic/path_sender";
 import type { Answer, Options, Requests } from "../net/requests";
 import type { Connection } from "../net/connection";
@@ -39,6 +40,14 @@ export function mayEnd(app: App): boolean {
 // Also without a connection: a stop is always tried.
 export function mayStop(app: App): boolean {
   return app.model.hello?.may_command === true || app.model.hello?.may_stop === true;
+}
+
+// How old what is shown of a motor is; nothing where it is of now.
+export function ageOf(app: App, motor: Motor): string {
+  if (!app.model.isOldMotor(motor)) return "";
+  const ageMs = app.model.ageMs(motor.mcu);
+  if (!Number.isFinite(ageMs)) return "never heard";
+  return app.model.isOld(motor.mcu) ? `${age(ageMs)} old` : "old: its daemon tells of it no more";
 }
 
 // Asks for something of one motor.

@@ -1,5 +1,5 @@
 // Buttons and arrow keys that move a motor for as long as they are held.
-import { HeldKey, Jog } from "../logic/jog";
+import { HeldKey, Jog, kFocusLost, whyBlurred } from "../logic/jog";
 import { beginsMotion } from "../logic/motion";
 import { parseNumber, roundDown125, short } from "../logic/format";
 import { recall, remember } from "../logic/persist";
@@ -17,7 +17,7 @@ export class JogPad {
   private readonly heldKey = new HeldKey();
   readonly root: HTMLElement;
 
-  private readonly endByBlur = (): void => this.end("the window lost the focus");
+  private readonly endByBlur = (): void => this.end(kFocusLost);
   private readonly endByPage = (): void => this.end("the page is left");
   private readonly endIfHidden = (): void => {
     if (document.visibilityState === "hidden") this.end("the page is hidden");
@@ -117,7 +117,7 @@ export class JogPad {
       event.preventDefault();
       this.heldKey.press(event.key, event.repeat, () => this.begin(sign));
     });
-    hold.addEventListener("blur", letGo);
+    hold.addEventListener("blur", () => this.end(whyBlurred(document.activeElement === hold)));
     return hold;
   }
 

@@ -1,8 +1,8 @@
 // One motor in the overview.
-import { age, fixed } from "../logic/format";
+import { fixed } from "../logic/format";
 import { stateWords } from "../logic/overview";
 import type { Motor } from "../model/model";
-import { askMotor, mayStop, motorAddress, precisionOf, unitOf, type App } from "./app";
+import { ageOf, askMotor, mayStop, motorAddress, precisionOf, unitOf, type App } from "./app";
 import { attribute, button, el, mark, put, show } from "./dom";
 import { Ruler } from "./ruler";
 
@@ -73,10 +73,8 @@ export class MotorRow {
 
   // Ages go on while nothing is heard.
   tick(): void {
-    const old = this.app.model.isOld(this.motor.mcu);
-    mark(this.root, "old", old);
-    const ageMs = this.app.model.ageMs(this.motor.mcu);
-    put(this.age, old ? (Number.isFinite(ageMs) ? `${age(ageMs)} old` : "never heard") : "");
+    mark(this.root, "old", this.app.model.isOldMotor(this.motor));
+    put(this.age, ageOf(this.app, this.motor));
     show(this.stop, mayStop(this.app));
   }
 

@@ -48,7 +48,7 @@ export class RampPlot {
     const { table, motor } = this;
     if (!table || !this.plot) return;
     const state = motor.state;
-    const old = this.app.model.isOld(motor.mcu);
+    const old = this.app.model.isOldMotor(motor);
     const left = state?.target_steps != null && state.position_steps != null && state.activity === "move"
       ? state.target_steps - state.position_steps : undefined;
     const place = state && !old ? placeOf(table, state.velocity_steps_per_s, left) : undefined;

@@ -14,7 +14,7 @@ const kShownChanges = 200;
 
 export class TablePanel {
   readonly root = el("section", { class: "panel", testid: "table-editor" });
-  onSaved: () => void = () => {};
+  onSaved: (said: string) => void = () => {};
   private readonly editor: TableEditor;
   private readonly plot: EditPlot;
   private side: Side = "accel";
@@ -121,6 +121,10 @@ export class TablePanel {
     const may = mayCommand(this.app);
     this.save.disabled = !may;
     this.use.disabled = !may;
+  }
+
+  say(text: string): void {
+    put(this.said, text);
   }
 
   get isChanged(): boolean {
@@ -248,8 +252,9 @@ export class TablePanel {
       expected_hash: name === this.file ? this.loaded.hash : "",
       content: name === this.file ? table : { ...table, name, revision: 0 },
     });
-    put(this.said, isGood(answer) ? `Saved; ${answer.reason}` : answer.reason);
-    if (isGood(answer)) this.onSaved();
+    this.say(isGood(answer) ? `Saved; ${answer.reason}` : answer.reason);
+    // The editor that comes after this one says it too.
+    if (isGood(answer)) this.onSaved(`Saved; ${answer.reason}`);
   }
 
   private async putInService(): Promise<void> {

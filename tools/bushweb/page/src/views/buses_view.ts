@@ -11,6 +11,8 @@ const kColumns = [
   "Timeouts", "Restarts", "Least queue (ticks)", "Crystal (ppm)", "Clock (us)", "Firmware", "Last reset",
 ];
 
+const kWords = 3; // columns before the numbers
+
 export class BusesView implements View {
   readonly title = "Buses";
   readonly root = el("div", { testid: "buses" });
@@ -82,7 +84,8 @@ export class BusesView implements View {
       el("div", {
         class: "wide", tabindex: "0", role: "region", "aria-label": `MCUs of ${title}`, "data-bus": title,
       }, el("table", { class: "plain" },
-        el("thead", {}, el("tr", {}, ...kColumns.map((text) => el("th", { scope: "col", text })))),
+        el("thead", {}, el("tr", {}, ...kColumns.map((text, i) =>
+          el("th", { class: i < kWords ? undefined : "number", scope: "col", text })))),
         el("tbody", {}, ...mcus.map((mcu) => this.rowOf(mcu, bus))))),
     );
   }
@@ -99,7 +102,7 @@ export class BusesView implements View {
         ? "–" : String(health.low_water_ticks),
       fixed(health.rate_ppm, 1), fixed(health.clock_offset_us, 1), String(health.firmware_version),
       health.reset_cause || "–",
-    ] : kColumns.slice(3).map(() => "–");
+    ] : kColumns.slice(kWords).map(() => "–");
     return el(
       "tr", { class: bad ? "bad" : undefined, testid: `mcu-${mcu.name}` },
       el("th", { scope: "row", text: mcu.name }),

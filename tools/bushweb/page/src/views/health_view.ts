@@ -7,6 +7,7 @@ import { button, download, el, put, section, show } from "../ui/dom";
 import { withCode } from "../ui/first_start";
 import { historyCsv } from "../ui/motor_history";
 
+const kNoDaemon = "No daemon is known to this page";
 const kRank = { error: 0, warning: 1, ok: 2 };
 
 export class HealthView implements View {
@@ -18,6 +19,7 @@ export class HealthView implements View {
   private readonly exported = el("p", { class: "quiet", role: "status" });
   private readonly first = el("p", { text: "Nothing has happened since the page was opened." });
   private logged = -1;
+  private examined = false;
 
   constructor(private readonly app: App) {
     this.root = el(
@@ -28,18 +30,22 @@ export class HealthView implements View {
         button("Export CSV", () => this.saveLog(), { testid: "log-csv" })), this.first,
       el("div", { class: "wide log", tabindex: "0", role: "region", "aria-label": "Log of this page" },
         el("table", { class: "plain", testid: "log" },
-          el("thead", {}, el("tr", {}, el("th", { scope: "col", text: "Time" }),
+          el("thead", {}, el("tr", {}, el("th", { class: "number", scope: "col", text: "Time" }),
             el("th", { scope: "col", text: "What" }))), this.events))),
       section("History of all motors",
         el("p", { class: "quiet", text: "Up to 1000 motions of each motor, as one CSV file." }),
         el("div", { class: "buttons" },
           button("Export CSV", () => void this.saveHistory(), { testid: "all-history-csv" })), this.exported),
     );
-    void this.examine();
+    put(this.said, "Waiting for what bushd-web says of daemons");
     this.drawLog();
   }
 
   update(_changes: Changes): void {
+    // A page that was opened here knows none before bushd-web has said hello.
+    const { daemons, hello } = this.app.model;
+    if (!this.examined && daemons.size > 0) void this.examine();
+    else if (!this.examined && hello) put(this.said, kNoDaemon);
     this.drawLog();
   }
 
@@ -50,8 +56,13 @@ export class HealthView implements View {
   close(): void {}
 
   private async examine(): Promise<void> {
-    put(this.said, "Looking for some seconds");
     const daemons = [...this.app.model.daemons.keys()];
+    if (daemons.length === 0) {
+      put(this.said, kNoDaemon);
+      return;
+    }
+    this.examined = true;
+    put(this.said, "Looking for some seconds");
     const answers = await Promise.all(
       daemons.map((daemon) => this.app.requests.call("doctor", { daemon })));
     const all = answers.flatMap((answer, i) =>
@@ -62,8 +73,7 @@ export class HealthView implements View {
     all.sort((a, b) => kRank[a.finding.level] - kRank[b.finding.level]);
     const errors = all.filter(({ finding }) => finding.level === "error").length;
     const warnings = all.filter(({ finding }) => finding.level === "warning").length;
-    put(this.said, daemons.length === 0 ? "No daemon is known to this page"
-      : `${counted(errors, "error")}, ${counted(warnings, "warning")}`);
+    put(this.said, `${counted(errors, "error")}, ${counted(warnings, "warning")}`);
     this.findings.replaceChildren(...all.map(({ daemon, finding }) => el(
       "li", { class: finding.level },
       el("strong", { text: finding.level }),

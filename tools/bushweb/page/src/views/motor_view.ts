@@ -1,8 +1,8 @@
 // One motor: where it stands, what can be asked of it, plots, settings and history.
-import { age, dateTime, duration, fixed, short } from "../logic/format";
+import { dateTime, duration, fixed, short } from "../logic/format";
 import { stateWords } from "../logic/overview";
 import type { Changes, Motor } from "../model/model";
-import { askMotor, precisionOf, unitOf, type App, type View } from "../ui/app";
+import { ageOf, askMotor, precisionOf, unitOf, type App, type View } from "../ui/app";
 import { attribute, el, mark, put, section, show } from "../ui/dom";
 import { JogPad } from "../ui/jog_pad";
 import { LivePlot } from "../ui/live_plot";
@@ -169,10 +169,9 @@ export class MotorView implements View {
   }
 
   private writeAge(): void {
-    const old = this.app.model.isOld(this.motor.mcu);
+    const old = this.app.model.isOldMotor(this.motor);
     mark(this.root, "old", old);
-    const ageMs = this.app.model.ageMs(this.motor.mcu);
-    put(this.age, old ? (Number.isFinite(ageMs) ? `${age(ageMs)} old` : "never heard") : "");
+    put(this.age, ageOf(this.app, this.motor));
     if (old) this.ramp.update();
   }
 }

@@ -1,7 +1,7 @@
 // Tables that the daemon finds: several over each other as curves, and the editor of one.
 import uPlot from "uplot";
 import { short } from "../logic/format";
-import { curveOf, decelOf, isMirrored, speedOf } from "../logic/table";
+import { curveOf, decelOf, groupsWith, isMirrored, speedOf } from "../logic/table";
 import type { Changes } from "../model/model";
 import type { TableEntry, TableFile } from "../net/messages";
 import type { App, View } from "../ui/app";
@@ -11,6 +11,8 @@ import { TablePanel } from "../ui/table_panel";
 
 const kHeight = 300;
 const kMostCurves = 6;
+const kColumns = ["Plot", "Table", "Revision", "Codes", "Start (steps/s)", "Max (steps/s)", "Groups", "Edit"];
+const kNumbers = new Set(["Revision", "Codes", "Start (steps/s)", "Max (steps/s)"]);
 
 export class TablesView implements View {
   readonly title = "Tables";
@@ -22,6 +24,7 @@ export class TablesView implements View {
   private readonly editorPlace = el("div", {});
   private readonly files = new Map<string, TableFile>();
   private readonly chosen = new Set<string>();
+  private groupCells: { table: string; cell: HTMLElement }[] = [];
   private daemon = "";
   private discards = ""; // the table for which somebody has been told what would be lost
   private plot: uPlot | undefined;
@@ -37,8 +40,9 @@ export class TablesView implements View {
         el("div", { class: "buttons" }, button("Read again", () => void this.load())), this.said,
         el("div", { class: "wide table-list", tabindex: "0", role: "region", "aria-label": "Tables" },
           el("table", { class: "plain" }, el("thead", {}, el("tr", {},
-            ...["Plot", "Table", "Revision", "Codes", "Start (steps/s)", "Max (steps/s)", "Groups", "Edit"]
-              .map((text) => el("th", { scope: "col", text })))), this.rows))),
+            ...kColumns.map((text) =>
+              el("th", { class: kNumbers.has(text) ? "number" : undefined, scope: "col", text })))),
+          this.rows))),
       this.curves, this.editorPlace,
     );
     show(this.curves, false);
@@ -60,6 +64,7 @@ export class TablesView implements View {
       }
       if (this.daemon !== "") void this.load();
     }
+    this.writeGroups();
     this.panel?.update();
   }
 
@@ -77,16 +82,16 @@ export class TablesView implements View {
     const answer = await this.app.requests.ask(this.daemon, "list tables", {}, { quiet: true });
     const entries = answer.detail.tables;
     put(this.said, entries ? `${entries.length} tables` : answer.reason);
+    this.groupCells = [];
     this.rows.replaceChildren(...(entries ?? []).map((entry) => this.row(entry)));
+    this.writeGroups();
     await this.draw();
   }
 
-  private groupsOf(entry: TableEntry): string[] {
-    const groups = new Set<string>();
-    for (const motor of this.app.model.daemons.get(this.daemon)?.motors.values() ?? []) {
-      if (motor.about?.group && motor.about.table.name === (entry.table?.name ?? "")) groups.add(motor.about.group);
-    }
-    return [...groups];
+  // Which group has which table changes while the list is shown.
+  private writeGroups(): void {
+    const motors = [...(this.app.model.daemons.get(this.daemon)?.motors.values() ?? [])];
+    for (const { table, cell } of this.groupCells) put(cell, groupsWith(motors, table).join(", "));
   }
 
   private row(entry: TableEntry): HTMLElement {
@@ -102,13 +107,15 @@ export class TablesView implements View {
     });
     const cells = good ? [
       String(entry.table?.revision ?? "–"), String(entry.codes ?? "–"),
-      short(entry.start_steps_per_s, 5), short(entry.max_steps_per_s, 5), this.groupsOf(entry).join(", "),
+      short(entry.start_steps_per_s, 5), short(entry.max_steps_per_s, 5),
     ] : [];
+    const groups = el("td", {});
+    if (good) this.groupCells.push({ table: entry.table?.name ?? "", cell: groups });
     return el(
       "tr", { class: good ? undefined : "bad", testid: `table-${entry.name}` },
       el("td", {}, box), el("th", { scope: "row", text: entry.name }),
       ...cells.map((text) => el("td", { class: "number", text })),
-      good ? null : el("td", { colspan: "5", text: entry.fault }),
+      good ? groups : el("td", { colspan: "5", text: entry.fault }),
       el("td", {}, good ? button("Edit", () => void this.edit(entry), { "aria-label": `Edit ${entry.name}` }) : null),
     );
   }
@@ -150,7 +157,8 @@ export class TablesView implements View {
     this.cleanup = fitWidth(this.plot, this.holder, kHeight);
   }
 
-  private async edit(entry: TableEntry): Promise<void> {
+  // `said`: what the editor says as it opens.
+  private async edit(entry: TableEntry, said = ""): Promise<void> {
     // No dialog: while one is open, neither Esc nor the stop bar would stop anything.
     if (this.panel?.isChanged && this.discards !== entry.name) {
       this.discards = entry.name;
@@ -165,15 +173,16 @@ export class TablesView implements View {
     const groups = [...new Set(motors.flatMap((motor) => motor.about?.group || []))];
     const served = motors.find((motor) => motor.about?.table.name === table.name)?.about?.table;
     const panel = new TablePanel(this.app, this.daemon, entry.name, table, groups);
-    panel.onSaved = () => {
+    panel.onSaved = (saved) => {
       this.files.clear();
       void this.load();
       this.panel?.close();
       this.panel = undefined;
-      void this.edit(entry);
+      void this.edit(entry, saved);
     };
     this.panel = panel;
     this.editorPlace.replaceChildren(panel.root);
+    panel.say(said);
     await panel.start(served && served.revision > 0 ? `${entry.name}@${served.revision}` : undefined);
     panel.root.scrollIntoView({ block: "nearest" });
   }
