@@ -34,7 +34,7 @@ class Server : public Outlet, public Dialer {
   // Connections, and pages among them.
   static constexpr std::size_t kMostConnections = 512;
   static constexpr std::size_t kMostPages = 200;
-  // Of these so many are for pages that may stop or command.
+  // So many of them are for pages that may stop or command.
   static constexpr std::size_t kKeptPages = 100;
   // What a page may send in one message, and a request over HTTP as its body.
   static constexpr std::size_t kMostMessage = 512 * 1024;
