@@ -44,6 +44,15 @@ class Installation(unittest.TestCase):
         cls.files = {str(path.relative_to(cls.prefix)) for path in cls.prefix.rglob("*") if not path.is_dir()}
 
 
+class BuiltForAPackage(unittest.TestCase):
+    """Packages are built without tests, for which much is made here."""
+
+    def test_the_headers_of_lcm_are_made_for_themselves(self):
+        made = subprocess.run(["ninja", "-C", BUILD, "-t", "query", "lib/lcm/all"], capture_output=True, text=True, check=True).stdout
+        inputs = made.partition("outputs:")[0].split()
+        self.assertIn("lib/lcm/bushd_lcm_headers", inputs)
+
+
 class Layout(Installation):
     def packaged(self):
         """What the packages take, below a prefix; the images come from builds of their own."""
