@@ -71,7 +71,7 @@ class WebStop(BrowserTest):
             self.wait_for_part(commander.get_by_test_id("notice").last, "clear faults")
         self.wait_until_ready()
         self.wait_for_text(tab.get_by_test_id("trouble"), "")
-        self.assertEqual([event["request"] for event in self.requests(client="anyone")], ["stop", "stop", "emergency stop"])
+        self.assertEqual([event["request"] for event in self.requests(client="*")], ["stop", "stop", "emergency stop"])
         self.end_programs()
         # No step after the emergency stop's: the same number as the daemon counts.
         traced = self.traced_positions()
