@@ -12,20 +12,17 @@ namespace {
 
 constexpr const char* kNoToken =
     "this page may only look: run 'bushctl web-token' as a member of the group bushd, and enter "
-    "what "
-    "it prints on this page";
+    "what it prints on this page";
 constexpr const char* kNoStop =
-    "this page may not stop either: it is not on the PC of bushd-web. Enter a token, which "
-    "'bushctl "
-    "web-token' makes";
+    "this page may not stop either: from here that needs a token too, which 'bushctl web-token' "
+    "makes";
 constexpr const char* kTooFast =
     "this page sends too many messages: 100 a second are taken, and all stops";
 constexpr const char* kTooLarge =
     "a message above 4 KiB is taken from who may command only: enter a token";
 constexpr const char* kLate =
     "this came late: the page had not heard of bushd-web for 2 s when it was asked for, so it is "
-    "not "
-    "carried out. Ask again";
+    "not carried out. Ask again";
 constexpr const char* kUrgent = "\n";  // behind the name of a daemon: a link for stops alone
 constexpr const char* kTooMany = "256 requests of this page are under way: wait for one of them";
 

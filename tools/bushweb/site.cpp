@@ -280,7 +280,7 @@ void Site::tick() {
   news.push_back(alive(steady_us()));
   for (const auto& [id, page] : pages_) {
     if (outlet_.is_behind(id)) {
-      page->behind = page->behind || !news.empty();
+      page->behind = true;
     } else if (std::exchange(page->behind, false)) {
       catch_up(*page);
     } else {
