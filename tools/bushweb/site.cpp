@@ -84,6 +84,8 @@ class Site::OpenPage : public Surroundings {
   void log_out() { visit_.cookies.clear(); }
   void greet() { tell(hello(site_.options_.version, page_.rights(), names())); }
   bool behind = false;  // what was told last is not all that there was
+  // It was told everything after this round's news were taken: they would be older.
+  std::int64_t knows_all_of = 0;
 
  private:
   std::vector<std::string> names() const {
@@ -258,6 +260,7 @@ void Site::catch_up(OpenPage& page) {
   for (const auto& source : sources_) {
     for (const Text& text : source->mirror().everything()) page.tell(text);
   }
+  page.knows_all_of = round_;
 }
 
 void Site::hear(PageId id, std::string_view text) {
@@ -270,27 +273,39 @@ void Site::close(PageId id) {
 }
 
 void Site::tick() {
-  std::vector<Text> news;
-  for (const auto& source : sources_) {
-    source->tick(steady_us());
-    is_heard(*source);
-    std::ranges::move(source->mirror().news(), std::back_inserter(news));
-  }
-  const bool second = ++ticks_ % kTicksPerSecond == 0;
-  news.push_back(alive(steady_us()));
+  const int turn = ++ticks_ % kTurns;
+  if (turn == 0) take_news();
+  const Text still_here = alive(steady_us());
   for (const auto& [id, page] : pages_) {
-    if (outlet_.is_behind(id)) {
-      page->behind = true;
-    } else if (std::exchange(page->behind, false)) {
-      catch_up(*page);
-    } else {
-      for (const Text& text : news) page->tell(text);
-    }
+    if (id % kTurns == static_cast<PageId>(turn)) tell_news(*page, still_here);
   }
-  if (!second) return;
+  if (ticks_ % kTicksPerSecond != 0) return;
   end_examinations();
   refresh_tokens();
   check_rights();
+}
+
+void Site::take_news() {
+  ++round_;
+  news_.clear();
+  for (const auto& source : sources_) {
+    source->tick(steady_us());
+    is_heard(*source);
+    std::ranges::move(source->mirror().news(), std::back_inserter(news_));
+  }
+}
+
+void Site::tell_news(OpenPage& page, const Text& still_here) {
+  if (outlet_.is_behind(page.id())) {
+    page.behind = true;
+    return;
+  }
+  if (std::exchange(page.behind, false)) {
+    catch_up(page);
+  } else if (page.knows_all_of != round_) {
+    for (const Text& text : news_) page.tell(text);
+  }
+  page.tell(still_here);
 }
 
 void Site::check_rights() {

@@ -45,7 +45,10 @@ struct SiteOptions {
 
 class Site {
  public:
-  static constexpr int kTicksPerSecond = 10;
+  // Pages are told what is new one fifth after the other: browsers that have many open would draw all of
+  // them at the same moment, and a key that is pressed just then would wait for that.
+  static constexpr int kTurns = 5;
+  static constexpr int kTicksPerSecond = 10 * kTurns;
 
   Site(SiteOptions options, Poller& poller, Outlet& outlet, Dialer& dialer);
   ~Site();
@@ -62,7 +65,8 @@ class Site {
   void hear(PageId page, std::string_view text);
   void close(PageId page);
 
-  // So many times a second: states go out, daemons are tried again, tokens are read.
+  // So many times a second: a fifth of the pages is told what is new; each fifth time daemons are tried
+  // again, and once a second tokens are read.
   void tick();
 
  private:
@@ -78,6 +82,8 @@ class Site {
   Rights rights_for(const Visit& visit) const;
   Source* source_of(const std::string& daemon) const;
   void catch_up(OpenPage& page);
+  void take_news();
+  void tell_news(OpenPage& page, const Text& still_here);
   void refresh_tokens();
   void check_rights();
   bool is_heard(Source& source);
@@ -107,6 +113,8 @@ class Site {
   std::map<std::string, Examination> examinations_{};
   std::map<std::string, std::int64_t> heard_at_us_{};  // of each daemon's last state
   int ticks_ = 0;
+  std::vector<Text> news_{};  // of the last round through all pages
+  std::int64_t round_ = 0;
 };
 
 }  // namespace bushweb
