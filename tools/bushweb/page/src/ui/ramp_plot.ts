@@ -1,18 +1,20 @@
-// The table of a motor, speed over steps, with the place in the ramp where the motor is now.
+// The table of a motor, speed over steps, with the place in the ramp where the motor is now: a mark
+// above the plot, which is not drawn again for it.
 import uPlot from "uplot";
 import { short } from "../logic/format";
 import { curveOf, decelOf, placeOf } from "../logic/table";
 import type { Motor } from "../model/model";
 import type { TableFile } from "../net/messages";
 import { askMotor, type App } from "./app";
-import { el, put, section } from "./dom";
-import { axis, colour, fitWidth, seriesColour } from "./plot_look";
+import { el, put, section, show } from "./dom";
+import { axis, fitWidth, seriesColour } from "./plot_look";
 
 const kHeight = 200;
 
 export class RampPlot {
   private readonly said = el("p", { class: "quiet", testid: "ramp-place" });
   private readonly holder = el("div", { class: "plot" });
+  private readonly mark = el("div", { class: "place", testid: "ramp-mark" });
   readonly root = section("Table", this.said, this.holder);
   private plot: uPlot | undefined;
   private cleanup: () => void = () => {};
@@ -64,7 +66,7 @@ export class RampPlot {
     this.at = place && {
       x: place.part === "decel" ? accelSteps + place.index : place.index, y: speed,
     };
-    this.plot.redraw(false);
+    this.place();
   }
 
   close(): void {
@@ -91,22 +93,19 @@ export class RampPlot {
         { label: "accelerating", stroke: seriesColour(0), width: 1.5, value: shown },
         { label: "decelerating", stroke: seriesColour(1), width: 1.5, value: shown },
       ],
-      hooks: { draw: [(plot) => this.drawPlace(plot)] },
+      hooks: { draw: [() => this.place()] }, // after a zoom and in another width too
     }, [x, rising, falling], this.holder);
+    this.plot.over.append(this.mark);
     this.cleanup = fitWidth(this.plot, this.holder, kHeight);
   }
 
-  private drawPlace(plot: uPlot): void {
-    if (!this.at) return;
-    const { ctx } = plot;
-    const x = plot.valToPos(this.at.x, "x", true);
-    const y = plot.valToPos(this.at.y, "y", true);
-    ctx.save();
-    ctx.fillStyle = colour("accent");
-    ctx.beginPath();
-    ctx.arc(x, y, 6 * devicePixelRatio, 0, 2 * Math.PI);
-    ctx.fill();
-    ctx.restore();
+  private place(): void {
+    const { plot, at } = this;
+    show(this.mark, at !== undefined);
+    if (!plot || !at) return;
+    const x = plot.valToPos(at.x, "x");
+    const y = plot.valToPos(at.y, "y");
+    this.mark.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
   }
 }
 
