@@ -45,8 +45,8 @@ struct SiteOptions {
 
 class Site {
  public:
-  // Pages are told what is new one fifth after the other: browsers that have many open would draw all of
-  // them at the same moment, and a key that is pressed just then would wait for that.
+  // Pages are told what is new one fifth after the other: browsers that have many open would draw
+  // all of them at the same moment, and a key that is pressed just then would wait for that.
   static constexpr int kTurns = 5;
   static constexpr int kTicksPerSecond = 10 * kTurns;
 
@@ -65,8 +65,8 @@ class Site {
   void hear(PageId page, std::string_view text);
   void close(PageId page);
 
-  // So many times a second: a fifth of the pages is told what is new; each fifth time daemons are tried
-  // again, and once a second tokens are read.
+  // So many times a second: a fifth of the pages is told what is new; each fifth time daemons are
+  // tried again, and once a second tokens are read.
   void tick();
 
  private:

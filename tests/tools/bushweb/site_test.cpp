@@ -25,7 +25,8 @@ class Pages {
  public:
   explicit Pages(PageId count) {
     for (PageId id = 1; id <= count; ++id) {
-      site_.open(id, {.method = "GET", .path = "/api/live", .host = "localhost", .peer = "127.0.0.1"});
+      site_.open(id,
+                 {.method = "GET", .path = "/api/live", .host = "localhost", .peer = "127.0.0.1"});
     }
     outlet_.told.clear();
   }
