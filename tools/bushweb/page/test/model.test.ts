@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { rulerOf, sections, stateWords, matcher, type Layout } from "../src/logic/overview";
-import { groupsWith } from "../src/logic/table";
+import { groupsWith, servedRevision } from "../src/logic/table";
 import { Lateness } from "../src/model/lateness";
 import { Model } from "../src/model/model";
 import { Rate } from "../src/model/rates";
@@ -140,6 +140,20 @@ test("groups with a table are those of now", () => {
   assert.deepEqual([groups("t"), groups("own")], [["slits"], ["stage"]]);
   model.takeDescription(described("a", "h:1", [about("m10", { group: "" })]));
   assert.deepEqual(groups("own"), ["stage"]);
+});
+
+test("the revision in service is that of the group, else of any that has the table", () => {
+  const model = lab();
+  const served = (table: string, group: string): number | undefined =>
+    servedRevision(model.allMotors(), table, group);
+  const own = (revision: number): MotorDescription["table"] => ({ name: "own", revision, hash: "00000001" });
+  assert.deepEqual([served("t", "stage"), served("own", "stage")], [1, undefined]);
+  const slits = about("m2", { group: "slits", table: own(3) });
+  model.takeDescription(described("a", "h:1", [about("m10", { table: own(2) }), slits]));
+  assert.deepEqual([served("own", "stage"), served("own", "slits"), served("own", "nobody")], [2, 3, 2]);
+  // One that is in no file of tables has no revision.
+  model.takeDescription(described("a", "h:1", [about("m10", { table: own(0) })]));
+  assert.equal(served("own", "stage"), 3);
 });
 
 test("a motor that is at another MCU by now is there once", () => {

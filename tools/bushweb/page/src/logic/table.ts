@@ -112,6 +112,17 @@ export function groupsWith(motors: Iterable<Motor>, table: string): string[] {
   return [...groups];
 }
 
+// The revision of this table that is in service: that of the group's motors, else of any. Undefined: no motor has it.
+export function servedRevision(motors: Iterable<Motor>, table: string, group: string): number | undefined {
+  let other: number | undefined;
+  for (const { about } of motors) {
+    if (about?.table.name !== table || about.table.revision <= 0) continue;
+    if (about.group === group) return about.table.revision;
+    other ??= about.table.revision;
+  }
+  return other;
+}
+
 export interface CodeChange {
   side: Side;
   index: number;

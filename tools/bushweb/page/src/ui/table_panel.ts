@@ -2,7 +2,7 @@
 // the revision in service, saving as the next revision, and putting it in service.
 import { TableEditor } from "../logic/editor";
 import { duration, parseNumber, short } from "../logic/format";
-import { codeOf, diffOf, isMirrored, moveTimeS, speedOf, tooLong, type Side } from "../logic/table";
+import { codeOf, diffOf, isMirrored, moveTimeS, servedRevision, speedOf, tooLong, type Side } from "../logic/table";
 import type { Diagnostic, TableFile } from "../net/messages";
 import { isGood } from "../net/requests";
 import { mayCommand, type App } from "./app";
@@ -22,6 +22,7 @@ export class TablePanel {
   private checks = 0;
   private timer: ReturnType<typeof setTimeout> | undefined;
   private inService: TableFile | undefined;
+  private compared: number | undefined; // the revision of inService, from when it is asked for
   private readonly index = field("Index", { type: "number", min: "0", testid: "code-index" });
   private readonly code = field("Code", { type: "number", min: "1", max: "65535", testid: "code" });
   private readonly speed = field("Speed (steps/s)", { inputmode: "decimal", testid: "code-speed" });
@@ -75,7 +76,7 @@ export class TablePanel {
     }));
     this.save = button("Save as a revision", () => void this.store(), { testid: "save-table" });
     const group = choice("Group", groups.map((one) => [one, one]), groups[0] ?? "",
-      (value) => { this.group = value; });
+      (value) => { this.group = value; this.update(); });
     this.group = groups[0] ?? "";
     this.use = button("Use from the next move on", () => void this.putInService(), { testid: "use-table" });
     this.connectFields();
@@ -107,13 +108,8 @@ export class TablePanel {
     });
   }
 
-  async start(reference: string | undefined): Promise<void> {
+  start(): void {
     this.plot.start();
-    this.edited();
-    if (reference === undefined) return;
-    const answer = await this.app.requests.ask(
-      this.daemon, "get table", { table: reference }, { quiet: true });
-    this.inService = answer.detail.table;
     this.edited();
   }
 
@@ -121,6 +117,7 @@ export class TablePanel {
     const may = mayCommand(this.app);
     this.save.disabled = !may;
     this.use.disabled = !may;
+    void this.compare();
   }
 
   say(text: string): void {
@@ -134,6 +131,20 @@ export class TablePanel {
   close(): void {
     clearTimeout(this.timer);
     this.plot.close();
+  }
+
+  // What is in service changes while the editor is open: by its own button, and by other people.
+  private async compare(): Promise<void> {
+    const motors = this.app.model.daemons.get(this.daemon)?.motors.values() ?? [];
+    const revision = servedRevision(motors, this.loaded.name, this.group);
+    if (revision === this.compared) return;
+    this.compared = revision;
+    const answer = revision === undefined ? undefined : await this.app.requests.ask(
+      this.daemon, "get table", { table: `${this.file}@${revision}` }, { quiet: true });
+    if (revision !== this.compared) return; // another one has come meanwhile
+    this.inService = answer?.detail.table;
+    this.plot.show(this.side, this.diagnostics);
+    this.writeDifference();
   }
 
   private connectFields(): void {

@@ -171,7 +171,6 @@ export class TablesView implements View {
     this.panel?.close();
     const motors = [...(this.app.model.daemons.get(this.daemon)?.motors.values() ?? [])];
     const groups = [...new Set(motors.flatMap((motor) => motor.about?.group || []))];
-    const served = motors.find((motor) => motor.about?.table.name === table.name)?.about?.table;
     const panel = new TablePanel(this.app, this.daemon, entry.name, table, groups);
     panel.onSaved = (saved) => {
       this.files.clear();
@@ -183,7 +182,7 @@ export class TablesView implements View {
     this.panel = panel;
     this.editorPlace.replaceChildren(panel.root);
     panel.say(said);
-    await panel.start(served && served.revision > 0 ? `${entry.name}@${served.revision}` : undefined);
+    panel.start();
     panel.root.scrollIntoView({ block: "nearest" });
   }
 }
