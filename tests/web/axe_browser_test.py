@@ -23,7 +23,7 @@ class WebAccessibility(BrowserTest):
             self.assertLessEqual(wide, 0)
 
     def test_no_view_has_a_serious_violation(self):
-        self.bring_up_page(kept=True)
+        self.bring_up_web(kept=True)
         self.command("config", "a0", "soft_limits=-1000,300000")
         self.command("move", "--wait", "a0", "30")
         self.command("hold", "b1")

@@ -5,6 +5,7 @@ unless $BUSHD_WEB_TESTS says that it is required, as tools/test --ci does.
 """
 
 import contextlib
+import functools
 import os
 import pathlib
 import re
@@ -23,6 +24,8 @@ GIVE_UP_MS = 60_000
 REFUSED_CONNECTION = r"WebSocket connection to '[^']*' failed"
 REFUSED_TOKEN = r"Failed to load resource: the server responded with a status of 403"
 
+_of_all_tests = contextlib.ExitStack()
+
 
 def main():
     """Runs the tests of the calling script by the Python of the environment."""
@@ -30,7 +33,8 @@ def main():
         os.execv(PYTHON, [str(PYTHON), "-B", *sys.argv])
     if os.environ.get("BUSHD_WEB_TESTS") == "required" and not browser_is_there():
         sys.exit(WITHOUT)
-    unittest.main()
+    with _of_all_tests:
+        unittest.main()
 
 
 def browser_is_there():
@@ -55,13 +59,27 @@ def descendants(pid):
     return found
 
 
+@functools.cache
+def chromium():
+    """One of all tests of a script: it takes a core for seconds to start. Each test has windows of its own."""
+    from playwright.sync_api import sync_playwright
+
+    playwright = _of_all_tests.enter_context(sync_playwright())
+    # Tests may run as root, where Chromium's own sandbox does not. Without a GPU it need not be looked for.
+    browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"])
+    _of_all_tests.callback(browser.close)
+    return browser
+
+
 @unittest.skipUnless(browser_is_there(), WITHOUT)
 class BrowserTest(WebTest):
     def setUp(self):
         super().setUp()
         self.faults = []  # what Chromium calls an error, and exceptions of the page
         self.expected_faults = []
+        self.windows = []
         self.addCleanup(self._assert_no_faults)
+        self.addCleanup(self.close_windows)
 
     def _assert_no_faults(self):
         self.assertEqual([fault for fault in self.faults if not any(re.search(one, fault) for one in self.expected_faults)], [])
@@ -73,22 +91,10 @@ class BrowserTest(WebTest):
     def page_folder(self):
         return PAGE
 
-    def start_browser(self):
-        from playwright.sync_api import sync_playwright
-
-        self._playwright = sync_playwright().start()
-        self.addCleanup(self._playwright.stop)
-        # Tests may run as root, where Chromium's own sandbox does not.
-        self.browser = self._playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        self.addCleanup(self.browser.close)
-
-    def bring_up_page(self, *options, **more):
-        self.bring_up_web(*options, **more)
-        self.start_browser()
-
     def open_window(self, token=None, **options):
         """Its cookies are not those of other windows."""
-        window = self.browser.new_context(**options)
+        window = chromium().new_context(**options)
+        self.windows.append(window)
         window.set_default_timeout(GIVE_UP_MS)
         if token is not None:
             name, _, value = self.log_in(token).partition("=")
@@ -110,9 +116,13 @@ class BrowserTest(WebTest):
         """As a link would lead there: the page stays."""
         tab.evaluate("view => { location.hash = '#/' + view; }", view)
 
+    def close_windows(self):
+        while self.windows:
+            self.windows.pop().close()
+
     def end_programs(self):
         """Tabs before them, so that none misses its server."""
-        self.browser.close()
+        self.close_windows()
         super().end_programs()
 
     # -- what a tab shows

@@ -29,7 +29,7 @@ class WebJog(BrowserTest):
         return page.result(page.ask("get history", motor=motor))["detail"]["history"]["motions"][0]
 
     def test_ends_when_the_button_is_let_go_and_when_the_page_is_left(self):
-        self.bring_up_page(kept=True)
+        self.bring_up_web(kept=True)
         token = self.make_token()
         window = self.open_window(token)
 
@@ -75,7 +75,7 @@ class WebJog(BrowserTest):
         self.assertLess(stand["b0"], -SPEED)
 
     def test_ends_when_the_browser_is_frozen_and_does_not_go_on_when_it_wakes(self):
-        self.bring_up_page(kept=True)
+        self.bring_up_web(kept=True)
         tab = self.open_tab("motor/bushd/a0", self.make_token())
         self.hold(tab, "a0")
         self.freeze_browser()
@@ -114,7 +114,7 @@ class WebJog(BrowserTest):
         self.assertLessEqual((jog[-1] - mark_ns) / 1e6, END_MS)
 
     def test_arrow_keys_move_while_they_are_held(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab("motor/bushd/a0", self.make_token())
         tab.get_by_test_id("jog-speed").fill(str(SPEED))
         tab.get_by_test_id("goto-input").focus()

@@ -9,7 +9,7 @@ AT_ONCE = 12  # opened without waiting for each
 
 class WebMany(BrowserTest):
     def test_with_60_tabs_open_one_more_works(self):
-        self.bring_up_page()
+        self.bring_up_web()
         window = self.open_window(self.make_token())
         tabs = []
         for _ in range(TABS // AT_ONCE):

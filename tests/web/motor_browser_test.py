@@ -8,7 +8,7 @@ from rig import FAR
 
 class WebMotor(BrowserTest):
     def test_goes_where_it_is_told_and_history_names_who(self):
-        self.bring_up_page(kept=True)
+        self.bring_up_web(kept=True)
         tab = self.open_tab("motor/bushd/a0", self.make_token("anna"))
         position = tab.get_by_test_id("position")
         self.wait_for_text(position, "0")
@@ -41,7 +41,7 @@ class WebMotor(BrowserTest):
         self.assertEqual([event["steps"] for event in self.moves() if event["event"] == "move"], [300, 20, -20])
 
     def test_stop_of_this_motor_leaves_others_alone(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab("motor/bushd/a0", self.make_token())
         tab.get_by_test_id("goto-input").fill(str(FAR))
         tab.get_by_test_id("goto").click()
@@ -75,7 +75,7 @@ class WebMotor(BrowserTest):
         self.assertGreater(traced["b0"], b0_went_on_from)
 
     def test_position_is_set_and_confirmed_without_a_step(self):
-        self.bring_up_page(kept=True)
+        self.bring_up_web(kept=True)
         # Somebody has moved the motor's cable to another output, say: the daemon is told that nobody knows.
         self.start_move("a1", str(FAR))
         self.wait_until_travelled(300, "a1")
@@ -104,7 +104,7 @@ class WebMotor(BrowserTest):
         self.assertEqual(self.traced_positions("trace-2.vcd")["a1"], 5)
 
     def test_settings_say_what_differs_from_the_file(self):
-        self.bring_up_page(kept=True)
+        self.bring_up_web(kept=True)
         tab = self.open_tab("motor/bushd/a0", self.make_token())
         limits = tab.get_by_test_id("setting-soft_limits")
         limits.get_by_role("textbox").fill("-100,250")

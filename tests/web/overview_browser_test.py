@@ -1,26 +1,32 @@
 """The overview in a browser: what it shows of motors, and that nothing looks alive that is not heard."""
 
+import contextlib
 import re
 import signal
 
 from browser import BrowserTest, main
 from rig import FAR, MOTORS
 
-# As the page sees it: when it was told of a state, by its own clock.
+# As the page sees it, by its own clock: when it was told of the MCU of a0, and by how much that took longer than it has ever taken.
 NOTE_STATES = """
 (() => {
   const Real = WebSocket;
+  let leastMs = Infinity;
   window.WebSocket = class extends Real {
     constructor(...given) {
       super(...given);
       this.addEventListener("message", (event) => {
-        if (JSON.parse(event.data).kind === "state") window.toldAt = performance.now();
+        const told = JSON.parse(event.data);
+        if (told.kind !== "state") return;
+        const tookMs = performance.now() - told.utime_us / 1000;
+        leastMs = Math.min(leastMs, tookMs);
+        if (told.mcus.some((mcu) => mcu.mcu === "hall:1")) window.told = { at: performance.now(), lateMs: tookMs - leastMs };
       });
     }
   };
 })();
 """
-SINCE_TOLD = "() => performance.now() - window.toldAt"
+SINCE_TOLD = "() => performance.now() - window.told.at"
 OLD_MS = 1000  # the page greys what was not reported for so long ...
 LOOKS_EVERY_MS = 250  # ... and looks so often
 LATE_MS = 200  # what a state may have waited on its way: it counts as so much older
@@ -34,7 +40,7 @@ class WebOverview(BrowserTest):
                 self.command("set", name, "0")
 
     def test_shows_where_motors_stand_and_go_and_what_that_is_worth(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab()
         a0, b0, b3 = (self.row(tab, name) for name in ("a0", "b0", "b3"))
         self.wait_for_text(a0.get_by_test_id("position"), "0")
@@ -70,7 +76,7 @@ class WebOverview(BrowserTest):
         self.assertEqual((traced["a0"], traced["b0"]), (stands, -70))
 
     def test_what_is_not_heard_for_a_second_is_grey_with_its_age(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab()
         self.wait_for_text(self.row(tab, "a0").get_by_test_id("position"), "0")
         watched = self.open_window().new_page()
@@ -98,10 +104,8 @@ class WebOverview(BrowserTest):
         # By the page's own clock, which stands here but for what it is told: to the millisecond.
         watched.reload()
         self.wait_for_text(row.get_by_test_id("position"), "40")
-        self.bushd.send(signal.SIGSTOP)
-        watched.clock.pause_at(watched.evaluate("() => Date.now() + 100") / 1000)
+        self.wait_until("the clock to stand soon after a state", lambda: self.stop_clock(watched))
         since = watched.evaluate(SINCE_TOLD)
-        self.assertLess(since, OLD_MS - LOOKS_EVERY_MS, "the machine is too slow for this test")
         watched.clock.run_for(int(OLD_MS - since) - LATE_MS)
         self.wait_for_class(row, "old", there=False)
         watched.clock.run_for(LOOKS_EVERY_MS + LATE_MS + 1)
@@ -113,8 +117,22 @@ class WebOverview(BrowserTest):
         self.wait_for_text(row.get_by_test_id("age"), re.compile(r"^4\.[0-6] s old$"))
         self.bushd.send(signal.SIGCONT)
 
+    def stop_clock(self, tab):
+        """And the daemon. False, and both go on: a loaded machine took too long for it."""
+        from playwright.sync_api import Error
+
+        self.bushd.send(signal.SIGSTOP)
+        with contextlib.suppress(Error):  # the time at which it is to stand is over
+            tab.clock.pause_at(tab.evaluate("() => Date.now() + 100") / 1000)
+            if tab.evaluate(SINCE_TOLD) < OLD_MS - LOOKS_EVERY_MS and tab.evaluate("() => window.told.lateMs") < LATE_MS:
+                return True
+        self.bushd.send(signal.SIGCONT)
+        tab.clock.resume()
+        self.wait_for_class(self.row(tab, "a0"), "old", there=False)
+        return False
+
     def test_filter_order_and_favourites_are_kept_in_the_browser(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab()
         self.row(tab, "b3").wait_for()
         self.wait_for_text(tab.get_by_test_id("motor-count"), "8 motors")

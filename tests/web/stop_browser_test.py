@@ -8,7 +8,7 @@ VIEWS = ("", "motor/bushd/a0", "buses", "tables", "paths", "health", "access")
 
 class WebStop(BrowserTest):
     def test_stops_from_each_view_while_a_request_is_under_way(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab("motor/bushd/a0", self.make_token())
         stood = 0
         for turn, view in enumerate(VIEWS):
@@ -37,7 +37,7 @@ class WebStop(BrowserTest):
         self.assertEqual((traced["a0"], traced["b0"]), (stand["a0"], stand["b0"]))
 
     def test_stop_and_emergency_stop_need_no_token_on_this_pc(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab()
         stop, emergency = tab.get_by_test_id("stop-all"), tab.get_by_test_id("estop")
         self.row(tab, "a0").wait_for()
@@ -78,7 +78,7 @@ class WebStop(BrowserTest):
         self.assertGreater(traced["a0"], stand["a0"] + 300)
 
     def test_says_big_that_a_stop_cannot_be_sent(self):
-        self.bring_up_page()
+        self.bring_up_web()
         tab = self.open_tab()
         self.row(tab, "a0").wait_for()
         self.expect_cut()
