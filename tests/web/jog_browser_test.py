@@ -1,9 +1,11 @@
 """Jogs by a browser: whatever takes the hand or the page away ends them."""
 
 import os
+import re
 import signal
 
 from browser import BrowserTest, main
+from cable import Cable
 
 SPEED = 500  # steps/s: reached and left within some steps by each of the tables
 KEEPALIVE_MS = 400  # of the page
@@ -43,6 +45,7 @@ class WebJog(BrowserTest):
             for page in (tab, other):
                 window.new_cdp_session(page).send("Emulation.setFocusEmulationEnabled", {"enabled": False})
             other.bring_to_front()
+            self.wait_for_part(tab.get_by_test_id("jog-said"), "ended: the window lost the focus")
 
         def close(tab):
             tab.close()
@@ -74,24 +77,40 @@ class WebJog(BrowserTest):
         self.assertLess(stand["a1"], -SPEED)
         self.assertLess(stand["b0"], -SPEED)
 
+    def test_ends_when_the_browser_takes_the_finger_for_something_else(self):
+        """As where the page is scrolled or zoomed, or a palm lies on the tablet."""
+        self.bring_up_web(kept=True)
+        tab = self.open_tab("motor/bushd/a0", self.make_token(), has_touch=True)
+        tab.get_by_test_id("jog-speed").fill(str(SPEED))
+        button = tab.get_by_test_id("jog-plus")
+        button.scroll_into_view_if_needed()
+        box = button.bounding_box()
+        debugger = tab.context.new_cdp_session(tab)
+        at = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
+        debugger.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [at]})
+        self.wait_until("a0 to move", lambda: self.positions()["a0"] > SPEED)
+        button.evaluate("node => node.addEventListener('pointerup', () => { window.wasLetGo = true; }, { capture: true })")
+        debugger.send("Input.dispatchTouchEvent", {"type": "touchCancel", "touchPoints": []})
+        self.wait_for_rest("a0")
+        self.wait_for_part(tab.get_by_test_id("jog-said"), "Hold a button")
+        self.assertFalse(tab.evaluate("() => 'wasLetGo' in window"))
+        ended = self.last_of_history("a0")
+        self.assertEqual(ended["outcome"], "done", ended)  # the page has said so
+        stands = self.positions()["a0"]
+        self.end_programs()
+        self.assertEqual(self.traced_positions()["a0"], stands)
+
     def test_ends_when_the_browser_is_frozen_and_does_not_go_on_when_it_wakes(self):
         self.bring_up_web(kept=True)
         tab = self.open_tab("motor/bushd/a0", self.make_token())
         self.hold(tab, "a0")
         self.freeze_browser()
-        # No renewal is sent any more. What the trace says of the time: the first step of b0 is asked for after that.
-        self.command("move", "--wait", "b0", "1")
-        self.wait_for_rest("a0")
-        stands = self.positions()["a0"]
-        ended = self.last_of_history("a0")
-        self.assertEqual(ended["outcome"], "stopped")
-        self.assertIn(f"{KEEPALIVE_MS} ms", ended["reason"])
+        stands = self.assert_ends_by_silence("a0")
 
         self.wake_browser()
         self.wait_for_part(tab.get_by_test_id("jog-said"), "ended: ")
         # It still holds the button, and may say what it likes: what it has said was taken before this is.
-        page = self.open_page(self.make_token("berta"))
-        self.assertEqual(page.result(page.ask("get history", motor="a0"))["phase"], "result")
+        self.ask_for_something()
         tab.mouse.up()
         # A new hold begins a new jog.
         tab.get_by_test_id("jog-plus").hover()
@@ -99,17 +118,63 @@ class WebJog(BrowserTest):
         self.wait_until("a0 to move again", lambda: self.positions()["a0"] > stands)
         tab.mouse.up()
         self.wait_for_rest("a0")
-        begun = [event["from_steps"] for event in self.moves() if event["event"] == "move" and event["motor"] == "a0"]
-        self.assertEqual(begun, [0, stands])
+        self.assertEqual(self.begun("a0"), [0, stands])
+        self.assert_ended_in_time("a0", stands)
 
+    def test_ends_when_the_network_is_cut_and_what_that_held_back_begins_nothing(self):
+        self.bring_up_web(kept=True)
+        cable = Cable(self.port)
+        self.addCleanup(cable.close)
+        server, self.port = self.port, cable.port
+        tab = self.open_tab("motor/bushd/a0", self.make_token())
+        self.port = server
+        self.hold(tab, "a0")
+        cable.cut()
+        self.ask_for_something()  # so what was passed on has been taken
+        stands = self.assert_ends_by_silence("a0")
+        self.wait_for_part(tab.get_by_test_id("jog-said"), "ended: ")
+        tab.mouse.up()
+        # It has not been silent for so long yet that the page would not send this.
+        tab.mouse.down()
+        self.wait_for_text(tab.get_by_test_id("connection"), re.compile("^silent for "))
+        tab.mouse.up()
+
+        cable.mend()
+        self.wait_for_text(tab.get_by_test_id("connection"), "connected")
+        # This is the last that the page has said.
+        tab.get_by_test_id("stop-motor").click()
+        self.wait_for_part(tab.get_by_test_id("notice").last, "stop a0 done")
+        self.assertEqual((self.begun("a0"), self.positions()["a0"]), ([0], stands))
+        self.assert_ended_in_time("a0", stands)
+
+    def ask_for_something(self):
+        """Answered: bushd-web has taken what came before it."""
+        page = self.open_page()
+        self.assertEqual(page.result(page.ask("get history", motor="a0"))["phase"], "result")
+
+    def begun(self, motor):
+        """From where it moved."""
+        return [event["from_steps"] for event in self.moves() if event["event"] == "move" and event["motor"] == motor]
+
+    def assert_ends_by_silence(self, motor):
+        """No renewal is sent any more. What the trace says of the time: the first step of b0 is asked for after that."""
+        self.command("move", "--wait", "b0", "1")
+        self.wait_for_rest(motor)
+        ended = self.last_of_history(motor)
+        self.assertEqual(ended["outcome"], "stopped")
+        self.assertIn(f"{KEEPALIVE_MS} ms", ended["reason"])
+        return self.positions()[motor]
+
+    def assert_ended_in_time(self, motor, stood):
+        """The first jog, which ended at `stood`, by edges. Ends all programs."""
         self.end_programs()
         edges = self.traced()
         mark_ns = edges["b0"][0].time_ns
-        jog = [edge.time_ns for edge in edges["a0"][:stands]]
+        jog = [edge.time_ns for edge in edges[motor][:stood]]
         cruise_ns = 1e9 / SPEED
         # An edge may lie a time unit of the format off.
         ramp_ns = max(early for early, late in zip(jog, jog[1:]) if late - early < 1.05 * cruise_ns)
-        self.assertGreater(ramp_ns, mark_ns)  # it was the browser's silence that has ended it
+        self.assertGreater(ramp_ns, mark_ns)  # it was the silence that has ended it
         self.assertLessEqual((ramp_ns - mark_ns) / 1e6, KEEPALIVE_MS + STOP_MS)
         self.assertLessEqual((jog[-1] - mark_ns) / 1e6, END_MS)
 
