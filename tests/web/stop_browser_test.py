@@ -6,12 +6,13 @@ from rig import FAR
 VIEWS = ("", "motor/bushd/a0", "buses", "tables", "paths", "health", "access")
 
 
-class WebStop(BrowserTest):
-    def test_stops_from_each_view_while_a_request_is_under_way(self):
+class StopTest(BrowserTest):
+    def check_stops_while_a_request_is_under_way(self, views):
+        """By Esc and by the button, in turn."""
         self.bring_up_web()
         tab = self.open_tab("motor/bushd/a0", self.make_token())
         stood = 0
-        for turn, view in enumerate(VIEWS):
+        for turn, view in enumerate(views):
             with self.subTest(view):
                 self.go_to_view(tab, "motor/bushd/a0")
                 tab.get_by_test_id("goto-input").fill(str(FAR))
@@ -30,11 +31,16 @@ class WebStop(BrowserTest):
                 self.assertEqual(self.mcu_states(), ["READY", "READY"])
                 stood = motors["a0"]["position_steps"]
         asked = [(event["request"], event.get("motors")) for event in self.requests()]
-        self.assertEqual(asked, [("move", ["a0"]), ("stop", None)] * len(VIEWS))
+        self.assertEqual(asked, [("move", ["a0"]), ("stop", None)] * len(views))
         stand = self.positions()
         self.end_programs()
         traced = self.traced_positions()
         self.assertEqual((traced["a0"], traced["b0"]), (stand["a0"], stand["b0"]))
+
+
+class WebStop(StopTest):
+    def test_stops_while_a_request_is_under_way(self):
+        self.check_stops_while_a_request_is_under_way(("motor/bushd/a0", "tables"))
 
     def test_stop_and_emergency_stop_need_no_token_on_this_pc(self):
         self.bring_up_web()
@@ -97,6 +103,11 @@ class WebStop(BrowserTest):
         self.wait_for_part(tab.get_by_test_id("stop-said"), "refused")
         self.wait_until("a0 to arrive", lambda: self.positions()["a0"] == 200)
         self.assertEqual(self.requests(), [])
+
+
+class WebStopOnEachView(StopTest):
+    def test_stops_while_a_request_is_under_way(self):
+        self.check_stops_while_a_request_is_under_way(VIEWS)
 
 
 if __name__ == "__main__":

@@ -74,7 +74,9 @@ class WebSocket:
             head += bytes([0x80 | 126]) + struct.pack(">H", length)
         else:
             head += bytes([0x80 | 127]) + struct.pack(">Q", length)
-        masked = bytes(byte ^ mask[i % 4] for i, byte in enumerate(payload))
+        # As one number: byte by byte it would take seconds of what is too large.
+        masks = (mask * (length // 4 + 1))[:length]
+        masked = (int.from_bytes(payload, "little") ^ int.from_bytes(masks, "little")).to_bytes(length, "little")
         self._socket.sendall(head + mask + masked)
 
     def send(self, message):
