@@ -72,8 +72,8 @@ class WebStop(StopTest):
         # Whoever may only stop does not clear it.
         self.assertEqual(tab.get_by_test_id("clear-faults").count(), 0)
         commander = self.open_tab(token=self.make_token())
-        for _ in range(2):
-            commander.get_by_test_id("clear-faults").first.click()
+        for mcu in ("hall:1", "hall:2"):
+            commander.get_by_role("button", name=f"Clear faults of MCU {mcu}").click()
             self.wait_for_part(commander.get_by_test_id("notice").last, "clear faults")
         self.wait_until_ready()
         self.wait_for_text(tab.get_by_test_id("trouble"), "")
