@@ -68,7 +68,9 @@ TEST(SupplyCurrent, OneStepDropsOvershootsAndSettles) {
   EXPECT_EQ(supply.reading(5'000'001), 512);
 }
 
-TEST(SupplyCurrent, StaggeredStepsMoveItTwoAndAHalfToThreeTimesLess) {
+// A regression: the model's amplitudes were chosen so that the ratio is that of the document, so
+// this says where the pulses are, and not what a supply would feel.
+TEST(SupplyCurrent, StaggeredStepsHaveTheRatioThatTheModelWasChosenFor) {
   const double together = peak_deviation(of_mode(BUSHD_EMISSION_BURST), {});
   bushd_emission staggered = of_mode(BUSHD_EMISSION_STAGGERED);
   staggered.settle_us = 518;
