@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "daemon/camac_lab.h"
 #include "daemon/lab.h"
 #include "tables/table_file.h"
 
@@ -407,51 +406,6 @@ TEST(Boards, WhateverHappensCountsAreRightOrSaidToBeUncertain) {
       lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")}));
     }
   }
-}
-
-// Program, BUSHD-2, commutator, windings: what the report of 1985 describes.
-TEST(Boards, ProgramOfABushd2MovesAMotorBehindABoard) {
-  const std::string toml = with_board() +
-                           "[[crate]]\nnumber = 1\n[[crate.module]]\nstation = 5\n"
-                           "type = \"bushd-2\"\nf_start_hz = 100\nmotors = [\"m0\", \"m5\"]\n";
-  CamacLab lab(toml);
-  // Not those of the table in service: 250, 249, 248, ... and none below 20.
-  std::vector<int> codes;
-  for (int i = 0; i < 238; ++i) codes.push_back(std::max(250 - i, 20));
-  lab.load(0, 300, codes);
-  std::vector<std::uint8_t> sent;
-  lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
-    sent.insert(sent.end(), bytes.begin(), bytes.end());
-    return true;
-  };
-  lab.permit(1 | 1 << 5 | 1 << 6 | 1 << 7);  // motor 1, requests, left
-  ASSERT_TRUE(lab.wait_for_lam());
-  EXPECT_EQ(lab.shaft_steps("m5"), -300);
-  EXPECT_EQ(lab.requests() & 0x1Fu, 1u << 4);  // step done, and nothing is wrong
-  std::vector<std::uint8_t> expected{0, 0x8D};
-  for (int k = 0; k < 300; ++k) {
-    expected.push_back(
-        static_cast<std::uint8_t>(codes[static_cast<std::size_t>(std::min(k, 299 - k))]));
-  }
-  EXPECT_EQ(sent, expected);
-
-  // The board misses the supply, and the module tells its program.
-  lab.naf(5, 0, 10);
-  lab.board(0).supply = false;
-  lab.permit(1 | 1 << 5 | 1 << 6);
-  ASSERT_TRUE(lab.wait_for_lam());
-  EXPECT_EQ(lab.shaft_steps("m5"), -300);
-  EXPECT_EQ(lab.requests() & 0x1Fu, 1u << 2);
-
-  // Nor is the motor there.
-  lab.board(0).supply = true;
-  lab.board(0).motor(5).connected = false;
-  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
-  lab.wait(lab.send(Ask::kSetPosition, {"m5"}, {lab.shaft_steps("m5")}));
-  lab.naf(5, 0, 10);
-  lab.permit(1 | 1 << 5 | 1 << 6);
-  ASSERT_TRUE(lab.wait_for_lam());
-  EXPECT_EQ(lab.requests() & 0x1Fu, 1u << 3);
 }
 
 }  // namespace

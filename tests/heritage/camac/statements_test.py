@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Each statement of the report of 1985 has a row in docs/camac.md, whose tests exist.
+"""Each statement of the report of 1985 has a row in docs/camac.md, whose tests exist; each reading of this project is marked
+where it is told.
 
 $BUSHD_SOURCE_DIR is the source tree."""
 import os
@@ -16,13 +17,23 @@ class Statements(unittest.TestCase):
         rows = dict(re.findall(r"^\| (S\d+) \| .* \| (.*) \|$", (SOURCE / "docs/camac.md").read_text(), re.MULTILINE))
         self.assertEqual(list(rows), [f"S{number}" for number in range(1, 35)])
         tests = set()
-        for source in sorted((SOURCE / "tests").glob("*/**/*camac*.cpp")) + sorted((SOURCE / "tests/heritage/camac").glob("*.cpp")):
+        sources = [*(SOURCE / "tests").glob("*/**/*camac*.cpp"), *(SOURCE / "tests/heritage/camac").glob("*.cpp")]
+        for source in sources:
             tests |= {f"{suite}.{name}" for suite, name in re.findall(r"^TEST(?:_[FP])?\((\w+), (\w+)\)", source.read_text(), re.MULTILINE)}
         for statement, cell in rows.items():
             named = re.findall(r"`(\w+\.\w+)`", cell)
             with self.subTest(statement=statement):
                 self.assertEqual(bool(named), statement not in NOT_TESTED)
                 self.assertLessEqual(set(named), tests)
+
+    def test_each_reading_is_marked(self):
+        told, readings = (SOURCE / "docs/camac.md").read_text().split("\n## Readings\n")
+        numbers = re.findall(r"^\| U(\d+) \|", readings, re.MULTILINE)
+        self.assertEqual(numbers, [str(number) for number in range(1, len(numbers) + 1)])
+        self.assertIn(f"is marked U1 to U{len(numbers)} ", told)
+        # The sentence that says so marks none.
+        marked = set(re.findall(r"\bU(\d+)\b", re.sub(r"is marked U1 to U\d+ ", "", told)))
+        self.assertEqual(marked, set(numbers))
 
 
 if __name__ == "__main__":
