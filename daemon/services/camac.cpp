@@ -19,6 +19,12 @@ std::string name_of(const config::Crate& crate, const config::CamacModule& modul
   return "camac-" + std::to_string(crate.number) + "-" + std::to_string(module.station);
 }
 
+camac::AdjustableDelay adjusts(const config::CamacModule& module) {
+  return module.adjustable_delay == config::CamacModule::AdjustableDelay::kOpening
+             ? camac::AdjustableDelay::kOpening
+             : camac::AdjustableDelay::kReturn;
+}
+
 Result<void> in_range(const char* what, std::int64_t value, std::int64_t least, std::int64_t most) {
   if (value >= least && value <= most) return {};
   return fail(std::string(what) + " " + std::to_string(value) +
@@ -68,15 +74,17 @@ class Camac::Station {
 class Camac::Bushd1Station final : public Station {
  public:
   template <class... Args>
-  explicit Bushd1Station(std::string place, Args&&... args)
-      : Station(std::move(place)), shutter_(std::forward<Args>(args)...) {}
+  Bushd1Station(std::string place, camac::AdjustableDelay adjusts, Args&&... args)
+      : Station(std::move(place)),
+        shutter_(std::forward<Args>(args)...),
+        module_(shutter_, adjusts) {}
   camac::MotionModule& module() override { return module_; }
   void step(std::int64_t now_us) override { shutter_.follow(now_us, module_); }
   void end_overtaken() override { shutter_.end_overtaken(); }
 
  private:
   CamacShutter shutter_;
-  camac::Bushd1 module_{shutter_};
+  camac::Bushd1 module_;
 };
 
 class Camac::Bushd2Station final : public Station {
@@ -106,9 +114,9 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
           "camac/" + std::to_string(configured.number) + "/" + std::to_string(module.station);
       std::unique_ptr<Station> station;
       if (module.type == config::CamacModule::Type::kBushd1) {
-        station = std::make_unique<Bushd1Station>(kept_as, name, module.motors.front(),
-                                                  installation, interlocks, open_moves.precedence(),
-                                                  turn_, tables, travels, outputs, ask);
+        station = std::make_unique<Bushd1Station>(
+            kept_as, adjusts(module), name, module.motors.front(), installation, interlocks,
+            open_moves.precedence(), turn_, tables, travels, outputs, ask);
       } else {
         station = std::make_unique<Bushd2Station>(kept_as, name, module, installation, interlocks,
                                                   open_moves.precedence(), turn_, tables, lines,

@@ -15,6 +15,11 @@ bool is_done(const api::Reply& reply, api::Outcome wanted) {
   return completed != nullptr && completed->outcome == wanted;
 }
 
+// An MCU prepares ticks ahead, so a run cannot begin sooner after an edge.
+std::int64_t least_first_delay_us(const config::Bus& bus) {
+  return std::int64_t{BUSHD_TRIGGER_FIXED_TICKS + 1} * bus.tick_us;
+}
+
 // Whether a switch is active, as debounced: what a motor has met it may not meet any more.
 bool is_active(const bushd_report& report, const std::optional<config::Input>& input) {
   return input && (report.inputs >> input->number & 1) != 0;
@@ -88,6 +93,15 @@ bool CamacShutter::travel(const camac::Travel& travel) {
   }
   if (travel.synchronous && !mcu.can_trigger()) {
     return refuse("its MCU has no trigger input for the reactor start; use mode 10");
+  }
+  const config::Config& config = installation_.config();
+  const std::int64_t least_us = least_first_delay_us(config.bus_of(config[motor_]));
+  if (travel.adjusts_opening() && travel.first_run_delay_us() < least_us) {
+    return refuse("its MCU opens " + std::to_string(least_us) +
+                  " us after a reactor start at the earliest, and the delay at addresses 2, 3 is " +
+                  std::to_string(travel.first_run_delay_us()) + " us; write " +
+                  std::to_string((least_us + camac::Travel::kUnitUs - 1) / camac::Travel::kUnitUs) +
+                  " or more there");
   }
   const auto table = table_of_travel(travel, name_);
   if (!table) return refuse(table.error().text());
@@ -165,7 +179,8 @@ void CamacShutter::ask_mcu() {
     message.kind = BUSHD_TRAVEL_LIMITS;
     message.edge = travel.synchronous ? BUSHD_EDGE_RISING : BUSHD_EDGE_NONE;
     message.steps = static_cast<std::uint32_t>(travel.codes.size());
-    message.delay_us = travel.synchronous ? camac::Travel::kFixedDelayUs : 0;
+    message.delay_us =
+        travel.synchronous ? static_cast<std::uint32_t>(travel.first_run_delay_us()) : 0;
     message.wait_us = static_cast<std::uint32_t>(travel.return_delay_us());
   }
   motion_->from_steps = installation_[motor_].position_steps();

@@ -193,9 +193,12 @@ struct Pseudo {
 // A module of a CAMAC crate (docs/camac.md).
 struct CamacModule {
   enum class Type { kBushd1, kBushd2 };
+  // What the adjustable delay after a reactor start is of.
+  enum class AdjustableDelay { kReturn, kOpening };
   int station = 0;
   Type type = Type::kBushd2;
-  int f_start_hz = 40;            // of kBushd2: code 250
+  int f_start_hz = 40;                                          // of kBushd2: code 250
+  AdjustableDelay adjustable_delay = AdjustableDelay::kReturn;  // of kBushd1
   std::vector<MotorId> motors{};  // by their numbers in the module; kBushd1 has one
 };
 struct Crate {

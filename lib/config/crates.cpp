@@ -104,7 +104,15 @@ Result<void> read_bushd2(const TomlReader& reader, const std::string& where, con
 
 Result<void> read_bushd1(const TomlReader& reader, const std::string& where, const Config& config,
                          CamacModule* module, Places* places) {
-  if (auto known = reader.only({"station", "type", "motor"}); !known) return known;
+  if (auto known = reader.only({"station", "type", "adjustable_delay", "motor"}); !known) {
+    return known;
+  }
+  if (reader.has("adjustable_delay")) {
+    const auto of = read_word(reader, "adjustable_delay", {"return", "opening"});
+    if (!of) return fail(of.error());
+    module->adjustable_delay =
+        *of == 0 ? CamacModule::AdjustableDelay::kReturn : CamacModule::AdjustableDelay::kOpening;
+  }
   const auto name = reader.string("motor", "the name of a motor");
   if (!name) return fail(name.error());
   const auto motor = find_motor(reader, "motor", std::nullopt, *name, config);

@@ -53,6 +53,22 @@ TEST(ConfigCrates, ModulesHaveStationsAndMotors) {
   EXPECT_EQ(one.station, 7);
   EXPECT_EQ(one.type, CamacModule::Type::kBushd1);
   EXPECT_EQ(one.motors, std::vector<MotorId>{MotorId{1}});
+  EXPECT_EQ(one.adjustable_delay, CamacModule::AdjustableDelay::kReturn);
+}
+
+TEST(ConfigCrates, TheAdjustableDelayIsOfOneOfTwoRuns) {
+  const auto loaded = [](const std::string& word) {
+    return ConfigFile(kCrate + "adjustable_delay = \"" + word + "\"\n").load();
+  };
+  EXPECT_EQ(loaded("return")->crates[0].modules[1].adjustable_delay,
+            CamacModule::AdjustableDelay::kReturn);
+  EXPECT_EQ(loaded("opening")->crates[0].modules[1].adjustable_delay,
+            CamacModule::AdjustableDelay::kOpening);
+  EXPECT_THAT(loaded("both").error().text(),
+              HasSubstr("is \"both\"; allowed: \"return\" or \"opening\""));
+  EXPECT_THAT(error_of("f_start_hz = 100", "adjustable_delay = \"return\""),
+              HasSubstr("adjustable_delay"))
+      << "a key of BUSHD-1";
 }
 
 TEST(ConfigCrates, BadOnesAreRefused) {

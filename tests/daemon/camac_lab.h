@@ -135,19 +135,19 @@ class ShutterLab : private WithShutter, public CamacLab {
 
   explicit ShutterLab(
       const std::string& keys = "inputs = { positive = 3, negative = 4, step = 5 }\n",
-      const std::string& keys_of_m01 = "")
-      : CamacLab(lab_with("fine", keys_of_m01, keys), &mechanics, kShutterStation) {
+      const std::string& keys_of_m01 = "", const std::string& keys_of_module = "")
+      : CamacLab(lab_with("fine", keys_of_m01, keys) + keys_of_module, &mechanics,
+                 kShutterStation) {
     shutter().bus = &bus(0);
     shutter().tell();
     run_for(0.1);
   }
   Shutter& shutter() { return mechanics; }
-  // Steps between the limits with these delays, and the delay of the return.
-  void load_codes(const std::vector<int>& codes, int return_delay) {
+  // Steps between the limits with these delays, and the adjustable delay.
+  void load_codes(const std::vector<int>& codes, int delay) {
     shutter().right_limit = static_cast<int>(codes.size());
     shutter().tell();
-    std::vector<int> bytes{static_cast<int>(codes.size()), 0, return_delay % 256,
-                           return_delay / 256};
+    std::vector<int> bytes{static_cast<int>(codes.size()), 0, delay % 256, delay / 256};
     for (const int code : codes) {
       bytes.push_back(code % 256);
       bytes.push_back(code / 256);

@@ -111,6 +111,51 @@ TEST(CamacShutter, FollowsReactorStarts) {
   EXPECT_EQ(lab.motor("m03").position_steps, 0);
 }
 
+// The other reading of U13: the delay is that of the opening, and the return keeps to the 150 ms.
+TEST(CamacShutter, TheAdjustableDelayMayBeThatOfTheOpening) {
+  ShutterLab lab("inputs = { positive = 3, negative = 4, step = 5 }\n", "",
+                 "adjustable_delay = \"opening\"\n");
+  std::size_t made = 0;
+  const auto opens_and_closes = [&](int delay) {
+    lab.load_codes(kCodes, delay);
+    lab.permit(kAutomatic | kSecondMode | kAllEnabled);
+    lab.run_for(0.5013);
+    const sim::TimeNs start_ns = lab.reactor_starts();
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.cleared_requests() & 0x3F, kRightLimit);
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.cleared_requests() & 0x3F, kLeftLimit);
+    ASSERT_EQ(lab.shutter().steps.size(), made + 18);
+    lab.expect_run(made, start_ns + delay * ShutterLab::kUnitNs, kCodes, false);
+    sim::TimeNs back_ns = start_ns + 150'000'000;
+    const sim::TimeNs there_ns = lab.shutter().steps[made + 8].time_ns;
+    if (there_ns > back_ns) {
+      // As soon as its MCU has seen the limit.
+      back_ns = lab.shutter().steps[made + 9].time_ns - kCodes[0] * ShutterLab::kUnitNs;
+      EXPECT_GT(back_ns, there_ns);
+      EXPECT_LE(back_ns, there_ns + 10 * 2'560'000);
+    }
+    lab.expect_run(made + 9, back_ns, kCodes, true);
+    made += 18;
+    lab.naf(kShutterStation, 0, 24);
+    ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }));
+  };
+  opens_and_closes(600);     // 30 ms, and there after 102.5 ms
+  opens_and_closes(205);     // 10.25 ms: four ticks are 10.24 ms
+  opens_and_closes(30'000);  // 1.5 s: there when the 150 ms are long over
+  EXPECT_TRUE(lab.warnings().empty());
+
+  lab.load_codes(kCodes, 204);
+  lab.permit(kAutomatic | kSecondMode | kAllEnabled);
+  EXPECT_EQ(lab.cleared_requests() & 0x3F, kTravelFailed);
+  EXPECT_THAT(lab.warnings().back(),
+              HasSubstr("its MCU opens 10240 us after a reactor start at the earliest, and the "
+                        "delay at addresses 2, 3 is 10200 us; write 205 or more there"));
+  // Without reactor starts it is that of the return, however short.
+  lab.permit(kAutomatic | kAllEnabled);
+  ASSERT_TRUE(lab.run_until([&] { return lab.shutter().steps.size() == made + 18; }));
+}
+
 TEST(CamacShutter, ErrorsOfATravelStopIt) {
   struct Case {
     int right_limit;

@@ -65,8 +65,9 @@ std::uint16_t Bushd1::delay_at(std::size_t address) const {
 void Bushd1::start_travel(bool left) {
   const int steps = programs().bytes()[0];
   Travel travel{.left = left,
-                .return_delay = delay_at(kDelayAddress),
-                .synchronous = is_enabled(kSecondMode)};
+                .delay = delay_at(kDelayAddress),
+                .synchronous = is_enabled(kSecondMode),
+                .adjusts = adjusts_};
   for (int i = 0; i < std::min(steps, kMostSteps); ++i) {
     travel.codes.push_back(delay_at(kFirstCode + 2 * static_cast<std::size_t>(i)));
   }

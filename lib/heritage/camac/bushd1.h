@@ -3,7 +3,7 @@
 // Memory of 256 bytes:
 //
 //     0         number of steps, 1..126
-//     2, 3      delay of the return run from the reactor start, the low byte first
+//     2, 3      adjustable delay from the reactor start, the low byte first
 //     4..255    126 delay codes of two bytes each
 //
 // in units of 50 us; 0 counts as 1, more than 30000 (1.5 s) as 30000.
@@ -36,7 +36,8 @@ class Bushd1 final : public MotionModule {
   static constexpr int kSecondMode = 8;
 
   // `shutter` outlives the module.
-  explicit Bushd1(Shutter& shutter) : MotionModule(kMemoryBytes), shutter_(shutter) {}
+  explicit Bushd1(Shutter& shutter, AdjustableDelay adjusts = AdjustableDelay::kReturn)
+      : MotionModule(kMemoryBytes), shutter_(shutter), adjusts_(adjusts) {}
 
   bool lam() const override;
 
@@ -83,6 +84,7 @@ class Bushd1 final : public MotionModule {
   bool runs() const { return motion_ && (!motion_->automatic || motion_->made > 0); }
 
   Shutter& shutter_;
+  const AdjustableDelay adjusts_;
   std::uint32_t requests_ = 0;  // bits 1..6
   bool right_limit_ = false;
   bool left_limit_ = false;

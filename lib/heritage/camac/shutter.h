@@ -18,23 +18,33 @@ struct SingleStep {
   bool with_sensor = false;
 };
 
+// Which run the adjustable delay after a reactor start releases: the report can be read in both
+// ways. The fixed one releases the other.
+enum class AdjustableDelay { kReturn, kOpening };
+
 // Automatic travel from one limit switch to the other and back. Before step k (from 0) of either
 // run stands codes[k].
 struct Travel {
-  static constexpr std::int64_t kUnitUs = 50;             // of the codes and of the return's delay
-  static constexpr std::int64_t kFixedDelayUs = 150'000;  // from a reactor start to the first run
+  static constexpr std::int64_t kUnitUs = 50;             // of the codes and of the delay
+  static constexpr std::int64_t kFixedDelayUs = 150'000;  // from a reactor start
 
   bool left = false;                   // the first run
   std::vector<std::uint16_t> codes{};  // one for each step; 1..30000
-  std::uint16_t return_delay = 1;      // 1..30000
+  std::uint16_t delay = 1;             // the adjustable one, 1..30000
   // Each reactor start begins a travel; one that comes during a travel is ignored. Otherwise one
   // travel begins at once.
   bool synchronous = false;
+  AdjustableDelay adjusts = AdjustableDelay::kReturn;  // where it is synchronous
 
-  std::int64_t return_delay_us() const { return return_delay * kUnitUs; }
+  std::int64_t delay_us() const { return delay * kUnitUs; }
+  bool adjusts_opening() const { return synchronous && adjusts == AdjustableDelay::kOpening; }
+  // From a reactor start to the first run.
+  std::int64_t first_run_delay_us() const { return adjusts_opening() ? delay_us() : kFixedDelayUs; }
+  // From a reactor start, or without them from arrival, to the return.
+  std::int64_t return_delay_us() const { return adjusts_opening() ? kFixedDelayUs : delay_us(); }
   // When a travel begins that a reactor start at this time has released.
-  static std::int64_t first_run_us(std::int64_t reactor_start_us) {
-    return reactor_start_us + kFixedDelayUs;
+  std::int64_t first_run_us(std::int64_t reactor_start_us) const {
+    return reactor_start_us + first_run_delay_us();
   }
   // From the beginning of a run to its step `step`, from 0.
   std::int64_t step_us(std::size_t step) const {

@@ -27,7 +27,10 @@ enum Request : std::uint32_t {
 
 class Bushd1Bench : public Commands<Bushd1> {
  public:
-  Bushd1Bench() : module(shutter) { crate.insert(kStation, module); }
+  explicit Bushd1Bench(AdjustableDelay adjusts = AdjustableDelay::kReturn)
+      : module(shutter, adjusts) {
+    crate.insert(kStation, module);
+  }
   // Steps with these delays, and the delay of the return.
   void load(const std::vector<int>& codes, int return_delay = 20'000) {
     std::vector<int> bytes{static_cast<int>(codes.size()), 0, return_delay % 256,
@@ -98,12 +101,29 @@ TEST(Bushd1, OpensTheBeamADelayAfterTheReactorStart) {  // S7, S8, S18, U9, U10
   ASSERT_EQ(bench.shutter.travels.size(), 1U);
   const Travel& travel = bench.shutter.travels[0];
   EXPECT_TRUE(travel.synchronous);
-  EXPECT_EQ(Travel::first_run_us(1'000'000), 1'150'000);
+  EXPECT_EQ(travel.first_run_us(1'000'000), 1'150'000);
   EXPECT_EQ(travel.step_us(0), 300 * 50) << "a delay stands before its step";
   EXPECT_EQ(travel.step_us(3), 800 * 50);
   EXPECT_EQ(travel.return_delay_us(), 1'000'000);
   EXPECT_EQ(travel.return_us(1'000'000, 1'190'000), 2'000'000) << "U13";
   EXPECT_EQ(travel.return_us(1'000'000, 2'500'000), 2'500'000) << "not before it has arrived";
+}
+
+// The other reading of U13.
+TEST(Bushd1, TheAdjustableDelayMayBeThatOfTheOpening) {  // S7, S18
+  Bushd1Bench bench(AdjustableDelay::kOpening);
+  bench.depart(kAutomatic | kSecondMode);
+  ASSERT_EQ(bench.shutter.travels.size(), 1U);
+  const Travel& travel = bench.shutter.travels[0];
+  EXPECT_EQ(travel.first_run_us(1'000'000), 2'000'000);
+  EXPECT_EQ(travel.return_us(1'000'000, 1'060'000), 1'150'000);
+  EXPECT_EQ(travel.return_us(1'000'000, 2'040'000), 2'040'000) << "not before it has arrived";
+
+  Bushd1Bench alone(AdjustableDelay::kOpening);
+  alone.depart(kAutomatic);
+  ASSERT_EQ(alone.shutter.travels.size(), 1U);
+  EXPECT_EQ(alone.shutter.travels[0].return_us(0, 700'000), 1'700'000)
+      << "U14: without reactor starts it is that of the return";
 }
 
 TEST(Bushd1, DelaysAreFrom50UsTo1500Ms) {  // S18, U9
@@ -212,7 +232,7 @@ TEST(Bushd1, MemoryHasStepsDelayAndCodes) {  // S13, D1
   bench.set_control(kAutomatic);
   bench.permit();
   EXPECT_EQ(bench.shutter.travels.at(0).codes.size(), 126U);
-  EXPECT_EQ(bench.shutter.travels.at(0).return_delay, 258);
+  EXPECT_EQ(bench.shutter.travels.at(0).delay, 258);
 }
 
 TEST(Bushd1, StepsOutOfRangeAreAFailure) {  // S13, U9

@@ -50,7 +50,7 @@ class Wanted final : public Motors, public Shutter {
   }
   bool travel(const Travel& t) override {
     asked << " travel " << t.left << ' ' << t.codes.size() << ' ' << checksum(t.codes) << ' '
-          << t.return_delay << ' ' << t.synchronous;
+          << t.delay << ' ' << t.synchronous;
     return accepts;
   }
   void stop() override { asked << " halt"; }
