@@ -65,7 +65,8 @@ class Camac::Station {
   // Its name in the store.
   explicit Station(std::string name) : kept_as(std::move(name)) {}
   virtual camac::MotionModule& module() = 0;
-  virtual void step(std::int64_t now_us) = 0;
+  // Whether its memory has changed for good, by a motion that has ended.
+  virtual bool step(std::int64_t now_us) = 0;
   virtual void end_overtaken() = 0;
 
   const std::string kept_as;
@@ -79,7 +80,10 @@ class Camac::Bushd1Station final : public Station {
         shutter_(std::forward<Args>(args)...),
         module_(shutter_, adjusts) {}
   camac::MotionModule& module() override { return module_; }
-  void step(std::int64_t now_us) override { shutter_.follow(now_us, module_); }
+  bool step(std::int64_t now_us) override {
+    shutter_.follow(now_us, module_);
+    return false;
+  }
   void end_overtaken() override { shutter_.end_overtaken(); }
 
  private:
@@ -94,7 +98,11 @@ class Camac::Bushd2Station final : public Station {
       : Station(std::move(place)), motors_(std::forward<Args>(args)...), module_(motors_) {}
   camac::MotionModule& module() override { return module_; }
   // Who does not answer is told by the core: his move ends.
-  void step(std::int64_t now_us) override { motors_.step(now_us, module_); }
+  bool step(std::int64_t now_us) override {
+    const bool moved = module_.is_moving();
+    motors_.step(now_us, module_);
+    return moved && !module_.is_moving();
+  }
   void end_overtaken() override { motors_.end_overtaken(); }
 
  private:
@@ -181,7 +189,9 @@ void Camac::take_kept() {
 
 void Camac::step(std::int64_t now_us) {
   for (Crate& crate : crates_) {
-    for (const auto& station : crate.stations) station->step(now_us);
+    bool changed = false;
+    for (const auto& station : crate.stations) changed |= station->step(now_us);
+    if (changed) keep_memories(crate);
     tell_lam(crate);
   }
 }

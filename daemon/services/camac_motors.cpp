@@ -173,13 +173,17 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   ask_(now_us, who, api::MoveLine{.motors = motors});
 }
 
+// In the direction of its program.
+std::int64_t CamacMotors::moved(const Motion& motion) const {
+  const std::int64_t steps = installation_[motion.motor].position_steps() - motion.from_steps;
+  return motion.program.left ? -steps : steps;
+}
+
 // All but the last one, which comes with the result.
 void CamacMotors::tell_steps(Bushd2& module) {
-  const std::int64_t moved = installation_[motion_->motor].position_steps() - motion_->from_steps;
   const std::int64_t last = motion_->program.steps - 1;
-  const auto made = static_cast<std::uint32_t>(
-      std::clamp<std::int64_t>(motion_->program.left ? -moved : moved, motion_->told,
-                               std::max<std::int64_t>(last, motion_->told)));
+  const auto made = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+      moved(*motion_), motion_->told, std::max<std::int64_t>(last, motion_->told)));
   const std::uint32_t more = made - motion_->told;
   motion_->told = made;
   if (more > 0) module.answer(more, {});
@@ -214,7 +218,8 @@ void CamacMotors::end(Bushd2& module, const api::Reply& reply) {
     status.supply_missing = outcome.has_value() && !supplied;
     status.not_connected = outcome.has_value() && supplied;
   }
-  module.ends(status);
+  const std::int64_t more = moved(ended) - ended.told;
+  module.ends(status, static_cast<std::uint32_t>(std::max<std::int64_t>(more, 0)));
 }
 
 }  // namespace bushd::daemon

@@ -82,6 +82,7 @@ class CamacMotors final : public camac::Motors {
   void follow_table(std::int64_t now_us, camac::Bushd2& module);
   void move(std::int64_t now_us, camac::Bushd2& module, const tables::TablePtr& by);
   void follow_move(std::int64_t now_us, camac::Bushd2& module);
+  std::int64_t moved(const Motion& motion) const;
   void tell_steps(camac::Bushd2& module);
   void end(camac::Bushd2& module, const api::Reply& reply);
   void warn(MotorId motor, const std::string& why);

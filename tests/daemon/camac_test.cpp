@@ -319,6 +319,44 @@ TEST(CamacMotion, SingleStepsOfTheShutter) {
   EXPECT_EQ(lab.shaft_steps("m03"), 0);
 }
 
+// U28: as the shafts have turned, whatever has ended a motion.
+TEST(CamacMotion, ThePositionOfTheMotorIsInTheMemory) {
+  CamacLab lab;
+  lab.keep_positions();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  const auto position = [&](std::uint32_t number) {
+    lab.naf(kStation, 1, 16, 240 + 2 * number);
+    const std::uint32_t low = lab.naf(kStation, 0, 0).data;
+    return std::int64_t{static_cast<std::int16_t>(low + 256 * lab.naf(kStation, 0, 0).data)};
+  };
+  lab.load(0, 300, falling_codes());
+  lab.permit(kEnabled | kLeft | 1);
+  ASSERT_TRUE(lab.wait_for_lam());
+  lab.naf(kStation, 0, 10);
+  EXPECT_EQ(position(1), -300);
+  EXPECT_EQ(position(0), 0);
+  lab.permit(kEnabled | 1);
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m02") > -200; }));
+  lab.naf(kStation, 0, 24);
+  ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m02").moving; }));
+  lab.run_for(1);
+  const std::int64_t stands = lab.shaft_steps("m02");
+  EXPECT_EQ(position(1), stands) << "with the steps of the ramp-down";
+  lab.load(0, 20'000, falling_codes());
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 500; }));
+  lab.send(Ask::kStop, {});
+  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_for(1);
+  lab.naf(kStation, 0, 10);
+  EXPECT_EQ(position(0), lab.shaft_steps("m01"));
+  lab.run_for(2);
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  EXPECT_EQ(position(0), lab.shaft_steps("m01"));
+  EXPECT_EQ(position(1), stands);
+}
+
 // Another daemon finds the memory, and no motor moves because of it.
 TEST(CamacMotion, MemorySurvivesRestartsAndPowerCuts) {
   CamacLab lab;

@@ -133,6 +133,10 @@ Wrong Crates::cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
 
 Wrong Crates::module_cycle(TimeNs now_ns, const Naf& naf, const Response& response) {
   if (ModuleRegisters::is_memory(naf)) {
+    // Positions of motors, which are counted as reports come.
+    if (registers_.address() % Bushd2::kPageBytes >= Bushd2::kFirstPosition) {
+      registers_.forget_byte();
+    }
     if (auto wrong = registers_.memory_cycle(now_ns, naf, response)) return wrong;
     return observe(!response.q);
   }

@@ -43,6 +43,8 @@ class ModuleRegisters {
   // A read of the address or the control register.
   Wrong read(const Naf& naf, const Response& response) const;
   void write(const Naf& naf);
+  // The byte at the address changes by itself.
+  void forget_byte() { memory_[address_].reset(); }
   void count_up() { address_ = (address_ + 1) % memory_.size(); }
 
   std::size_t address() const { return address_; }

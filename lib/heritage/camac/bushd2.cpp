@@ -97,12 +97,22 @@ void Bushd2::receive(std::uint32_t messages, const MotorStatus& status, bool ste
   received_ = (received_ + messages) & kReceivedMask;
 }
 
+void Bushd2::count_position(const Program& program, std::uint32_t steps) {
+  const auto page = static_cast<std::size_t>(program.page) * kPageBytes;
+  const auto number = static_cast<std::size_t>(program.motor % kMotorsPerPage);
+  const std::size_t at = page + kFirstPosition + 2 * number;
+  const std::uint32_t before = programs().word_at(at);
+  programs().set_word_at(
+      at, static_cast<std::uint16_t>(program.left ? before - steps : before + steps));
+}
+
 void Bushd2::answer(std::uint32_t steps, const MotorStatus& status) {
   if (!exchange_) return;
   Exchange& exchange = *exchange_;
   const std::uint32_t made = std::min(steps, exchange.program.steps - exchange.answered);
   receive(std::max(made, 1U), status, made > 0);
   exchange.answered += made;
+  count_position(exchange.program, made);
   const bool all = exchange.answered == exchange.program.steps;
   if (all || status.bars(exchange.program.left)) {
     ended_ |= all && !exchange.stopping;
@@ -111,8 +121,9 @@ void Bushd2::answer(std::uint32_t steps, const MotorStatus& status) {
   }
 }
 
-void Bushd2::ends(const MotorStatus& status) {
+void Bushd2::ends(const MotorStatus& status, std::uint32_t unanswered) {
   if (!exchange_) return;
+  count_position(exchange_->program, unanswered);
   if (status.any()) receive(1, status, false);
   fault_ |= !exchange_->stopping || status.bars(exchange_->program.left);
   exchange_.reset();

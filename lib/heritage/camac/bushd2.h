@@ -5,7 +5,8 @@
 //     0, 1      number of steps, the low byte first
 //     2..239    238 delay codes; a code lasts code / (250 F_start), so 250 is F_start, 10 is
 //               25 F_start; 0 counts as 1
-//     240..255  free, for the positions of motors
+//     240..255  positions of the page's eight motors, two bytes each, the low one first: steps to
+//               the right that the module has been told of, less those to the left, modulo 65536
 //
 // Control register: bits 1..5 number of the motor, bit 5 enables address overflow as well; 6
 // enables the request from the motor, 7 that at the end of motion; 8 is the direction, 1: left.
@@ -27,6 +28,7 @@ class Bushd2 final : public MotionModule {
   static constexpr std::size_t kPageBytes = 256;
   static constexpr std::size_t kCodes = 238;
   static constexpr std::size_t kFirstCode = 2;  // in its page
+  static constexpr std::size_t kFirstPosition = 240;
   static constexpr int kMotors = 32;
   static constexpr int kMotorsPerPage = 8;
   static constexpr std::int64_t kCodesPerStartPeriod = 250;  // 250 of them last 1 / F_start
@@ -40,7 +42,8 @@ class Bushd2 final : public MotionModule {
   // What comes while none moves is ignored, here and below.
   void answer(std::uint32_t steps, const MotorStatus& status);
   // It stands although not all steps are made, because it was stopped or for what its status says.
-  void ends(const MotorStatus& status);
+  // `unanswered`: steps that it has made all the same, of which its position takes notice.
+  void ends(const MotorStatus& status, std::uint32_t unanswered = 0);
 
   bool is_moving() const { return exchange_.has_value(); }
 
@@ -60,6 +63,7 @@ class Bushd2 final : public MotionModule {
   void stop() override;
 
   Program program() const;
+  void count_position(const Program& program, std::uint32_t steps);
   void receive(std::uint32_t messages, const MotorStatus& status, bool step_done);
 
   Motors& motors_;

@@ -21,4 +21,9 @@ std::uint16_t CountingMemory::word_at(std::size_t address) const {
   return static_cast<std::uint16_t>(bytes_[address] | bytes_[address + 1] << 8);
 }
 
+void CountingMemory::set_word_at(std::size_t address, std::uint16_t word) {
+  bytes_[address] = static_cast<std::uint8_t>(word);
+  bytes_[address + 1] = static_cast<std::uint8_t>(word >> 8);
+}
+
 }  // namespace bushd::camac

@@ -30,6 +30,7 @@ class CountingMemory {
   void load(std::span<const std::uint8_t> bytes);
   // Two bytes, the low one at the lower address. Precondition: address + 1 < size().
   std::uint16_t word_at(std::size_t address) const;
+  void set_word_at(std::size_t address, std::uint16_t word);
 
  private:
   std::vector<std::uint8_t> bytes_;

@@ -39,6 +39,7 @@ class MotionModule : public Module {
   bool is_enabled(int control_bit) const { return (control_ & bit(control_bit)) != 0; }
   std::uint8_t control() const { return control_; }
   const CountingMemory& programs() const { return memory_; }
+  CountingMemory& programs() { return memory_; }
 
  private:
   virtual std::uint32_t request_register() const = 0;

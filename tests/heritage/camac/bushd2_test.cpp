@@ -118,7 +118,7 @@ TEST(Bushd2, MovesTheGivenNumberOfSteps) {  // S19, S25: the number at addresses
 TEST(Bushd2, HoldsFourProgramsAndThePositionsOfMotors) {  // S20, S28, U19
   Bushd2Bench bench;
   for (int page = 0; page < 4; ++page) bench.load(page, 10 * (page + 1));
-  bench.write_at(240, {1, 2, 3});
+  bench.write_at(240, {1, 2});
   for (int motor = 0; motor < 32; ++motor) {
     bench.set_control(static_cast<std::uint32_t>(motor));
     bench.permit();
@@ -129,8 +129,44 @@ TEST(Bushd2, HoldsFourProgramsAndThePositionsOfMotors) {  // S20, S28, U19
     bench.answer(program.steps);
   }
   EXPECT_EQ(bench.motors.moves.size(), 32U);
-  bench.set_address(240);
-  EXPECT_EQ(bench.read().data, 1U);
+  // U28: page and place of the motor, and what a program has put there counts.
+  for (std::uint32_t motor = 0; motor < 32; ++motor) {
+    const std::uint32_t page = motor / 8;
+    bench.set_address(page * 256 + 240 + motor % 8 * 2);
+    const std::uint32_t low = bench.read().data;
+    const std::uint32_t before = motor == 0 ? 0x0201 : 0;
+    EXPECT_EQ(low + 256 * bench.read().data, before + 10 * (page + 1)) << motor;
+  }
+}
+
+TEST(Bushd2, CountsThePositionOfItsMotorUpAndDown) {  // S20, U28
+  Bushd2Bench bench;
+  bench.load(0, 300);
+  const auto position = [&] {
+    bench.set_address(246);
+    const std::uint32_t low = bench.read().data;
+    return low + 256 * bench.read().data;
+  };
+  bench.set_control(3);
+  bench.permit();
+  bench.answer(100);
+  EXPECT_EQ(position(), 100U) << "as statuses come";
+  bench.answer(200);
+  EXPECT_EQ(position(), 300U);
+  bench.set_control(3 | kLeft);
+  bench.permit();
+  bench.answer(300);
+  EXPECT_EQ(position(), 0U);
+  bench.permit();
+  bench.answer(1);
+  EXPECT_EQ(position(), 65535U) << "below 0 it goes on from the top";
+  bench.forbid();
+  bench.module.ends({}, 2);
+  EXPECT_EQ(position(), 65533U) << "steps of the ramp-down too, which no status has told";
+  bench.module.ends({}, 2);
+  EXPECT_EQ(position(), 65533U) << "nothing moves";
+  bench.crate.initialise();
+  EXPECT_EQ(position(), 65533U);
 }
 
 TEST(Bushd2, SendsNumberDirectionAndCodes) {  // S21, S30, U7

@@ -104,7 +104,8 @@ class Driver {
       const auto steps = static_cast<std::uint32_t>(next());
       bushd2_.answer(steps, status_of(static_cast<unsigned>(next())));
     } else if (what == "ends") {
-      bushd2_.ends(status_of(static_cast<unsigned>(next())));
+      const MotorStatus status = status_of(static_cast<unsigned>(next()));
+      bushd2_.ends(status, static_cast<std::uint32_t>(next()));
     } else if (what == "limits") {
       const bool right = next() != 0;
       bushd1_.limits(right, next() != 0);

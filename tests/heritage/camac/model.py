@@ -148,6 +148,12 @@ class Bushd2(Station):
             self.motion["stopped"] = True
             self.asked.append(f"stop {self.motion['number']}")
 
+    def note(self, steps):
+        right = self.motion["direction"] == RIGHT
+        at = 256 * (self.motion["number"] // 8) + 240 + 2 * (self.motion["number"] % 8)
+        position = (self.word(at) + (steps if right else -steps)) % 65536
+        self.memory[at:at + 2] = [position % 256, position // 256]
+
     def answer(self, steps, status):
         motion = self.motion
         if not motion:
@@ -155,6 +161,7 @@ class Bushd2(Station):
         steps = min(steps, motion["left"])
         motion["left"] -= steps
         motion["made"] += steps
+        self.note(steps)
         self.received += max(steps, 1)
         self.status = status | ({5} if steps else set())
         if motion["left"] == 0:
@@ -165,10 +172,11 @@ class Bushd2(Station):
             self.flags.add("fault")
             self.motion = None
 
-    def ends(self, status):
+    def ends(self, status, unanswered):
         motion = self.motion
         if not motion:
             return
+        self.note(unanswered)
         if status:
             self.status = set(status)
             self.received += 1
@@ -353,7 +361,7 @@ class Laboratory:
         elif what == "answer":
             self.two.answer(numbers[0], bits_of(numbers[1]))
         elif what == "ends":
-            self.two.ends(bits_of(numbers[0]))
+            self.two.ends(bits_of(numbers[0]), numbers[1])
         else:
             getattr(self.one, what)(*numbers)
         line = " ".join([answer, str(self.graded()), *self.asked])

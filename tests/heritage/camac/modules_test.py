@@ -33,7 +33,7 @@ def cycle(random_):
     f, a = weighted(random_, [(command, 4 if command in ((26, 0), (0, 3), (16, 2)) else 2) for command in COMMANDS])
     data = random_.randrange(2**24)
     if (f, a) == (16, 1):
-        data = random_.choice([0, 1, 2, 252, 254, 255, 256, 1020, 1022, 1023, data])
+        data = random_.choice([0, 1, 2, 240, 252, 254, 255, 256, 496, 1020, 1022, 1023, data])
     if (f, a) == (16, 2) and random_.random() < 0.8:
         data |= random_.choice([0x70, 0x50, 0x10, 0x3F])
     return [f"naf {station} {a} {f} {data}"]
@@ -55,7 +55,7 @@ def event(random_):
     what = weighted(random_, [("answer", 8), ("ends", 1), ("status", 1), ("accept", 1), ("limits", 5), ("step_done", 2),
                               ("step_not_done", 1), ("run_step_done", 10), ("run_ends", 4), ("stands", 1)])
     bits = weighted(random_, [(0, 20), (1, 1), (2, 1), (4, 1), (8, 1), (random_.randrange(16), 1)])
-    arguments = {"answer": [random_.choice([0, 1, 1, 1, 2, 5, 100, 70000]), bits], "ends": [bits],
+    arguments = {"answer": [random_.choice([0, 1, 1, 1, 2, 5, 100, 70000]), bits], "ends": [bits, random_.choice([0, 0, 1, 30])],
                  "status": [random_.randrange(32), bits],
                  "accept": [int(random_.random() < 0.9)], "limits": random_.choice([[0, 0], [0, 0], [1, 0], [0, 1], [1, 1]])}
     return " ".join(str(word) for word in [what, *arguments.get(what, [])])
