@@ -125,7 +125,7 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
     line["emission"] = fieldbus::kEmissionNames.at(emission.mode);
     line["step_us"] = emission.step_us;
     line["dir_setup_us"] = emission.dir_setup_us;
-    if (emission.mode == BUSHD_EMISSION_STAGGERED) line["settle_us"] = emission.settle_us;
+    if (bushd_emission_is_staggered(emission.mode)) line["settle_us"] = emission.settle_us;
     if (emission.mode == BUSHD_EMISSION_PHASES) {
       line["phase_sequence"] = fieldbus::kSequenceNames.at(emission.sequence);
     }

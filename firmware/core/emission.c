@@ -13,9 +13,10 @@
 // Windings stay on for so long after a move, until the rotor has come to rest.
 #define ROTOR_SETTLES_NS 100000000u
 
-// Capabilities of the modes follow each other as the modes do.
+// Capabilities of the modes follow each other as the modes do; the last mode needs two.
 static bool is_disabled(const bushd_mcu* mcu, uint8_t mode) {
-  const uint32_t needed = mode == BUSHD_EMISSION_EVEN ? 0 : (uint32_t)BUSHD_CAN_BURST << (mode - 1);
+  uint32_t needed = mode == BUSHD_EMISSION_EVEN ? 0 : (uint32_t)BUSHD_CAN_BURST << (mode - 1);
+  if (mode == BUSHD_EMISSION_COMMON_STAGGERED) needed = BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED;
   return (needed & mcu->config.disabled_capabilities) != 0;
 }
 
@@ -24,9 +25,9 @@ static bushd_status use(bushd_mcu* mcu, const bushd_emission* settings) {
   const bushd_status status = bushd_emission_fit(settings, mcu->tick_ns, mcu->config.slots, &grid);
   if (status != BUSHD_OK) return status;
   bushd_mcu_emission* emission = &mcu->emission;
-  const bool settles = settings->mode == BUSHD_EMISSION_STAGGERED;
+  const bool settles = bushd_emission_is_staggered(settings->mode);
   const bool phases = settings->mode == BUSHD_EMISSION_PHASES;
-  if (settles || emission->settings.mode == BUSHD_EMISSION_STAGGERED ||
+  if (settles || bushd_emission_is_staggered(emission->settings.mode) ||
       (phases && emission->of.windings.sequence != settings->sequence)) {
     memset(&emission->of, 0, sizeof emission->of);
   }
@@ -153,8 +154,15 @@ static bool make_settle_step(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
   slot_buffer->steps[m] = step;
   slot_buffer->active = motor_bit(m);
   memset(slot_buffer->step, 0, sizeof slot_buffer->step);
-  slot_buffer->step[bushd_mcu_settle_slot(mcu)] = motor_bit(m);
+  uint16_t slot = bushd_mcu_settle_slot(mcu);
+  if (step < 0 && bushd_emission_has_common_dir(mcu->emission.grid.mode)) --slot;
+  slot_buffer->step[slot] = motor_bit(m);
   return true;
+}
+
+static void use_common_dir(bushd_slot_buffer* slot_buffer) {
+  slot_buffer->outputs = BUSHD_OUTPUTS_COMMON_DIR;
+  slot_buffer->direction = 0;
 }
 
 void bushd_mcu_shape(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
@@ -166,11 +174,10 @@ void bushd_mcu_shape(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer) {
     const uint16_t changed = slot_buffer->direction ^ mcu->slot_buffer[mcu->front].direction;
     bushd_emission_defer(slot_buffer->step, changed & slot_buffer->active, grid->setup_slots);
   } else {
-    if (grid->mode == BUSHD_EMISSION_STAGGERED && make_settle_step(mcu, slot_buffer)) return;
-    bushd_emission_fill(slot_buffer->step, mcu->config.slots, grid, slot_buffer->steps,
-                        mcu->config.motors);
-    if (grid->mode != BUSHD_EMISSION_COMMON_DIR) return;
-    slot_buffer->outputs = BUSHD_OUTPUTS_COMMON_DIR;
-    slot_buffer->direction = 0;
+    if (!bushd_emission_is_staggered(grid->mode) || !make_settle_step(mcu, slot_buffer)) {
+      bushd_emission_fill(slot_buffer->step, mcu->config.slots, grid, slot_buffer->steps,
+                          mcu->config.motors);
+    }
+    if (bushd_emission_has_common_dir(grid->mode)) use_common_dir(slot_buffer);
   }
 }

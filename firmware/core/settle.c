@@ -33,7 +33,9 @@ enum {
 uint16_t bushd_mcu_settle_slot(const bushd_mcu* mcu) {
   const uint16_t middle = mcu->config.slots / 2u;
   const uint16_t setup_slots = mcu->emission.grid.setup_slots;
-  return setup_slots > middle ? setup_slots : middle;
+  const uint16_t slot = setup_slots > middle ? setup_slots : middle;
+  // The step, which is measured, goes to the right: a common DIR is there in odd slots.
+  return bushd_emission_has_common_dir(mcu->emission.grid.mode) ? slot | 1u : slot;
 }
 
 // With a table, and none of these.
@@ -46,13 +48,13 @@ static int8_t first_but(const bushd_mcu* mcu, uint16_t barred) {
 
 bool bushd_mcu_settle_pending(const bushd_mcu* mcu) {
   const bushd_mcu_emission* emission = &mcu->emission;
-  return emission->grid.mode == BUSHD_EMISSION_STAGGERED &&
+  return bushd_emission_is_staggered(emission->grid.mode) &&
          emission->settings.settle_us == BUSHD_SETTLE_MEASURED && !emission->of.settle.done &&
          first_but(mcu, 0) >= 0;
 }
 
 bool bushd_mcu_wants_samples(const bushd_mcu* mcu) {
-  if (mcu->emission.grid.mode != BUSHD_EMISSION_STAGGERED) return false;
+  if (!bushd_emission_is_staggered(mcu->emission.grid.mode)) return false;
   const uint8_t ticks = mcu->emission.of.settle.ticks;
   return ticks >= FIRST_QUIET && ticks <= BACK_AT;
 }

@@ -8,8 +8,14 @@
 namespace bushd::fieldbus {
 namespace {
 
-constexpr std::array<std::uint16_t, 5> kCapabilities = {0, BUSHD_CAN_BURST, BUSHD_CAN_COMMON_DIR,
-                                                        BUSHD_CAN_STAGGERED, BUSHD_CAN_PHASES};
+constexpr std::array<std::uint16_t, 6> kCapabilities = {0,
+                                                        BUSHD_CAN_BURST,
+                                                        BUSHD_CAN_COMMON_DIR,
+                                                        BUSHD_CAN_STAGGERED,
+                                                        BUSHD_CAN_PHASES,
+                                                        BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED};
+// By bushd_emission_mode, which of kStepsNames.
+constexpr std::array<std::uint8_t, 6> kStepsOf = {0, 1, 1, 2, 3, 2};
 
 std::string at(Error place, std::string message) {
   place.message = std::move(message);
@@ -21,6 +27,12 @@ std::string us_of_ns(std::uint32_t ns) {
 }
 
 }  // namespace
+
+std::string emission_keys(std::uint8_t mode) {
+  std::string keys = "steps = \"" + std::string(kStepsNames.at(kStepsOf.at(mode))) + "\"";
+  if (bushd_emission_has_common_dir(mode)) keys += " with direction = \"common\"";
+  return keys;
+}
 
 const char* remedy_of(unsigned refusal) {
   return refusal == BUSHD_E_STATE
@@ -37,10 +49,10 @@ Result<unsigned> max_steps_per_tick(const EmissionSetup& setup, const bushd_iden
     std::string allowed;
     for (std::uint8_t mode = 0; mode < kEmissionNames.size(); ++mode) {
       if (!can(mode)) continue;
-      allowed.append(allowed.empty() ? "\"" : ", \"").append(kEmissionNames[mode]).append("\"");
+      allowed.append(allowed.empty() ? "" : "; ").append(emission_keys(mode));
     }
-    return fail(at(setup.mode_at, "is \"" + std::string(kEmissionNames.at(setup.settings.mode)) +
-                                      "\", which this MCU cannot do; allowed: " + allowed));
+    return fail(at(setup.mode_at, "asks for " + emission_keys(setup.settings.mode) +
+                                      ", which this MCU cannot do; allowed: " + allowed));
   }
   if (identity.slots < BUSHD_MIN_SLOTS) {
     return fail("says that it has " + std::to_string(identity.slots) +
@@ -79,7 +91,7 @@ std::string emission_refusal(const EmissionSetup& setup, unsigned status, std::u
     case BUSHD_E_DIR_SETUP:
       return at(setup.dir_setup_at,
                 "is " + std::to_string(settings.dir_setup_us) + " us; allowed: " +
-                    (settings.mode == BUSHD_EMISSION_COMMON_DIR
+                    (bushd_emission_has_common_dir(settings.mode)
                          ? half_slot + ": so long before a pulse the common DIR changes"
                          : "less than a tick"));
     case BUSHD_E_STEP_PERIOD:

@@ -17,7 +17,8 @@ struct EmissionSetup {
   bushd_emission settings{};
   // A motor makes a step before work, which tells how long the supply current needs after one.
   bool measures() const {
-    return settings.mode == BUSHD_EMISSION_STAGGERED && settings.settle_us == BUSHD_SETTLE_MEASURED;
+    return bushd_emission_is_staggered(settings.mode) &&
+           settings.settle_us == BUSHD_SETTLE_MEASURED;
   }
   // Where they stand; without messages.
   Error mode_at{};
@@ -26,9 +27,17 @@ struct EmissionSetup {
   Error pulse_at{};
 };
 
-// By bushd_emission_mode.
-inline constexpr std::array<std::string_view, 5> kEmissionNames = {"even", "burst", "common-dir",
-                                                                   "staggered", "phases"};
+// By bushd_emission_mode, in the log of moves.
+inline constexpr std::array<std::string_view, 6> kEmissionNames = {
+    "even", "burst", "common-dir", "staggered", "phases", "common-dir-staggered"};
+
+// What `steps` and `direction` of a configuration may be.
+inline constexpr std::array<std::string_view, 4> kStepsNames = {"even", "burst", "staggered",
+                                                                "phases"};
+inline constexpr std::array<std::string_view, 2> kDirectionNames = {"own", "common"};
+
+// `steps = "burst"`, and `direction = "common"` where the mode has one DIR for all.
+std::string emission_keys(std::uint8_t mode);
 
 // By bushd_phase_sequence.
 inline constexpr std::array<std::string_view, 4> kSequenceNames = {"wave", "full", "half",

@@ -115,7 +115,7 @@ Result<void> check_emission(const Loading& loading, std::size_t index) {
         "most. Use a longer tick_us",
         settings.pulse_us, bus.tick_us, bus.name, half_slot_us);
   } else if (status == BUSHD_E_DIR_SETUP) {
-    const bool common = settings.mode == BUSHD_EMISSION_COMMON_DIR;
+    const bool common = bushd_emission_has_common_dir(settings.mode);
     error = mcu.emission.dir_setup_at;
     fault = fmt::format(
         "is {} us; allowed: less than {} of the {} us tick of bus \"{}\", {} us at "

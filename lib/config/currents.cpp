@@ -22,7 +22,7 @@ Result<std::optional<Currents>> read_currents(const TomlReader& motor, const Mcu
   if (mcu.emission.settings.mode != BUSHD_EMISSION_PHASES) {
     return fail(motor.error(kKey,
                             "says nothing of a driver with STEP and DIR; allowed: only with "
-                            "emission = \"phases\" of its MCU"));
+                            "steps = \"phases\" of its MCU"));
   }
   auto reader =
       motor.section(kKey, "a table such as { ramp_ma = 1500, cruise_ma = 1000, hold_ma = 300 }");

@@ -47,48 +47,104 @@ Result<void> read_settle(const TomlReader& reader, std::uint16_t* us) {
   return {};
 }
 
+// Of kStepsNames, and what knows a key as a bit each.
+enum Steps : std::uint8_t { kEven, kBurst, kStaggered, kPhases };
+constexpr unsigned bit(Steps steps) {
+  return 1u << steps;
+}
+constexpr unsigned kPeriodic = bit(kBurst) | bit(kStaggered);
+constexpr unsigned kPulses = bit(kEven) | kPeriodic;
+
 struct Key {
   std::string_view name;
-  std::uint8_t first_mode;  // the modes that know it
-  std::uint8_t last_mode;
+  unsigned known_with;
 };
 constexpr std::array<Key, 6> kKeys = {{
-    {"step_us", BUSHD_EMISSION_BURST, BUSHD_EMISSION_STAGGERED},
-    {"settle_us", BUSHD_EMISSION_STAGGERED, BUSHD_EMISSION_STAGGERED},
-    {"dir_setup_us", BUSHD_EMISSION_EVEN, BUSHD_EMISSION_STAGGERED},
-    {"pulse_us", BUSHD_EMISSION_EVEN, BUSHD_EMISSION_STAGGERED},
-    {"phase_sequence", BUSHD_EMISSION_PHASES, BUSHD_EMISSION_PHASES},
-    {"hold_current", BUSHD_EMISSION_PHASES, BUSHD_EMISSION_PHASES},
+    {"step_us", kPeriodic},
+    {"settle_us", bit(kStaggered)},
+    {"dir_setup_us", kPulses},
+    {"pulse_us", kPulses},
+    {"phase_sequence", bit(kPhases)},
+    {"hold_current", bit(kPhases)},
 }};
 
+std::string names_of(unsigned known_with) {
+  std::string names;
+  for (const Steps steps : {kEven, kBurst, kStaggered, kPhases}) {
+    if ((known_with & bit(steps)) == 0) continue;
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", fieldbus::kStepsNames[steps]);
+  }
+  return names;
+}
+
 // A key that does nothing would be taken for one that does.
-Result<void> refuse_idle_keys(const TomlReader& reader, std::uint8_t mode) {
+Result<void> refuse_idle_keys(const TomlReader& reader, Steps steps) {
   for (const Key& key : kKeys) {
-    if (!reader.has(key.name) || (mode >= key.first_mode && mode <= key.last_mode)) continue;
-    std::string modes;
-    for (std::uint8_t m = key.first_mode; m <= key.last_mode; ++m) {
-      modes += fmt::format("{}\"{}\"", modes.empty() ? "" : ", ", fieldbus::kEmissionNames[m]);
-    }
-    return fail(reader.error(key.name, fmt::format("says nothing with emission = \"{}\"; allowed: "
-                                                   "only with {}",
-                                                   fieldbus::kEmissionNames[mode], modes)));
+    if (!reader.has(key.name) || (key.known_with & bit(steps)) != 0) continue;
+    return fail(reader.error(key.name,
+                             fmt::format("says nothing with steps = \"{}\"; allowed: only with {}",
+                                         fieldbus::kStepsNames[steps], names_of(key.known_with))));
   }
   return {};
 }
 
+Result<std::uint8_t> read_mode(const TomlReader& reader) {
+  Steps steps = kEven;
+  if (reader.has("steps")) {
+    const auto word = read_word(reader, "steps", fieldbus::kStepsNames);
+    if (!word) return fail(word.error());
+    steps = static_cast<Steps>(*word);
+  }
+  bool common = false;
+  if (reader.has("direction")) {
+    const auto word = read_word(reader, "direction", fieldbus::kDirectionNames);
+    if (!word) return fail(word.error());
+    common = *word == 1;
+    // Steps at their own times cannot wait for the one DIR; windings have none.
+    if ((bit(steps) & kPeriodic) == 0 && (common || steps == kPhases)) {
+      return fail(reader.error(
+          "direction",
+          fmt::format("is \"{}\" with steps = \"{}\"; allowed: {}",
+                      fieldbus::kDirectionNames[common ? 1 : 0], fieldbus::kStepsNames[steps],
+                      steps == kPhases ? "only with drivers, which have STEP and DIR; remove it"
+                                       : "\"common\" only with steps = " + names_of(kPeriodic))));
+    }
+  }
+  if (auto idle = refuse_idle_keys(reader, steps); !idle) return fail(idle.error());
+  switch (steps) {
+    case kBurst:
+      return common ? BUSHD_EMISSION_COMMON_DIR : BUSHD_EMISSION_BURST;
+    case kStaggered:
+      return common ? BUSHD_EMISSION_COMMON_STAGGERED : BUSHD_EMISSION_STAGGERED;
+    case kPhases:
+      return BUSHD_EMISSION_PHASES;
+    default:
+      return BUSHD_EMISSION_EVEN;
+  }
+}
+
 }  // namespace
+
+Result<void> refuse_emission_key(const TomlReader& reader) {
+  constexpr std::string_view kKey = "emission";
+  if (!reader.has(kKey)) return {};
+  std::string instead = "steps and direction";
+  if (reader.is_string(kKey)) {
+    const auto word = reader.string(kKey, "");
+    for (std::uint8_t mode = 0; word && mode < fieldbus::kEmissionNames.size(); ++mode) {
+      if (fieldbus::kEmissionNames[mode] == *word) instead = fieldbus::emission_keys(mode);
+    }
+  }
+  return fail(reader.error(kKey, fmt::format("is not a key; write {} in place of it", instead)));
+}
 
 Result<fieldbus::EmissionSetup> read_emission(const TomlReader& reader) {
   fieldbus::EmissionSetup setup;
   bushd_emission& settings = setup.settings;
-  if (reader.has("emission")) {
-    const auto mode = read_word(reader, "emission", fieldbus::kEmissionNames);
-    if (!mode) return fail(mode.error());
-    settings.mode = static_cast<std::uint8_t>(*mode);
-  }
-  if (auto idle = refuse_idle_keys(reader, settings.mode); !idle) return fail(idle.error());
-  const bool periodic =
-      settings.mode >= BUSHD_EMISSION_BURST && settings.mode <= BUSHD_EMISSION_STAGGERED;
+  const auto mode = read_mode(reader);
+  if (!mode) return fail(mode.error());
+  settings.mode = *mode;
+  const bool periodic = bushd_emission_has_periods(settings.mode);
   if (periodic) {
     if (auto read = read_us(reader, "step_us", 1, &settings.step_us); !read) {
       return fail(read.error());
@@ -98,10 +154,10 @@ Result<fieldbus::EmissionSetup> read_emission(const TomlReader& reader) {
                                std::uint16_t* us) -> Result<void> {
     return reader.has(key) ? read_us(reader, key, lowest, us) : Result<void>{};
   };
-  if (settings.mode == BUSHD_EMISSION_STAGGERED) {
+  if (bushd_emission_is_staggered(settings.mode)) {
     if (auto read = read_settle(reader, &settings.settle_us); !read) return fail(read.error());
   }
-  if (settings.mode == BUSHD_EMISSION_BURST || settings.mode == BUSHD_EMISSION_STAGGERED) {
+  if (periodic && !bushd_emission_has_common_dir(settings.mode)) {
     settings.dir_setup_us = kDirSetupUs;
   }
   if (auto read = optional_us("dir_setup_us", 0, &settings.dir_setup_us); !read) {
@@ -122,7 +178,7 @@ Result<fieldbus::EmissionSetup> read_emission(const TomlReader& reader) {
     if (!hold) return fail(hold.error());
     settings.hold_current = *hold;
   }
-  setup.mode_at = reader.error(reader.has("emission") ? "emission" : "", "");
+  setup.mode_at = reader.error(reader.has("steps") ? "steps" : "", "");
   setup.step_at = reader.error("step_us", "");
   setup.dir_setup_at = reader.error("dir_setup_us", "");
   setup.pulse_at = reader.error("pulse_us", "");

@@ -7,6 +7,9 @@
 
 namespace bushd::config {
 
+// The keys `steps` and `direction` have taken its place.
+Result<void> refuse_emission_key(const tables::TomlReader& reader);
+
 Result<fieldbus::EmissionSetup> read_emission(const tables::TomlReader& reader);
 
 }  // namespace bushd::config

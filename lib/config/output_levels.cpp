@@ -29,7 +29,7 @@ Result<void> read(const TomlReader& reader, const LevelKey& key, std::uint16_t o
   if (mcu->emission.settings.mode == BUSHD_EMISSION_PHASES) {
     return fail(reader.error(
         key.name,
-        fmt::format("says nothing where emission is \"phases\", on MCU \"{}\": its "
+        fmt::format("says nothing where steps is \"phases\", on MCU \"{}\": its "
                     "outputs switch windings. Remove it; transistors that are on when low "
                     "need inverters",
                     mcu->id)));
@@ -67,11 +67,11 @@ Result<void> read_output_levels(const TomlReader& reader, Output output, Mcu* mc
                                 "a level: direction_line = {{ line = \"dtr\", active = \"off\" }}",
                                 mcu->id)));
     }
-    const bool shared = mcu->emission.settings.mode == BUSHD_EMISSION_COMMON_DIR;
+    const bool shared = bushd_emission_has_common_dir(mcu->emission.settings.mode);
     if (shared && key.low == kDirection.low) {
       return fail(reader.error(
           key.name, fmt::format("stands at a motor, but the motors of MCU \"{}\" have one DIR "
-                                "(emission = \"common-dir\"): write it into its [[mcu]]",
+                                "(direction = \"common\"): write it into its [[mcu]]",
                                 mcu->id)));
     }
     const auto bit = static_cast<std::uint16_t>(1u << output.value);

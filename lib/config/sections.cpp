@@ -193,9 +193,11 @@ constexpr std::int64_t kMostKeypadMs = 10'000;  // some 50000 of the shortest ti
 Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
   Taken ids;
   for (const TomlReader& reader : readers) {
+    if (auto old = refuse_emission_key(reader); !old) return old;
     if (auto known = reader.only({"bus",
                                   "address",
-                                  "emission",
+                                  "steps",
+                                  "direction",
                                   "step_us",
                                   "settle_us",
                                   "dir_setup_us",

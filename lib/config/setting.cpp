@@ -239,7 +239,7 @@ std::string_view why_not(SettingKey key) {
     case SettingKey::kKeypad:
       return "its bus has no MCU with local inputs or a keypad";
     case SettingKey::kCurrents:
-      return "its MCU does not drive it by phases; give that `emission = \"phases\"` in bushd.toml "
+      return "its MCU does not drive it by phases; give that `steps = \"phases\"` in bushd.toml "
              "first";
     default:
       return "it has no unit, so its positions are steps; give it `unit` and `steps_per_unit` in "

@@ -10,23 +10,19 @@ static uint32_t slots_in(uint32_t ns, uint32_t tick_ns, uint16_t slot_count) {
   return (uint32_t)(((uint64_t)ns * slot_count + tick_ns - 1u) / tick_ns);
 }
 
-static bool has_periods(uint8_t mode) {
-  return mode == BUSHD_EMISSION_BURST || mode == BUSHD_EMISSION_COMMON_DIR ||
-         mode == BUSHD_EMISSION_STAGGERED;
-}
-
 bushd_status bushd_emission_fit(const bushd_emission* settings, uint32_t tick_ns,
                                 uint16_t slot_count, bushd_emission_grid* grid) {
   const uint32_t shortest_ns = tick_ns - tick_ns / BUSHD_TICK_SLEW_DIVISOR;
   const uint32_t half_slot_ns = shortest_ns / (2u * slot_count);
   const uint32_t setup_ns = (uint32_t)settings->dir_setup_us * 1000u;
+  const bool common_dir = bushd_emission_has_common_dir(settings->mode);
   memset(grid, 0, sizeof *grid);
   grid->mode = settings->mode;
   grid->period_slots = 1;
   // Levels of phases last for a whole slot at least, and have no direction.
   if (settings->mode != BUSHD_EMISSION_PHASES) {
     if ((uint32_t)settings->pulse_us * 1000u > half_slot_ns) return BUSHD_E_PULSE_WIDTH;
-    if (settings->mode == BUSHD_EMISSION_COMMON_DIR) {
+    if (common_dir) {
       if (setup_ns > half_slot_ns) return BUSHD_E_DIR_SETUP;
     } else {
       const uint32_t setup_slots = slots_in(setup_ns, shortest_ns, slot_count);
@@ -34,10 +30,10 @@ bushd_status bushd_emission_fit(const bushd_emission* settings, uint32_t tick_ns
       grid->setup_slots = (uint16_t)setup_slots;
     }
   }
-  if (has_periods(settings->mode)) {
+  if (bushd_emission_has_periods(settings->mode)) {
     uint32_t period = slots_in((uint32_t)settings->step_us * 1000u, tick_ns, slot_count);
     // Left in even slots, right in odd ones.
-    if (settings->mode == BUSHD_EMISSION_COMMON_DIR) period = (period + 1u) & ~(uint32_t)1u;
+    if (common_dir) period = (period + 1u) & ~(uint32_t)1u;
     if (period > (uint32_t)slot_count - grid->setup_slots) return BUSHD_E_STEP_PERIOD;
     grid->period_slots = (uint16_t)period;
   }
@@ -53,18 +49,32 @@ uint16_t bushd_emission_settle_slots(uint32_t settle_ns, uint32_t tick_ns, uint1
   return slots == 0 || slots > UINT16_MAX ? UINT16_MAX : (uint16_t)slots;
 }
 
-static void stagger(uint16_t* masks, const bushd_emission_grid* grid, uint16_t due) {
+// Places are slots, or with a common DIR pairs of slots: those to the left pulse in the first slot
+// of theirs, and come first; the others in the second one.
+static void stagger(uint16_t* masks, const bushd_emission_grid* grid, uint16_t due,
+                    uint16_t right) {
+  const uint8_t pairs = grid->mode == BUSHD_EMISSION_COMMON_STAGGERED ? 1 : 0;
+  const uint16_t places = (uint16_t)(grid->period_slots >> pairs);
+  const uint32_t settle = ((uint32_t)grid->settle_slots + pairs) >> pairs;
   uint8_t count = 0;
   for (uint16_t left = due; left != 0; left = (uint16_t)(left & (left - 1u))) ++count;
-  const bool settles = (uint32_t)grid->settle_slots * count < grid->period_slots;
-  const uint16_t apart = (uint16_t)(settles ? grid->settle_slots : grid->period_slots / count);
-  const uint16_t apart_rest = (uint16_t)(settles ? 0 : grid->period_slots % count);
+  const bool settles = settle * count < places;
+  const uint16_t apart = (uint16_t)(settles ? settle : places / count);
+  const uint16_t apart_rest = (uint16_t)(settles ? 0 : places % count);
+  uint16_t now = pairs == 0 ? due : (uint16_t)(due & ~right);
+  due = (uint16_t)(due & ~now);
   uint16_t at = 0;
   uint16_t rest = 0;
-  for (uint16_t bit = 1; due != 0; bit = (uint16_t)(bit << 1)) {
-    if ((due & bit) == 0) continue;
-    due &= (uint16_t)~bit;
-    masks[at] |= bit;
+  for (uint16_t bit = 1; now != 0 || due != 0; bit = (uint16_t)(bit << 1)) {
+    if (now == 0) {
+      now = due;
+      due = 0;
+      bit = 1;
+      ++masks;
+    }
+    if ((now & bit) == 0) continue;
+    now &= (uint16_t)~bit;
+    masks[(uint16_t)(at << pairs)] |= bit;
     at = (uint16_t)(at + apart);
     rest = (uint16_t)(rest + apart_rest);
     if (rest >= count) {
@@ -99,8 +109,8 @@ void bushd_emission_fill(uint16_t* masks, uint16_t slot_count, const bushd_emiss
     joining = masks[k];
     masks[k] = 0;
     period -= grid->period_slots;
-    if (grid->mode == BUSHD_EMISSION_STAGGERED) {
-      stagger(period, grid, due);
+    if (bushd_emission_is_staggered(grid->mode)) {
+      stagger(period, grid, due, right);
     } else if (grid->mode == BUSHD_EMISSION_COMMON_DIR) {
       period[0] = due & (uint16_t)~right;
       period[1] = due & right;

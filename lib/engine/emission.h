@@ -9,6 +9,8 @@
 //                            one DIR line is low in even slots and high in odd ones
 //     staggered   (claim 4)  pulse one after the other, dt_p apart if dt_p < dt_n = T_step / n_d,
 //                            else dt_n; n_d motors, in rising order
+//     both        (claims 11, 12)  so the motors that go left, in even slots, then those that go
+//                            right, in odd ones: T_step and dt_p are rounded up to even numbers
 #ifndef BUSHD_ENGINE_EMISSION_H
 #define BUSHD_ENGINE_EMISSION_H
 
@@ -41,7 +43,7 @@ bushd_status bushd_emission_fit(const bushd_emission* settings, uint32_t tick_ns
 // `settle_slots` for this time; 0: not known.
 uint16_t bushd_emission_settle_slots(uint32_t settle_ns, uint32_t tick_ns, uint16_t slot_count);
 
-// Makes the masks of all slots anew, for burst, common-dir and staggered. steps[m] is bit m's
+// Makes the masks of all slots anew, for modes with periods. steps[m] is bit m's
 // signed number, |steps[m]| <= grid->max_steps. O(slots + motors), for staggered O(slots + steps).
 void bushd_emission_fill(uint16_t* masks, uint16_t slot_count, const bushd_emission_grid* grid,
                          const int16_t* steps, uint8_t motors);

@@ -133,9 +133,8 @@ bushd_status bushd_decode_emission(const uint8_t* payload, size_t size, bushd_em
   message->settle_us = get16(&r);
   message->dir_setup_us = get16(&r);
   message->pulse_us = get16(&r);
-  const bool has_period =
-      message->mode >= BUSHD_EMISSION_BURST && message->mode <= BUSHD_EMISSION_STAGGERED;
-  return finish(&r, message->mode <= BUSHD_EMISSION_PHASES &&
+  const bool has_period = bushd_emission_has_periods(message->mode);
+  return finish(&r, message->mode <= BUSHD_EMISSION_COMMON_STAGGERED &&
                         message->sequence <= BUSHD_PHASES_THREE && hold_current <= 1 &&
                         (!has_period || message->step_us >= 1));
 }

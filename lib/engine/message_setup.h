@@ -85,8 +85,24 @@ typedef enum bushd_emission_mode {
   BUSHD_EMISSION_BURST = 1,       // all motors together, each T_step
   BUSHD_EMISSION_COMMON_DIR = 2,  // one DIR for all: each T_step those to the left, then the others
   BUSHD_EMISSION_STAGGERED = 3,   // one after the other, each T_step
-  BUSHD_EMISSION_PHASES = 4       // four levels a motor instead of STEP and DIR
+  BUSHD_EMISSION_PHASES = 4,      // four levels a motor instead of STEP and DIR
+  // One DIR for all, each T_step those to the left one after the other, then the others likewise.
+  // Needs the capabilities of both modes.
+  BUSHD_EMISSION_COMMON_STAGGERED = 5
 } bushd_emission_mode;
+
+static inline bool bushd_emission_has_common_dir(uint8_t mode) {
+  return mode == BUSHD_EMISSION_COMMON_DIR || mode == BUSHD_EMISSION_COMMON_STAGGERED;
+}
+
+static inline bool bushd_emission_is_staggered(uint8_t mode) {
+  return mode == BUSHD_EMISSION_STAGGERED || mode == BUSHD_EMISSION_COMMON_STAGGERED;
+}
+
+// The steps of a tick follow each other at intervals of T_step.
+static inline bool bushd_emission_has_periods(uint8_t mode) {
+  return mode != BUSHD_EMISSION_EVEN && mode != BUSHD_EMISSION_PHASES;
+}
 
 typedef enum bushd_phase_sequence {
   BUSHD_PHASES_WAVE = 0,  // 4-beat, one winding on
@@ -105,7 +121,7 @@ typedef struct bushd_emission {
   uint8_t mode;           // bushd_emission_mode
   uint8_t sequence;       // bushd_phase_sequence, of phases
   bool hold_current;      // of phases: windings stay on at rest
-  uint16_t step_us;       // T_step, of burst, common-dir and staggered; >= 1 there
+  uint16_t step_us;       // T_step, where the mode has periods; >= 1 there
   uint16_t settle_us;     // dt_p, of staggered; BUSHD_SETTLE_MEASURED, BUSHD_SETTLE_UNKNOWN
   uint16_t dir_setup_us;  // DIR changes as long before a step at least
   uint16_t pulse_us;      // a STEP pulse lasts as long at least

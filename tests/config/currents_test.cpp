@@ -17,8 +17,8 @@ using test::of_motor;
 using testing::HasSubstr;
 
 // Currents of "theta", on an MCU with this emission; on line 33.
-std::string with(const std::string& currents, const std::string& emission = "phases") {
-  return of_mcu("emission = \"" + emission + "\"\n", of_motor("currents = " + currents + "\n"));
+std::string with(const std::string& currents, const std::string& steps = "phases") {
+  return of_mcu("steps = \"" + steps + "\"\n", of_motor("currents = " + currents + "\n"));
 }
 
 TEST(Currents, AreReadOfAMotorWithPhases) {
@@ -38,7 +38,7 @@ TEST(Currents, AreReadOfAMotorWithPhases) {
 TEST(Currents, WhatIsWrongIsNamed) {
   EXPECT_THAT(error_of(with("{ ramp_ma = 1, cruise_ma = 1, hold_ma = 1 }", "even")),
               HasSubstr("33:12: motor[0].currents: says nothing of a driver with STEP and DIR; "
-                        "allowed: only with emission = \"phases\" of its MCU"));
+                        "allowed: only with steps = \"phases\" of its MCU"));
   EXPECT_THAT(error_of(with("{ ramp_ma = 1500, cruise_ma = 1000 }")), HasSubstr("hold_ma"));
   EXPECT_THAT(error_of(with("{ ramp_ma = 5111, cruise_ma = 1, hold_ma = 1 }")),
               HasSubstr("ramp_ma: is 5111; allowed: a whole number 1..5110 mA"));

@@ -51,18 +51,18 @@ TEST(OutputLevels, AreHighOrLow) {
 }
 
 TEST(OutputLevels, OfWindingsAreRefused) {
-  const std::string phases = "emission = \"phases\"\n";
+  const std::string phases = "steps = \"phases\"\n";
   EXPECT_THAT(error_of(of_mcu(phases + "step_active = \"low\"\n")),
-              HasSubstr("mcu[0].step_active: says nothing where emission is \"phases\""));
+              HasSubstr("mcu[0].step_active: says nothing where steps is \"phases\""));
   EXPECT_THAT(error_of(of_mcu(phases, of_motor("direction_active = \"low\"\n"))),
-              HasSubstr("motor[0].direction_active: says nothing where emission is \"phases\""));
+              HasSubstr("motor[0].direction_active: says nothing where steps is \"phases\""));
   EXPECT_EQ(outputs_of(of_mcu(phases + "enable_active = \"low\"\n")).enabled, BUSHD_ENABLED_LOW);
 }
 
 TEST(OutputLevels, CommonDirIsNoMotors) {
-  const std::string common = "emission = \"common-dir\"\nstep_us = 300\n";
+  const std::string common = "direction = \"common\"\nsteps = \"staggered\"\nstep_us = 300\n";
   EXPECT_THAT(error_of(of_mcu(common, of_motor("direction_active = \"low\"\n"))),
-              HasSubstr("have one DIR (emission = \"common-dir\"): write it into its [[mcu]]"));
+              HasSubstr("have one DIR (direction = \"common\"): write it into its [[mcu]]"));
   EXPECT_EQ(outputs_of(of_mcu(common + "direction_active = \"low\"\n")).direction_low, 0xFFFF);
 }
 

@@ -268,7 +268,7 @@ TEST_P(ConformanceOfStreams, StepsOfInvertedOutputsFallIntoTheSameSlots) {
 
 struct Mode {
   std::string name;
-  std::uint16_t needs;
+  std::uint16_t needs;  // all of them
   bushd_emission settings;
 };
 
@@ -307,6 +307,8 @@ std::vector<Mode> modes() {
   return {{"Burst", BUSHD_CAN_BURST, mode(BUSHD_EMISSION_BURST)},
           {"CommonDir", BUSHD_CAN_COMMON_DIR, mode(BUSHD_EMISSION_COMMON_DIR)},
           {"Staggered", BUSHD_CAN_STAGGERED, mode(BUSHD_EMISSION_STAGGERED)},
+          {"CommonStaggered", BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED,
+           mode(BUSHD_EMISSION_COMMON_STAGGERED)},
           {"Phases", BUSHD_CAN_PHASES, mode(BUSHD_EMISSION_PHASES)}};
 }
 
@@ -349,7 +351,7 @@ TEST_P(ConformanceOfEmission, ChangesOutputsInTheSlotsOfTheVirtualOne) {
 TEST_P(ConformanceOfEmission, ChangesInvertedOutputsInTheSlotsOfTheVirtualOne) {
   const bool phases = mode_.settings.mode == BUSHD_EMISSION_PHASES;
   ASSERT_NO_FATAL_FAILURE(expect_both_answer(BUSHD_OK));
-  const bool common_dir = mode_.settings.mode == BUSHD_EMISSION_COMMON_DIR;
+  const bool common_dir = bushd_emission_has_common_dir(mode_.settings.mode);
   bushd_set_outputs levels{.step_low = 0xFFFF,
                            .direction_low = common_dir ? std::uint16_t{0xFFFF} : std::uint16_t{0},
                            .enabled = BUSHD_ENABLED_LOW};

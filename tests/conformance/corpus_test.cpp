@@ -281,7 +281,7 @@ class ImageReplay final : public fuzz::Programmed {
     adopt_ = adopt_ || !counted;
     emission_ = mode;
     phases_ = phases_ || mode == BUSHD_EMISSION_PHASES;
-    counter_.common_dir = mode == BUSHD_EMISSION_COMMON_DIR;
+    counter_.common_dir = bushd_emission_has_common_dir(mode);
   }
 
   void check_counts(const bushd_report& report) {

@@ -49,15 +49,18 @@ class EmissionModes : public testing::TestWithParam<Mode> {};
 INSTANTIATE_TEST_SUITE_P(
     All, EmissionModes,
     testing::Values(Mode{"even", "pulse_us = 4\ndir_setup_us = 20\n", 4},
-                    Mode{"burst", "emission = \"burst\"\nstep_us = 320\n", 4},
-                    Mode{"common", "emission = \"common-dir\"\nstep_us = 320\n", 2},
-                    Mode{"staggered", "emission = \"staggered\"\nstep_us = 320\nsettle_us = 100\n",
+                    Mode{"burst", "steps = \"burst\"\nstep_us = 320\n", 4},
+                    Mode{"common", "direction = \"common\"\nsteps = \"burst\"\nstep_us = 320\n", 2},
+                    Mode{"staggered", "steps = \"staggered\"\nstep_us = 320\nsettle_us = 100\n", 1},
+                    Mode{"both",
+                         "direction = \"common\"\nsteps = \"staggered\"\nstep_us = 320\n"
+                         "settle_us = 100\n",
                          1}),
     [](const auto& p) { return std::string(p.param.name); });
 
 TEST_P(EmissionModes, MovesReachTheirTargetsAndNoStepIsLost) {
   for (const char* manner : {"coarse", "fine", "fine_table"}) {
-    Drivers drivers(std::string_view(GetParam().name) == "common");
+    Drivers drivers(std::string_view(GetParam().keys).find("common") != std::string_view::npos);
     Lab lab(with_keys(manner, GetParam().keys), {}, &drivers);
     lab.connect();
     const std::map<std::string, std::int64_t> moves = {
@@ -88,9 +91,18 @@ TEST_P(EmissionModes, MovesReachTheirTargetsAndNoStepIsLost) {
   }
 }
 
-TEST(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
-  Lab lab(with_keys("fine", "emission = \"staggered\"\nstep_us = 320\nsettle_us = \"measured\"\n"));
+class EmissionStaggered : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Direction, EmissionStaggered, testing::Values("own", "common"),
+                         [](const auto& p) { return std::string(p.param); });
+
+TEST_P(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
+  const std::string direction = "direction = \"" + std::string(GetParam()) + "\"\n";
+  Drivers drivers(std::string_view(GetParam()) == "common");
+  Lab lab(with_keys("fine", direction + "steps = \"staggered\"\nstep_us = 320\n"
+                                        "settle_us = \"measured\"\n"),
+          {}, &drivers);
   lab.connect();
+  EXPECT_EQ(drivers.position[0], 0) << "to and fro, as drivers see it";
   EXPECT_NEAR(lab.bus(0).mcu(0).core().emission.of.settle.of.step.back_ns, 518'000, 60'000);
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
   EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 2u) << "a step and its way back";
@@ -99,8 +111,9 @@ TEST(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
   EXPECT_EQ(lab.shaft_steps("m01"), 300);
 }
 
-TEST(EmissionStaggered, NothingMovesToBeMeasuredUnlessThatIsAskedFor) {
-  Lab lab(with_keys("fine", "emission = \"staggered\"\nstep_us = 320\n"));
+TEST_P(EmissionStaggered, NothingMovesToBeMeasuredUnlessThatIsAskedFor) {
+  const std::string direction = "direction = \"" + std::string(GetParam()) + "\"\n";
+  Lab lab(with_keys("fine", direction + "steps = \"staggered\"\nstep_us = 320\n"));
   lab.connect();
   lab.run_for(0.5);
   for (int m = 0; m < 4; ++m) EXPECT_EQ(lab.bus(0).mcu(0).shaft(m).travel_steps, 0u) << m;
@@ -138,7 +151,7 @@ TEST(EmissionPhases, MovesTurnTheWindings) {
   };
   for (const char* manner : {"coarse", "fine", "fine_table"}) {
     Windings windings;
-    Lab lab(with_keys(manner, "emission = \"phases\"\nphase_sequence = \"half\"\n"), {}, &windings);
+    Lab lab(with_keys(manner, "steps = \"phases\"\nphase_sequence = \"half\"\n"), {}, &windings);
     lab.connect();
     for (const std::int64_t steps : {500, -37, -600}) {
       const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m04"}, {steps, -steps}));
@@ -158,7 +171,7 @@ TEST(EmissionSettings, WhatTheMcuCannotKeepIsNamedWithKeyAndLine) {
 }
 
 TEST(EmissionSettings, ADaemonWithOtherSettingsChangesThem) {
-  Lab lab(with_keys("coarse", "emission = \"burst\"\nstep_us = 320\n"));
+  Lab lab(with_keys("coarse", "steps = \"burst\"\nstep_us = 320\n"));
   lab.connect();
   EXPECT_EQ(lab.bus(0).mcu(0).core().emission.settings.mode, BUSHD_EMISSION_BURST);
   lab.restart_daemon();

@@ -201,24 +201,34 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Manner{"even", "", "{\"emission\": \"burst\", \"step_us\": 320}"},
         Manner{"coarse", "", nullptr, "coarse"}, Manner{"table", "", nullptr, "fine_table"},
-        Manner{"burst", "emission = \"burst\"\nstep_us = 320\n", "{\"step_us\": 340}"},
-        Manner{"common", "emission = \"common-dir\"\nstep_us = 320\n", "{\"emission\": \"burst\"}"},
-        Manner{"staggered", "emission = \"staggered\"\nstep_us = 320\nsettle_us = 60\n",
+        Manner{"burst", "steps = \"burst\"\nstep_us = 320\n", "{\"step_us\": 340}"},
+        Manner{"common", "direction = \"common\"\nsteps = \"burst\"\nstep_us = 320\n",
+               "{\"emission\": \"burst\"}"},
+        Manner{"staggered", "steps = \"staggered\"\nstep_us = 320\nsettle_us = 60\n",
                "{\"settle_us\": 80}"},
-        Manner{"spread", "emission = \"staggered\"\nstep_us = 320\n", "{\"settle_us\": 20}"},
-        Manner{"measured", "emission = \"staggered\"\nstep_us = 320\nsettle_us = \"measured\"\n",
+        Manner{"spread", "steps = \"staggered\"\nstep_us = 320\n", "{\"settle_us\": 20}"},
+        Manner{"measured", "steps = \"staggered\"\nstep_us = 320\nsettle_us = \"measured\"\n",
+               "{\"step_us\": 240}"},
+        Manner{"common_staggered",
+               "direction = \"common\"\nsteps = \"staggered\"\nstep_us = 320\nsettle_us = 60\n",
+               "{\"settle_us\": 100}"},
+        Manner{"common_spread", "direction = \"common\"\nsteps = \"staggered\"\nstep_us = 320\n",
+               "{\"emission\": \"staggered\"}"},
+        Manner{"common_measured",
+               "direction = \"common\"\nsteps = \"staggered\"\nstep_us = 320\n"
+               "settle_us = \"measured\"\n",
                "{\"step_us\": 240}"},
         Manner{"inverted",
                "enable_active = \"low\"\nstep_active = \"low\"\ndirection_active = \"low\"\n"},
         Manner{"common_inverted",
-               "emission = \"common-dir\"\nstep_us = 320\nenable_active = \"low\"\n"
+               "direction = \"common\"\nsteps = \"burst\"\nstep_us = 320\nenable_active = \"low\"\n"
                "step_active = \"low\"\ndirection_active = \"low\"\n",
                "{\"emission\": \"burst\"}"},
         Manner{"measured_inverted",
-               "emission = \"staggered\"\nstep_us = 320\nsettle_us = \"measured\"\n"
+               "steps = \"staggered\"\nstep_us = 320\nsettle_us = \"measured\"\n"
                "step_active = \"low\"\n",
                "{\"step_us\": 240}"},
-        Manner{"phases", "emission = \"phases\"\nphase_sequence = \"half\"\n",
+        Manner{"phases", "steps = \"phases\"\nphase_sequence = \"half\"\n",
                "{\"phase_sequence\": \"full\"}"}),
     [](const auto& manner) { return std::string(manner.param.name); });
 

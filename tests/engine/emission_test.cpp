@@ -9,6 +9,8 @@
 #include <set>
 #include <vector>
 
+#include "engine/properties.h"
+
 namespace bushd::test::emission_test {
 namespace {
 
@@ -97,6 +99,65 @@ TEST(Staggered, MoreMotorsThanSlotsShareThem) {
   EXPECT_EQ(fill(grid, {1, 1, 1, 1, 1}), (Pulses{{0}, {0}, {0}, {1}, {1}}));
 }
 
+// Pairs of 128 us: dt_n = 0.512 ms is less than dt_p, four of them.
+TEST(CommonStaggered, LeftMoversFollowEachOtherThenRightMovers) {
+  const auto grid = fit(periodic(BUSHD_EMISSION_COMMON_STAGGERED, 2048, 518));
+  EXPECT_EQ(fill(grid, {1, -1, 2, -1}), (Pulses{{17}, {0}, {25, 33}, {8}}));
+}
+
+TEST(CommonStaggered, FewerMotorsAreTheSettlingTimeApart) {
+  const auto grid = fit(periodic(BUSHD_EMISSION_COMMON_STAGGERED, 2048, 518));
+  // 0.64 ms, the next pair.
+  EXPECT_EQ(fill(grid, {-1, 0, -1}), (Pulses{{0}, {}, {10}}));
+  EXPECT_EQ(fill(grid, {1, 0, -1}), (Pulses{{11}, {}, {0}})) << "and time for DIR";
+}
+
+TEST(CommonStaggered, UnknownSettlingTimeSpreadsOverTheWholeStep) {
+  const auto grid = fit(periodic(BUSHD_EMISSION_COMMON_STAGGERED));
+  EXPECT_EQ(fill(grid, {1, 1, -1}), (Pulses{{11}, {21}, {0}}));
+}
+
+// By pulses alone: DIR is at the level of each motor, and turns once in a T_step.
+TEST(CommonStaggered, NoMotorGoesLeftAfterOneThatGoesRight) {
+  holds("in each T_step all left movers pulse in even slots, then all right movers in odd ones",
+        [] {
+          const auto step_us = between<std::uint16_t>(100, 8000);
+          const auto grid = fit(
+              periodic(BUSHD_EMISSION_COMMON_STAGGERED, step_us, between<std::uint16_t>(0, 2000)));
+          std::vector<std::int16_t> steps(between<std::size_t>(1, 16));
+          for (auto& count : steps) {
+            count = static_cast<std::int16_t>(between<int>(-grid.max_steps, grid.max_steps));
+          }
+          const Pulses pulses = fill(grid, steps);
+          std::map<int, int> last_left;
+          std::map<int, int> first_right;
+          for (std::size_t m = 0; m < steps.size(); ++m) {
+            RC_ASSERT(pulses[m].size() == static_cast<std::size_t>(std::abs(steps[m])));
+            for (std::size_t k = 0; k < pulses[m].size(); ++k) {
+              const int at = pulses[m][k];
+              const int period = static_cast<int>(k);
+              RC_ASSERT(at / grid.period_slots == period);
+              RC_ASSERT(at % 2 == (steps[m] > 0 ? 1 : 0));
+              if (steps[m] < 0) last_left[period] = std::max(last_left[period], at);
+              if (steps[m] > 0) {
+                const auto [found, is_new] = first_right.try_emplace(period, at);
+                found->second = std::min(found->second, at);
+              }
+            }
+          }
+          for (const auto& [period, at] : last_left) {
+            const auto right = first_right.find(period);
+            RC_ASSERT(right == first_right.end() || at < right->second);
+          }
+        });
+}
+
+TEST(CommonStaggered, MoreMotorsThanPairsShareThem) {
+  const auto grid = fit(periodic(BUSHD_EMISSION_COMMON_STAGGERED, 190));  // two pairs
+  EXPECT_EQ(grid.period_slots, 4);
+  EXPECT_EQ(fill(grid, {1, -1, 1, -1, 1}), (Pulses{{1}, {0}, {3}, {0}, {3}}));
+}
+
 // By the definition, period by period.
 Pulses by_definition(const bushd_emission_grid& grid, const std::vector<std::int16_t>& steps) {
   Pulses pulses(steps.size());
@@ -109,6 +170,20 @@ Pulses by_definition(const bushd_emission_grid& grid, const std::vector<std::int
     for (std::size_t i = 0; i < due.size(); ++i) {
       int at = begin;
       if (grid.mode == BUSHD_EMISSION_COMMON_DIR && steps[due[i]] > 0) ++at;
+      if (grid.mode == BUSHD_EMISSION_COMMON_STAGGERED) {
+        // The place in turn: those to the left before all others.
+        int index = 0;
+        const bool right = steps[due[i]] > 0;
+        for (const std::size_t other : due) {
+          const bool other_right = steps[other] > 0;
+          index += (right && !other_right) || (right == other_right && other < due[i]) ? 1 : 0;
+        }
+        const int n = static_cast<int>(due.size());
+        const int apart = grid.settle_slots + grid.settle_slots % 2;
+        at +=
+            apart * n < grid.period_slots ? index * apart : index * (grid.period_slots / 2) / n * 2;
+        if (right) ++at;
+      }
       if (grid.mode == BUSHD_EMISSION_STAGGERED) {
         const int n = static_cast<int>(due.size());
         const int index = static_cast<int>(i);
@@ -124,9 +199,12 @@ Pulses by_definition(const bushd_emission_grid& grid, const std::vector<std::int
 TEST(Emission, EveryStepHasItsPulseWhereTheDefinitionPutsIt) {
   std::mt19937 random(4);
   const auto up_to = [&](int most) { return static_cast<int>(random() % (most + 1u)); };
-  for (int i = 0; i < 3000; ++i) {
-    bushd_emission settings = periodic(static_cast<bushd_emission_mode>(1 + i % 3));
-    settings.step_us = static_cast<std::uint16_t>(1 + up_to(i % 2 ? 16000 : 300));
+  for (int i = 0; i < 4000; ++i) {
+    constexpr bushd_emission_mode kModes[] = {BUSHD_EMISSION_BURST, BUSHD_EMISSION_COMMON_DIR,
+                                              BUSHD_EMISSION_STAGGERED,
+                                              BUSHD_EMISSION_COMMON_STAGGERED};
+    bushd_emission settings = periodic(kModes[i % 4]);
+    settings.step_us = static_cast<std::uint16_t>(1 + up_to(i / 4 % 2 ? 16000 : 300));
     settings.settle_us = static_cast<std::uint16_t>(up_to(2000));
     settings.dir_setup_us = static_cast<std::uint16_t>(up_to(30));
     const auto slots = static_cast<std::uint16_t>(128 + up_to(128));
@@ -158,6 +236,9 @@ TEST(Emission, WhatTheSlotsCannotKeepIsRefused) {
   settings.dir_setup_us = 17'000;
   EXPECT_EQ(bushd_emission_fit(&settings, kTickNs, kSlots, &grid), BUSHD_E_DIR_SETUP);
   settings = periodic(BUSHD_EMISSION_COMMON_DIR);
+  settings.dir_setup_us = 32;
+  EXPECT_EQ(bushd_emission_fit(&settings, kTickNs, kSlots, &grid), BUSHD_E_DIR_SETUP);
+  settings = periodic(BUSHD_EMISSION_COMMON_STAGGERED);
   settings.dir_setup_us = 32;
   EXPECT_EQ(bushd_emission_fit(&settings, kTickNs, kSlots, &grid), BUSHD_E_DIR_SETUP);
   settings = periodic(BUSHD_EMISSION_BURST, 16'385);

@@ -144,18 +144,23 @@ Kinds setup_kinds() {
       {"emission",
        {bytes_with(11,
                    [](Bytes* p) {
-                     (*p)[0] = between<uint8_t>(0, 4);
+                     (*p)[0] = between<uint8_t>(0, 5);
                      (*p)[1] = between<uint8_t>(0, 3);
                      (*p)[2] = between<uint8_t>(0, 1);
                      bushd_put_u16(p->data() + 3, between<uint16_t>(1, 65535));
                    }),
         codec(bushd_decode_emission, bushd_encode_emission),
-        {{"mode 5", set8(0, 5)},
+        {{"mode 6", set8(0, 6)},
          {"sequence 4", set8(1, 4)},
          {"hold current 2", set8(2, 2)},
          {"no step period",
           [](Bytes* p) {
             (*p)[0] = BUSHD_EMISSION_BURST;
+            bushd_put_u16(p->data() + 3, 0);
+          }},
+         {"no step period of staggered steps with a common DIR",
+          [](Bytes* p) {
+            (*p)[0] = BUSHD_EMISSION_COMMON_STAGGERED;
             bushd_put_u16(p->data() + 3, 0);
           }}}}},
       {"currents",

@@ -20,9 +20,9 @@ bushd_emission of_mode(bushd_emission_mode mode) {
   return settings;
 }
 
-constexpr bushd_emission_mode kModes[] = {BUSHD_EMISSION_EVEN, BUSHD_EMISSION_BURST,
-                                          BUSHD_EMISSION_COMMON_DIR, BUSHD_EMISSION_STAGGERED,
-                                          BUSHD_EMISSION_PHASES};
+constexpr bushd_emission_mode kModes[] = {
+    BUSHD_EMISSION_EVEN,      BUSHD_EMISSION_BURST,  BUSHD_EMISSION_COMMON_DIR,
+    BUSHD_EMISSION_STAGGERED, BUSHD_EMISSION_PHASES, BUSHD_EMISSION_COMMON_STAGGERED};
 
 // READY, with this emission.
 void make_ready(Rig& rig, const bushd_emission& settings, bushd_format format) {
@@ -129,6 +129,14 @@ TEST(Emission, ModeThatThePortDoesNotSupportIsRefused) {
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_PHASES, 0);
   rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
   EXPECT_EQ(rig.emission(of_mode(BUSHD_EMISSION_PHASES)), BUSHD_E_FORMAT);
+}
+
+TEST(Emission, StaggeredStepsWithACommonDirNeedBothCapabilities) {
+  for (const std::uint32_t denied : {BUSHD_CAN_COMMON_DIR, BUSHD_CAN_STAGGERED}) {
+    Rig rig({.disabled_capabilities = denied});
+    rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+    EXPECT_EQ(rig.emission(of_mode(BUSHD_EMISSION_COMMON_STAGGERED)), BUSHD_E_FORMAT) << denied;
+  }
 }
 
 TEST(Emission, PulsesAreRefusedThatThePortDoesNotMake) {

@@ -214,6 +214,10 @@ SEEDS = {
     "burst": ready(0, emission(1)) + MOVE[0] + passes(12),
     "common-dir": ready(0, emission(2)) + MOVE[0] + passes(12),
     "staggered": ready(0, emission(3, settle_us=60)) + MOVE[0] + passes(12),
+    "common-dir-staggered": ready(0, emission(5, settle_us=60)) + MOVE[0] + passes(12),
+    "common-dir-staggered-measured": ready(0, emission(5)) + b"".join(
+        sample(4096 * at, 500 + at % 2) + passes(1) for at in range(12)) + sample(40000, 900)
+                          + sample(60000, 501) + passes(15) + sample(100, 500) + passes(15) + MOVE[0] + passes(9),
     "staggered-measured": ready(0, emission(3)) + b"".join(
         sample(4096 * at, 500 + at % 2) + passes(1) for at in range(12)) + sample(40000, 900)
                           + sample(60000, 501) + passes(15) + sample(100, 500) + passes(15) + MOVE[0] + passes(9),

@@ -129,7 +129,7 @@ void decode_for_mcu(Bytes payload) {
   }
   bushd_emission emission;
   if (decoded(payload, &emission, bushd_decode_emission, bushd_encode_emission)) {
-    BUSHD_REQUIRE(emission.mode <= BUSHD_EMISSION_PHASES &&
+    BUSHD_REQUIRE(emission.mode <= BUSHD_EMISSION_COMMON_STAGGERED &&
                   emission.sequence <= BUSHD_PHASES_THREE);
   }
   bushd_sync sync;

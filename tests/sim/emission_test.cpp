@@ -112,6 +112,67 @@ TEST(EmissionOnPins, StaggeredPulsesFollowEachOther) {
   EXPECT_EQ(steps.at(3)[1].rise_ns - lab.start_ns, kStepNs);
 }
 
+// Figures 16 and 17 of the document: one DIR and a current sensor. Those to the left come first, in
+// pairs of slots; DIR is low for them and high for those to the right.
+TEST(EmissionOnPins, StaggeredPulsesWithACommonDirGoLeftThenRight) {
+  EmissionBus lab(kTickNs);
+  bushd_emission settings = of_mode(BUSHD_EMISSION_COMMON_STAGGERED);
+  settings.settle_us = 518;
+  settings.dir_setup_us = 30;
+  lab.use(settings, 4);
+  lab.run({{1, -1, 2, -1}, {0, 1, 0, -1}});
+  const auto steps = steps_of(lab.recorder, true);
+  using Times = std::vector<TimeNs>;
+  constexpr TimeNs kSlot = kTickNs / 256;
+  constexpr TimeNs kApart = 512'000;
+  EXPECT_EQ(rises(steps.at(1), lab.start_ns), (Times{0, kTickNs + 640'000 + kSlot}));
+  EXPECT_EQ(rises(steps.at(3), lab.start_ns), (Times{kApart, kTickNs}));
+  EXPECT_EQ(rises(steps.at(0), lab.start_ns), (Times{2 * kApart + kSlot}));
+  EXPECT_EQ(rises(steps.at(2), lab.start_ns), (Times{3 * kApart + kSlot, kStepNs + kSlot}));
+  EXPECT_EQ(sum(steps.at(0)), 1);
+  EXPECT_EQ(sum(steps.at(1)), 0);
+  EXPECT_EQ(sum(steps.at(2)), 2);
+  EXPECT_EQ(sum(steps.at(3)), -2);
+  for (const auto& [output, of_motor] : steps) {
+    for (const Step& step : of_motor) EXPECT_GE(step.dir_since_ns, 30'000);
+  }
+  EXPECT_TRUE(lab.recorder.times(0, Signal::kDir, 0, true).empty()) << "one line is enough";
+}
+
+// Whatever the counts: in each T_step nobody goes left after one that goes right, nobody pulses
+// together with another, and the current has settled where there is time for it.
+TEST(EmissionOnPins, StaggeredPulsesWithACommonDirNeverTurnBackWithinAStep) {
+  std::mt19937 random(11);
+  EmissionBus lab(kTickNs);
+  bushd_emission settings = of_mode(BUSHD_EMISSION_COMMON_STAGGERED);
+  settings.settle_us = 200;
+  lab.use(settings, 6);
+  for (int part = 0; part < 20; ++part) {
+    std::vector<int> row(6);
+    for (int& count : row) count = static_cast<int>(random() % 17) - 8;
+    lab.recorder.edges.clear();
+    lab.run({row});
+    std::map<TimeNs, bool> all;  // which way, by when
+    std::size_t pulses = 0;
+    for (const auto& [output, of_motor] : steps_of(lab.recorder, true)) {
+      for (const Step& step : of_motor) {
+        all[step.rise_ns - lab.start_ns] = step.right;
+        ++pulses;
+        EXPECT_EQ(step.right, row[static_cast<std::size_t>(output)] > 0);
+      }
+    }
+    EXPECT_EQ(all.size(), pulses) << "one at a time";
+    for (auto it = all.begin(); it != all.end() && std::next(it) != all.end(); ++it) {
+      const auto next = std::next(it);
+      if (it->first / kStepNs != next->first / kStepNs) continue;
+      EXPECT_FALSE(it->second && !next->second) << "back to the left at " << next->first;
+      // Six times 0.256 ms, two pairs, is less than T_step.
+      EXPECT_EQ(next->first - it->first - (next->second != it->second ? kTickNs / 256 : 0),
+                256'000);
+    }
+  }
+}
+
 // The least time between two steps of a motor with delays of 0.2 ms, to the left and then back.
 TimeNs closest_steps(std::uint16_t dir_setup_us) {
   EmissionBus lab(2'000'000, {}, BUSHD_FORMAT_FINE);
@@ -143,13 +204,14 @@ TEST(EmissionOnPins, StepsKeepTheirDistanceWhereDirIsEarlyEnough) {
 TEST(EmissionOnPins, PulseWidthAndDirSetupAreKeptInEveryModeAndNoStepIsLost) {
   std::mt19937 random(1);
   for (const bushd_format format : {BUSHD_FORMAT_COARSE, BUSHD_FORMAT_FINE}) {
-    for (const bushd_emission_mode mode : {BUSHD_EMISSION_EVEN, BUSHD_EMISSION_BURST,
-                                           BUSHD_EMISSION_COMMON_DIR, BUSHD_EMISSION_STAGGERED}) {
+    for (const bushd_emission_mode mode :
+         {BUSHD_EMISSION_EVEN, BUSHD_EMISSION_BURST, BUSHD_EMISSION_COMMON_DIR,
+          BUSHD_EMISSION_STAGGERED, BUSHD_EMISSION_COMMON_STAGGERED}) {
       for (const std::uint16_t slots : {std::uint16_t{128}, std::uint16_t{201}}) {
         EmissionBus lab(2'560'000, {.slots = slots}, format);
         bushd_emission settings = of_mode(mode, 100);
         settings.settle_us = 30;
-        settings.dir_setup_us = mode == BUSHD_EMISSION_COMMON_DIR ? 6 : 50;
+        settings.dir_setup_us = bushd_emission_has_common_dir(mode) ? 6 : 50;
         settings.pulse_us = 6;
         lab.use(settings, 6);
         const int most = bushd_emission_grid(lab.bus.mcu(0).core().emission.grid).max_steps;
@@ -171,7 +233,7 @@ TEST(EmissionOnPins, PulseWidthAndDirSetupAreKeptInEveryModeAndNoStepIsLost) {
           }
           lab.run(rows);
         }
-        const auto steps = steps_of(lab.recorder, mode == BUSHD_EMISSION_COMMON_DIR);
+        const auto steps = steps_of(lab.recorder, bushd_emission_has_common_dir(mode));
         const bushd_report report = lab.master.poll(1);
         for (int m = 0; m < 6; ++m) {
           EXPECT_EQ(sum(steps.at(m)), asked[static_cast<std::size_t>(m)]);

@@ -139,6 +139,8 @@ FRAMES = [
                          "dir_setup_us": 5, "pulse_us": 3}),
     (1, 17, "emission", {"mode": 4, "sequence": 2, "hold_current": 1, "step_us": 0, "settle_us": 65535,
                          "dir_setup_us": 0, "pulse_us": 0}),
+    (1, 18, "emission", {"mode": 5, "sequence": 0, "hold_current": 0, "step_us": 2048, "settle_us": 518,
+                         "dir_setup_us": 0, "pulse_us": 0}),
     (0, 17, "set_address", {"unique_id": ID, "address": 9}),
     (9, 18, "get_tables", {}),
     (1, 19, "set_inputs", {"limit_positive": 0x00FF, "limit_negative": 0x0180, "limit_immediate": 0x8001,

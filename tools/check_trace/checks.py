@@ -6,6 +6,7 @@ import json
 import math
 
 from check_trace.clock import NO_CLOCK
+from check_trace.emission import STAGGERED
 from check_trace.problems import InputError
 
 MAX_SKEW_NS = 20_000  # between the MCUs of a bus
@@ -82,7 +83,7 @@ class MotorCheck:
     def _without_measuring(self, edges):
         """A step and the way back, by which an MCU measures its supply current before it moves anything."""
         moves = self._motor.moves
-        measures = any(move.emission == "staggered" and move.settle_ns == 0 for move in moves)
+        measures = any(move.emission in STAGGERED and move.settle_ns == 0 for move in moves)
         if not measures or len(edges) < 2 or edges[0].direction == edges[1].direction:
             return edges
         first_ns = moves[0].start_tick * moves[0].tick_ns

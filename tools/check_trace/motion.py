@@ -22,8 +22,8 @@ crossing half a step earlier takes back half: r = 1/2. The line's slope is d / T
     |edge - table|  <=  T / d * ((vmax - vmin) T / 4 + r) + T / S,  and never more than T
 
 In a move's last tick vmin is 0, as the motor comes to rest somewhere in it: it is reported apart, and so is
-the first. Of a table run an edge lies in its slot: |edge - table| <= T / S. With burst, common-dir
-and staggered it lies in its tick: T.
+the first. Of a table run an edge lies in its slot: |edge - table| <= T / S. With modes that
+have periods (emission.py) it lies in its tick: T.
 """
 
 import bisect

@@ -237,13 +237,14 @@ TEST(Connect, EmissionThatAnMcuDoesNotKnowIsNotAskedFor) {
   FakeBus bus;
   bus.setup.mcus[0].emission.settings.mode = BUSHD_EMISSION_BURST;
   bus.setup.mcus[0].emission.settings.step_us = 100;
-  bus.setup.mcus[0].emission.mode_at = {.message = {}, .file = "b.toml", .key = "mcu[0].emission"};
+  bus.setup.mcus[0].emission.mode_at = {.message = {}, .file = "b.toml", .key = "mcu[0].steps"};
   bus.master = std::make_unique<link::Rs485Master>(bus.setup, bus.source);
   bus.master->port_opened(bus.now_us);
   bus.run_for(1'000'000);
-  EXPECT_THAT(bus.master->view(McuIndex{0}).detail,
-              HasSubstr("b.toml: mcu[0].emission: is \"burst\", which this MCU cannot do; allowed: "
-                        "\"even\""));
+  EXPECT_THAT(
+      bus.master->view(McuIndex{0}).detail,
+      HasSubstr("b.toml: mcu[0].steps: asks for steps = \"burst\", which this MCU cannot do; "
+                "allowed: steps = \"even\""));
   EXPECT_TRUE(bus.heard_of(BUSHD_MSG_EMISSION).empty());
 }
 
