@@ -35,6 +35,14 @@ function(bushd_in_batches)
   endif()
 endfunction()
 
+# bushd_checked_by_calls(daemon_test): the same checks of AddressSanitizer, with the same reports, but by calls instead of in place. The
+# compiler takes a seventh less, and tests of the daemon's core, which is checked in place, take a twentieth longer.
+function(bushd_checked_by_calls target)
+  if(BUSHD_SANITIZE MATCHES address AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    target_compile_options(${target} PRIVATE --param=asan-instrumentation-with-call-threshold=0)
+  endif()
+endfunction()
+
 # bushd_built_quickly(bushctl ...): command lines and screens, whose speed nobody could tell, take half the compiler's time with
 # -Og; with sanitizers they are not optimised at all. Packages are built with the flags of the distribution.
 function(bushd_built_quickly)
