@@ -66,8 +66,10 @@ void IdleDrivers::reports(std::int64_t now_us, Mcu& mcu) {
   installation_.changed = true;
 }
 
+// One that is BUSY with drivers that are enabled measures its supply current by a step.
 bool IdleDrivers::at_rest(const Mcu& mcu) const {
   if (!enabled(mcu) || mcu.asleep || mcu.busy() || mcu.report().faults != 0) return false;
+  if (mcu.report().state == BUSHD_STATE_BUSY) return false;
   return std::ranges::all_of(mcu.motors(), [this](MotorId motor) {
     return installation_[motor].is<motion::Resting>() && !about_to_move_(motor);
   });

@@ -112,11 +112,12 @@ struct Mcu {
   std::uint8_t debounce_ticks = 1;
   std::uint16_t overcurrent = 0;  // reading of the current sensor; 0: no threshold
   EnableAfterReset enable_after_reset = EnableAfterReset::kReady;
-  std::optional<double> idle_disable_s = {};  // drivers are disabled after so long a rest
-  std::uint32_t enable_settle_ms = 0;         // from enabling them to the first step
-  std::uint32_t keypad_ms = 500;  // that a key of its keypad counts; 0: until the next one
-  bool stand_in = false;          // for a bus that has no MCUs
-  KeyPlaces places{};             // of `address`
+  std::optional<double> idle_disable_s =
+      {};                              // drivers are disabled after so long a rest; 0: at once
+  std::uint32_t enable_settle_ms = 0;  // from enabling them to the first step
+  std::uint32_t keypad_ms = 500;       // that a key of its keypad counts; 0: until the next one
+  bool stand_in = false;               // for a bus that has no MCUs
+  KeyPlaces places{};                  // of `address`
 };
 
 struct Group {

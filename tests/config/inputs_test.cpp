@@ -66,14 +66,9 @@ TEST(ConfigInputs, DriversAreDisabledAtRest) {
   EXPECT_EQ(config->mcus[1].idle_disable_s, 2.5);
   EXPECT_EQ(config->mcus[1].enable_settle_ms, 300u);
   EXPECT_TRUE(config->motors[1].never_disable);
-  // 0 is none, which local inputs and motors that are always held have nothing against.
-  for (const char* key : {"never_disable = true\n", "local = true\n"}) {
-    const auto never = ConfigFile(replaced(with_mcu("idle_disable_s = 0\n"), "output = 15\n",
-                                           "output = 15\n" + std::string(key)))
-                           .load();
-    ASSERT_TRUE(never.has_value()) << never.error().text();
-    EXPECT_FALSE(never->mcus[1].idle_disable_s);
-  }
+  const auto at_once = ConfigFile(with_mcu("idle_disable_s = 0\n")).load();
+  ASSERT_TRUE(at_once.has_value()) << at_once.error().text();
+  EXPECT_EQ(at_once->mcus[1].idle_disable_s, 0);
 }
 
 TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
@@ -116,10 +111,12 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_mcu("enable_after_reset = true\n"), 22,
        "mcu[1].enable_after_reset: is true; allowed: \"ready\", \"at_once\" or \"no\""},
       {with_mcu("idle_disable_s = -1\n"), 22,
-       "mcu[1].idle_disable_s: is -1; allowed: 0: never, or up to 1000000 s"},
+       "mcu[1].idle_disable_s: is -1; allowed: a number 0..1000000 s; 0: at once"},
       {with_mcu("enable_settle_ms = -1\n"), 22, "mcu[1].enable_settle_ms: is -1; allowed: a whole"},
       {with_motor("never_disable = 1\n"), 37,
        "motor[1].never_disable: is 1; allowed: true or false"},
+      {replaced(with_mcu("idle_disable_s = 0\n"), "output = 15\n", "output = 15\nlocal = true\n"),
+       38, "motor[1].local: is true, but MCU \"roof:255\" has idle_disable_s"},
       {replaced(with_mcu("idle_disable_s = 1\n"), "output = 15\n", "output = 15\nlocal = true\n"),
        38, "motor[1].local: is true, but MCU \"roof:255\" has idle_disable_s"},
       {with_motor("limit = \"left\"\n"), 37,

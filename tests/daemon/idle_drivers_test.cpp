@@ -91,6 +91,41 @@ TEST_P(IdleDrivers, AreDisabledAfterARestAndEnabledBeforeTheNextStep) {
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
+TEST_P(IdleDrivers, AreDisabledAtOnceAfterTheLastMotionIfAskedFor) {
+  IdleLab lab(GetParam(), with_mcu(hall(1, 2), "idle_disable_s = 0\nenable_settle_ms = 250\n"));
+  lab.fall_asleep();
+  const auto first = lab.send(Ask::kMoveBy, {"m01"}, {400});
+  const auto second = lab.send(Ask::kMoveBy, {"m02"}, {-40});
+  EXPECT_EQ(lab.wait(second).result, "reached");
+  EXPECT_TRUE(lab.pins.enabled) << "the other one moves";
+  const Answer answer = lab.wait(first);
+  EXPECT_EQ(answer.result, "reached") << answer.reason;
+  lab.fall_asleep();
+  EXPECT_LE(lab.pins.off_ns - lab.pins.last_step_ns, kAnswered);
+  EXPECT_EQ(lab.shaft_steps("m01"), 400);
+  EXPECT_EQ(lab.shaft_steps("m02"), -40);
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  // Again and again, each time from drivers that are off.
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(lab.move("m02", 5).result, "reached");
+    EXPECT_GE(lab.pins.first_step_ns - lab.pins.on_ns, 250 * kMs);
+    lab.fall_asleep();
+  }
+  EXPECT_THAT(lab.errors(), IsEmpty());
+}
+
+TEST(IdleDriversAtOnce, LetTheMcuMeasureItsSupplyCurrentFirst) {
+  Lab lab(with_mcu(hall(1, 2),
+                   "idle_disable_s = 0\nsteps = \"staggered\"\nstep_us = 320\n"
+                   "settle_us = \"measured\"\n"));
+  lab.connect();
+  lab.run_for(1);
+  EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 2u) << "a step and its way back";
+  EXPECT_FALSE(lab.motor("m01").enabled);
+  const Answer answer = lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {30}));
+  EXPECT_EQ(answer.result, "reached") << answer.reason;
+}
+
 TEST_P(IdleDrivers, StayEnabledWhileAMotorMovesOrWaits) {
   IdleLab lab(GetParam());
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {4000});
