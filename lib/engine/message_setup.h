@@ -86,7 +86,7 @@ typedef enum bushd_emission_mode {
   BUSHD_EMISSION_COMMON_DIR = 2,  // one DIR for all: each T_step those to the left, then the others
   BUSHD_EMISSION_STAGGERED = 3,   // one after the other, each T_step
   BUSHD_EMISSION_PHASES = 4,      // four levels a motor instead of STEP and DIR
-  // One DIR for all, each T_step those to the left one after the other, then the others likewise.
+  // One DIR for all: each T_step those to the left one after the other, then those to the right.
   // Needs the capabilities of both modes.
   BUSHD_EMISSION_COMMON_STAGGERED = 5
 } bushd_emission_mode;

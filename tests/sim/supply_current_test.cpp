@@ -81,6 +81,18 @@ TEST(SupplyCurrent, StaggeredStepsHaveTheRatioThatTheModelWasChosenFor) {
   EXPECT_NEAR(peak_deviation(of_mode(BUSHD_EMISSION_STAGGERED), {}), apart, 0.01);
 }
 
+// Figures 16 and 17: three motors go right and one goes left, by one DIR.
+TEST(SupplyCurrent, StaggeredStepsMoveItAsLittleWithACommonDir) {
+  const double together = peak_deviation(of_mode(BUSHD_EMISSION_COMMON_DIR), {});
+  bushd_emission staggered = of_mode(BUSHD_EMISSION_COMMON_STAGGERED);
+  staggered.settle_us = 518;
+  const double apart = peak_deviation(staggered, {});
+  const double burst = peak_deviation(of_mode(BUSHD_EMISSION_BURST), {});
+  EXPECT_GE(burst / apart, 2.5) << burst << " A and " << apart << " A";
+  EXPECT_GT(together, 1.5 * apart) << together << " A and " << apart << " A";
+  EXPECT_NEAR(peak_deviation(of_mode(BUSHD_EMISSION_COMMON_STAGGERED), {}), apart, 0.01);
+}
+
 TEST(SupplyCurrent, FirmwareMeasuresItsSettlingTimeBeforeWork) {
   for (const TimeNs settle_ns : {200'000, 518'000, 1'500'000}) {
     SupplyRules rules;
