@@ -15,7 +15,8 @@ constexpr double kPollEntryBytes = BUSHD_POLL_ENTRY;
 // The window of one whose motors all move, whether its report fills it or not.
 double report_bytes(std::uint8_t motors) {
   const auto all = static_cast<std::uint16_t>((1u << motors) - 1u);
-  const unsigned sections = motors != 0 ? BUSHD_NEWS_IN_MOTION : BUSHD_NEWS_AT_REST;
+  const unsigned sections =
+      motors != 0 ? BUSHD_NEWS_IN_MOTION & ~BUSHD_TELLS_AUTONOMOUS : BUSHD_NEWS_AT_REST;
   return static_cast<double>(bushd_report_size(static_cast<std::uint8_t>(sections), all));
 }
 

@@ -22,4 +22,9 @@ Tick BusClock::tick_at(std::int64_t now_us) const {
   return bus_ns >= 0 ? bus_ns / tick_ns_ : -((tick_ns_ - 1 - bus_ns) / tick_ns_);
 }
 
+std::int64_t BusClock::begin_us(Tick tick) const {
+  const std::int64_t host_ns = tick * tick_ns_ + best_ns_;
+  return host_ns >= 0 ? (host_ns + 999) / 1000 : -(-host_ns / 1000);
+}
+
 }  // namespace bushd::link

@@ -28,6 +28,9 @@ class BusClock {
   void sample(Tick tick, std::int64_t ns_in_tick, std::int64_t now_us);
   // The tick that the bus is in; precondition: valid().
   Tick tick_at(std::int64_t now_us) const;
+  // When the bus comes to this tick: the first time of which tick_at tells it. Precondition:
+  // valid().
+  std::int64_t begin_us(Tick tick) const;
   // Rounded up; needs no sample.
   Tick ticks_in(std::int64_t us) const { return (us * 1000 + tick_ns_ - 1) / tick_ns_; }
 

@@ -84,6 +84,7 @@ void Rs485Master::ask_again_for_start(std::int64_t now_us, McuIndex mcu) {
 }
 
 void Rs485Master::ended(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
+  if (type == BUSHD_MSG_POLL) poller_.ended(now_us);
   if (type == BUSHD_MSG_IDENTIFY) connector_.identify_ended(now_us, mcu);
 }
 
@@ -132,16 +133,20 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   events_.push_back(McuReported{index});
 }
 
-// The master's clock lags behind the MCU's, so the MCU has reached the end's tick when the clock
-// has.
+// The master's clock lags behind the MCU's, or leads by what crystals drift at most. A motor that
+// rests by its plan may be on a line that goes on elsewhere: its MCU is asked again at the ends of
+// others.
 void Rs485Master::ask_at_end(std::int64_t now_us, McuIndex mcu) {
-  const std::optional<Tick> end = streams_.next_end(mcu);
+  constexpr std::int64_t kMostDriftUs = 200;
+  std::optional<Tick> end = streams_.next_end(mcu);
+  if (!end && streams_.active(mcu) != 0) {
+    for (const McuIndex i : mcus_.indices()) end = std::max(end, streams_.next_end(i));
+  }
   poller_.expect_motion(mcu, streams_.active(mcu));
-  const Tick now = clock().tick_at(now_us);
   // What lies farther ahead the next report asks for.
-  const bool soon = end && *end <= now + clock().ticks_in(2 * fieldbus::kPollPeriodUs);
-  poller_.expect_news(
-      mcu, soon ? now_us + std::max<Tick>(*end - now, 0) * setup_.tick_ns / 1000 : INT64_MAX);
+  const Tick soon = clock().tick_at(now_us) + clock().ticks_in(2 * fieldbus::kPollPeriodUs);
+  const bool is_soon = end && *end <= soon;
+  poller_.expect_news(mcu, is_soon ? clock().begin_us(*end) + kMostDriftUs : INT64_MAX);
 }
 
 void Rs485Master::found(std::int64_t now_us, McuIndex) {

@@ -41,6 +41,7 @@ struct McuRecord {
   // Number of the last report; 0: `view.report` is nothing that a later one can go on from.
   std::uint8_t known = 0;
   bool poll_wanted = false;         // its report is needed sooner than its turn would come
+  bool sync_sent = false;           // of the last SYNC it has not told yet
   bool answered = false;            // something that was asked of it, since its last report
   std::uint8_t trigger_number = 0;  // the last that it was given
 };

@@ -15,12 +15,13 @@ using fieldbus::kWindowGuardUs;
 
 // Nothing else is sent meanwhile; queues that have run low must not wait for longer.
 constexpr std::int64_t kMaxCycleUs = 60'000;
-constexpr std::uint8_t kNewsAtRest = BUSHD_NEWS_AT_REST;
-constexpr std::uint8_t kNewsOfPlans = BUSHD_NEWS_IN_MOTION & ~BUSHD_TELLS_AUTONOMOUS;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
-constexpr int kMaxMissedReplies = 10;    // about half a second
+// A poll of one MCU takes about as long. Who has news by then is waited for: asked apart it would
+// have to wait until that poll is over, and for as long again.
+constexpr std::int64_t kNewsTogetherUs = 3'000;
+constexpr int kMaxMissedReplies = 10;  // about half a second
 // An MCU that was not asked for so long may have given the number to another report.
 constexpr std::int64_t kKnownForUs = 1'000'000;
 
@@ -29,8 +30,8 @@ constexpr std::int64_t kKnownForUs = 1'000'000;
 Poller::Poller(PerMcu<McuRecord>& mcus, Transactions& transactions, const FrameWriter& writer)
     : mcus_(mcus), transactions_(transactions), writer_(writer), polled_(mcus.size()) {}
 
-// Those whose turn comes soon are asked along, and all if one may miss its reply: somebody must
-// answer after it.
+// Those that have news or whose turn comes soon are asked along, and all if one may miss its reply:
+// somebody must answer after it.
 std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   bool doubtful = false;
   for (const McuIndex i : mcus_.indices()) {
@@ -39,8 +40,10 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   std::vector<McuIndex> asked;
   for (const McuIndex i : mcus_.indices()) {
     // One that will have news soon is asked then, not before and then again.
-    const bool waits = polled_[i].news_us < polled_[i].routine_us && polled_[i].news_us > now_us;
-    const bool soon = doubtful || (polled_[i].routine_us <= now_us + kPollPeriodUs / 2 && !waits);
+    const bool has_news = polled_[i].news_us <= now_us;
+    const bool waits = polled_[i].news_us < polled_[i].routine_us && !has_news;
+    const bool soon =
+        doubtful || has_news || (polled_[i].routine_us <= now_us + kPollPeriodUs / 2 && !waits);
     const bool along = mcus_[i].view.phase != McuPhase::kOffline && soon;
     if (mcus_[i].poll_wanted || along) asked.push_back(i);
   }
@@ -59,8 +62,39 @@ void Poller::forget_old(std::int64_t now_us) {
   }
 }
 
-// Payload bytes of its report: for all, where all may be told. Otherwise for what is likely; at
-// rest that is a SYNC, or what fits in its place.
+std::int64_t Poller::news_due_us(McuIndex mcu) const {
+  const std::int64_t news_us = polled_[mcu].news_us;
+  if (news_us == INT64_MAX) return INT64_MAX;
+  std::int64_t last_us = news_us;
+  for (const Polled& other : polled_) {
+    if (other.news_us <= news_us + kNewsTogetherUs) last_us = std::max(last_us, other.news_us);
+  }
+  return std::max(last_us, extra_from_us_);
+}
+
+// A poll that has begun shortly before there is news would keep it waiting: it begins so much
+// sooner that it is over by then.
+std::int64_t Poller::routine_due_us(McuIndex mcu) const {
+  const std::int64_t routine_us = polled_[mcu].routine_us;
+  const bool clear = routine_us >= first_news_us_ || routine_us < first_news_us_ - kMaxCycleUs;
+  if (clear) return routine_us;
+  const std::int64_t latency_us = transactions_.health().latency.recent_us;
+  const std::int64_t cycle_us = expected_cycle_us({}) + latency_us;
+  return std::min(routine_us, first_news_us_ - cycle_us);
+}
+
+std::int64_t Poller::due_us(McuIndex mcu) const {
+  return std::min(routine_due_us(mcu), news_due_us(mcu));
+}
+
+void Poller::expect_news(McuIndex mcu, std::int64_t at_us) {
+  polled_[mcu].news_us = at_us;
+  first_news_us_ = std::ranges::min(polled_, {}, &Polled::news_us).news_us;
+}
+
+// Payload bytes of its report: for all, where all may be told. Otherwise for what is likely: the
+// last SYNC until that is told, then as much as inputs or counters take, and motors that plans
+// move.
 std::uint8_t Poller::room(McuIndex mcu, std::uint16_t to_move) const {
   const McuRecord& record = mcus_[mcu];
   const Polled& polled = polled_[mcu];
@@ -73,8 +107,9 @@ std::uint8_t Poller::room(McuIndex mcu, std::uint16_t to_move) const {
     return static_cast<std::uint8_t>(bushd_report_size(BUSHD_NEWS_IN_MOTION, of_mcu));
   }
   const auto motors = static_cast<std::uint16_t>(polled.motors | report.moving | to_move);
-  return static_cast<std::uint8_t>(
-      bushd_report_size(motors != 0 ? kNewsOfPlans : kNewsAtRest, motors));
+  unsigned sections = record.sync_sent ? BUSHD_TELLS_SYNC : BUSHD_TELLS_INPUTS;
+  if (motors != 0) sections |= BUSHD_TELLS_MOTION;
+  return static_cast<std::uint8_t>(bushd_report_size(static_cast<std::uint8_t>(sections), motors));
 }
 
 std::int64_t Poller::reply_us(std::size_t payload) const {
@@ -134,19 +169,21 @@ bool Poller::send_wanted(std::int64_t now_us) {
   const std::size_t size =
       bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data());
   transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, windows, kWindowGuardUs);
+  extra_sent_us_.reset();
   bool extra = false;
   for (const Transactions::ReplyWindow& window : windows) {
     mcus_[window.mcu].poll_wanted = false;
     Polled& polled = polled_[window.mcu];
     polled.routine_us = now_us + kPollPeriodUs;
     if (polled.news_us > now_us) continue;
-    polled.news_us = INT64_MAX;
+    expect_news(window.mcu, INT64_MAX);
     extra = true;
   }
   if (extra) {
     const std::int64_t took_us = writer_.line_us(size + BUSHD_FRAME_OVERHEAD + 1) +
                                  windows.back().end_us + transactions_.patience_us();
     extra_from_us_ = now_us + kExtraShare * took_us;
+    extra_sent_us_ = now_us;
   }
   return true;
 }
@@ -158,6 +195,13 @@ bool Poller::send_due(std::int64_t now_us) {
     mcus_[i].poll_wanted = due = true;
   }
   return due && send_wanted(now_us);
+}
+
+// Mostly all have answered, so that it took less than was set aside for it.
+void Poller::ended(std::int64_t now_us) {
+  if (!extra_sent_us_) return;
+  const std::int64_t took_us = now_us - *std::exchange(extra_sent_us_, std::nullopt);
+  extra_from_us_ = std::min(extra_from_us_, now_us + (kExtraShare - 1) * took_us);
 }
 
 bool Poller::missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
@@ -185,7 +229,7 @@ void Poller::went_offline(McuIndex mcu) {
   polled_[mcu].has_more = false;
   polled_[mcu].motors = 0;
   mcus_[mcu].known = 0;
-  polled_[mcu].news_us = INT64_MAX;
+  expect_news(mcu, INT64_MAX);
   mcus_[mcu].poll_wanted = mcus_[mcu].answered = false;
 }
 

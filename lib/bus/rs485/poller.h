@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -31,20 +32,19 @@ class Poller {
   std::int64_t longest_cycle_us() const;
   // By one now, if what is likely is told, and these motors are to move.
   std::int64_t expected_cycle_us(std::span<const ToBegin> together) const;
-  // At this time the MCU's report will have something new: it is asked then, unless its turn comes
-  // before. INT64_MAX: nothing is expected. Such extra polls take at most half of the time, so
-  // they may come later; no routine poll does.
-  void expect_news(McuIndex mcu, std::int64_t at_us) { polled_[mcu].news_us = at_us; }
+  // At this time the MCU's report will have something new, and it is asked then. INT64_MAX: nothing
+  // is expected. MCUs that have news at nearly the same time are asked by one poll. Such extra
+  // polls take at most half of the time, so they may come later; no routine poll does.
+  void expect_news(McuIndex mcu, std::int64_t at_us);
   // Until told otherwise these motors of it move, or are to.
   void expect_motion(McuIndex mcu, std::uint16_t motors) { polled_[mcu].motors = motors; }
   // When the MCU's turn comes. Precondition: it is not offline.
-  std::int64_t due_us(McuIndex mcu) const {
-    const Polled& polled = polled_[mcu];
-    return std::min(polled.routine_us, std::max(polled.news_us, extra_from_us_));
-  }
+  std::int64_t due_us(McuIndex mcu) const;
 
   // An answer to whatever request.
   void answered(McuIndex mcu) { polled_[mcu].missed_replies = 0; }
+  // The poll is over.
+  void ended(std::int64_t now_us);
   // Or none. Returns true if the MCU has missed so many replies that it is taken for lost.
   bool missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type);
   // What the MCU's record has of reports was of this time, or is void.
@@ -66,6 +66,8 @@ class Poller {
 
   std::vector<McuIndex> choose(std::int64_t now_us) const;
   void forget_old(std::int64_t now_us);
+  std::int64_t news_due_us(McuIndex mcu) const;
+  std::int64_t routine_due_us(McuIndex mcu) const;
   std::uint8_t room(McuIndex mcu, std::uint16_t to_move) const;
   std::int64_t reply_us(std::size_t payload) const;
 
@@ -73,7 +75,9 @@ class Poller {
   Transactions& transactions_;
   const FrameWriter& writer_;
   PerMcu<Polled> polled_;
-  std::int64_t extra_from_us_ = 0;  // no extra poll before
+  std::int64_t first_news_us_ = INT64_MAX;
+  std::int64_t extra_from_us_ = 0;             // no extra poll before
+  std::optional<std::int64_t> extra_sent_us_;  // that of the poll under way, if it is an extra one
 };
 
 }  // namespace bushd::link

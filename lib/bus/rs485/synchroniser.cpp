@@ -64,6 +64,7 @@ Synchroniser::Agreement Synchroniser::follow_report(std::int64_t now_us, McuInde
   McuView& view = mcus_[mcu].view;
   const bushd_report& report = view.report;
   since_sync_[mcu].reported = true;
+  if (sync_id_ == report.sync_id) mcus_[mcu].sync_sent = false;
   note_other_master(now_us, report);
   view.tick = clock_.unwrap(report.tick, now_us);
   constexpr std::uint8_t kKnowsTime = BUSHD_FLAG_SYNCED | BUSHD_FLAG_SYNC_HEARD;
@@ -160,6 +161,7 @@ bool Synchroniser::send_due(std::int64_t now_us) {
   own_sync_ids_.push_back(sync.sync_id);
   for (const McuIndex i : mcus_.indices()) {
     since_sync_[i].reported = false;
+    mcus_[i].sync_sent = true;
     // MCUs that wait are asked at once, so that the next SYNC can follow this one.
     const bool connecting = mcus_[i].view.phase == McuPhase::kConnecting;
     if (found.waiting && connecting) mcus_[i].poll_wanted = true;

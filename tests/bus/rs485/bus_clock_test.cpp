@@ -21,6 +21,18 @@ TEST(BusClock, FirstReportIsTakenAsItIs) {
   EXPECT_EQ(clock.tick_at(-1'560'001), -1) << "before tick 0, rounded down";
 }
 
+TEST(BusClock, ATickBeginsWhenItIsFirstTold) {
+  for (const std::int64_t tick_ns : {kTickNs, std::int64_t{1'000'001}}) {
+    BusClock clock(tick_ns);
+    clock.sample(1000, 123'457, 1'000'000);
+    for (const Tick tick : {-1, 0, 1, 999, 1000, 1001, 123456}) {
+      const std::int64_t begin_us = clock.begin_us(tick);
+      EXPECT_EQ(clock.tick_at(begin_us), tick);
+      EXPECT_EQ(clock.tick_at(begin_us - 1), tick - 1);
+    }
+  }
+}
+
 TEST(BusClock, SmallestLatencyCounts) {
   BusClock clock(kTickNs);
   // True bus time is host time; reports come 20, 3 and 9 ms late.

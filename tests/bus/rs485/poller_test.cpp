@@ -95,16 +95,43 @@ TEST_F(Polling, ExtraPollsLeaveTheLineToOthers) {
   poller.send_due(1'000'000);
   asked();
   poller.expect_news(kFirst, 1'010'000);
-  poller.expect_news(kSecond, 1'010'001);
+  poller.expect_news(kSecond, 1'013'001);
   ASSERT_TRUE(poller.send_due(1'010'000));
   EXPECT_THAT(asked(), ElementsAre(1));
-  // The poll, its window and the patience with the answer: three more times as long.
-  const std::int64_t window_us =
-      begins_us[0] + writer.line_us(BUSHD_REPORT_SIZE(4) + BUSHD_FRAME_OVERHEAD + 1);
-  const std::int64_t took_us =
-      writer.line_us(1 + 5 + BUSHD_FRAME_OVERHEAD + 1) + window_us + transactions.patience_us();
-  EXPECT_GE(poller.due_us(kSecond), std::min<std::int64_t>(1'010'000 + 4 * took_us, 1'050'000));
-  EXPECT_LE(poller.due_us(kSecond), 1'050'000);
+  // The patience with an answer is 40 ms now: half of the time is that of the routine polls.
+  EXPECT_EQ(poller.due_us(kSecond), 1'050'000);
+  poller.ended(1'014'000);
+  EXPECT_EQ(poller.due_us(kSecond), 1'018'000) << "as long as it took";
+  ASSERT_TRUE(poller.send_due(1'018'000));
+  EXPECT_THAT(asked(), ElementsAre(2));
+}
+
+TEST_F(Polling, NewsOfSeveralIsAskedForByOnePoll) {
+  poller.send_due(1'000'000);
+  asked();
+  poller.expect_news(kFirst, 1'010'000);
+  poller.expect_news(kSecond, 1'013'000);
+  poller.expect_news(McuIndex{2}, 1'013'001);
+  EXPECT_FALSE(poller.send_due(1'012'999));
+  ASSERT_TRUE(poller.send_due(1'013'000));
+  EXPECT_THAT(asked(), ElementsAre(1, 2));
+}
+
+// Four answers of all, each in its window, and the poll that asks for them.
+TEST_F(Polling, ARoutinePollIsOverWhenThereIsNews) {
+  poller.send_due(1'000'000);
+  asked();
+  poller.expect_news(kFirst, 1'051'000);
+  const std::int64_t answer_us = writer.line_us(106 + BUSHD_FRAME_OVERHEAD + 1) + 600;
+  const std::int64_t poll_us =
+      writer.line_us(2 + 4 * 5 + BUSHD_FRAME_OVERHEAD) + 1'000 + 4 * answer_us;
+  const std::int64_t due_us = 1'051'000 - poll_us;
+  EXPECT_EQ(poller.due_us(kSecond), due_us);
+  EXPECT_FALSE(poller.send_due(due_us - 1));
+  ASSERT_TRUE(poller.send_due(due_us));
+  EXPECT_THAT(asked(), ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(poller.due_us(kFirst), 1'051'000);
+  EXPECT_EQ(poller.due_us(kSecond), due_us + 50'000);
 }
 
 TEST_F(Polling, WhoWillHaveNewsIsNotAskedAlongBefore) {
@@ -175,8 +202,12 @@ TEST_F(Polling, WhoIsAtRestGetsRoomForLittle) {
   poller.send_due(1'050'000);
   asked();
   EXPECT_THAT(known, ElementsAre(9, 0, 0, 0));
+  EXPECT_THAT(room, ElementsAre(22 + 7, 106, 106, 106));
+  EXPECT_EQ(begins_us[1] - begins_us[0], (29 + 10) * 20 + 600 + 10) << "its window is short";
+  mcus[kFirst].sync_sent = true;
+  poller.send_due(1'100'000);
+  asked();
   EXPECT_THAT(room, ElementsAre(22 + 16, 106, 106, 106));
-  EXPECT_EQ(begins_us[1] - begins_us[0], (38 + 10) * 20 + 600 + 10) << "its window is short";
 }
 
 TEST_F(Polling, WhoMayHaveMuchToTellGetsRoomForIt) {
@@ -189,13 +220,17 @@ TEST_F(Polling, WhoMayHaveMuchToTellGetsRoomForIt) {
   };
   std::int64_t now_us = 1'000'000;
   const auto later = [&] { return now_us += 50'000; };
-  EXPECT_EQ(room_of_first(later()), 38);
+  constexpr int kAtRest = 22 + 7;
   constexpr int kInMotion = 22 + 16 + 7 + 12 + 15 + 4 * 6;
-  constexpr int kOfPlans = 22 + 16 + 7 + 12 + 6;
+  constexpr int kOfPlans = 22 + 7 + 12 + 6;
+  EXPECT_EQ(room_of_first(later()), kAtRest);
   mcus[kFirst].view.report.moving = 8;
   EXPECT_EQ(room_of_first(later()), kOfPlans);
   poller.expect_motion(kFirst, 5);
   EXPECT_EQ(room_of_first(later()), kOfPlans + 2 * 6);
+  mcus[kFirst].sync_sent = true;
+  EXPECT_EQ(room_of_first(later()), kOfPlans + 2 * 6 + 16 - 7);
+  mcus[kFirst].sync_sent = false;
   mcus[kFirst].view.report.moving = 0;
   poller.expect_motion(kFirst, 1);
   mcus[kFirst].view.report.armed = 1;
@@ -206,14 +241,14 @@ TEST_F(Polling, WhoMayHaveMuchToTellGetsRoomForIt) {
   mcus[kFirst].answered = false;
   EXPECT_EQ(room_of_first(later()), kOfPlans);
   poller.expect_motion(kFirst, 0);
-  EXPECT_EQ(room_of_first(later()), 38);
+  EXPECT_EQ(room_of_first(later()), kAtRest);
   mcus[kFirst].view.phase = link::McuPhase::kConnecting;
   EXPECT_EQ(room_of_first(later()), 106);
   mcus[kFirst].view.phase = link::McuPhase::kOnline;
   poller.missed(now_us, kFirst, BUSHD_MSG_POLL);
   EXPECT_EQ(room_of_first(later()), 106);
   poller.answered(kFirst);
-  EXPECT_EQ(room_of_first(later()), 38);
+  EXPECT_EQ(room_of_first(later()), kAtRest);
 }
 
 TEST_F(Polling, WhatHadNoRoomIsAskedForAtOnce) {
@@ -221,7 +256,7 @@ TEST_F(Polling, WhatHadNoRoomIsAskedForAtOnce) {
   poller.follow_report(1'000'000, kFirst);
   poller.send_due(1'000'000);
   asked();
-  EXPECT_EQ(room.front(), 38);
+  EXPECT_EQ(room.front(), 29);
   EXPECT_TRUE(poller.no_room(kFirst));
   ASSERT_TRUE(poller.send_wanted(1'004'000));
   EXPECT_THAT(asked(), ElementsAre(1));
