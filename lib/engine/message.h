@@ -9,6 +9,7 @@
 #include "engine/message_base.h"
 #include "engine/message_line.h"
 #include "engine/message_motion.h"
+#include "engine/message_program.h"
 #include "engine/message_report.h"
 #include "engine/message_setup.h"
 

@@ -46,7 +46,10 @@ typedef enum bushd_type {
   BUSHD_MSG_CURRENTS = 0x1A,      // bushd_currents -> acknowledgement
   BUSHD_MSG_LINE_TRIGGER = 0x1B,  // bushd_line_trigger -> acknowledgement
   BUSHD_MSG_VELOCITY = 0x1C,      // bushd_set_velocity -> acknowledgement
-  BUSHD_MSG_OUTPUTS = 0x1D        // bushd_set_outputs -> acknowledgement
+  BUSHD_MSG_OUTPUTS = 0x1D,       // bushd_set_outputs -> acknowledgement
+  BUSHD_MSG_PROGRAM_PUT = 0x1E,   // bushd_program_put -> acknowledgement
+  BUSHD_MSG_PROGRAM = 0x1F,       // bushd_program_control -> acknowledgement
+  BUSHD_MSG_PROGRAM_STATE = 0x20  // empty -> reply: bushd_program_state
 } bushd_type;
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.
 

@@ -51,6 +51,7 @@ enum {
 #define BUSHD_CAN_CLEAR_NAMED UINT32_C(0x80000)  // bushd_control.faults
 #define BUSHD_CAN_OUTPUTS UINT32_C(0x100000)     // levels of its outputs may be chosen
 #define BUSHD_CAN_SLOW_RUNS UINT32_C(0x200000)   // shortest delays and slow delays beyond 16 bits
+#define BUSHD_CAN_PROGRAM UINT32_C(0x400000)     // carries out programs by itself
 
 // Only `protocol_version` is decoded of another version, the rest is zero: enough to say which one
 // it is.

@@ -47,6 +47,7 @@ const std::vector<Unsupported> kUnsupported = {
      "`inputs` of the bus names the modem lines that are switches; no request changes them"},
     {"LINE_RUN", BUSHD_CAN_LINE_RUN, kByCapability, "no tick is common to two ports"},
     {"TRAVEL", BUSHD_CAN_TRAVEL, kByCapability, "nothing runs without the daemon"},
+    {"PROGRAM", BUSHD_CAN_PROGRAM, kByCapability, "nothing runs without the daemon"},
     {"CURRENTS", BUSHD_CAN_CURRENTS, kByCapability, "there is no chopper"},
     {"VELOCITY", BUSHD_CAN_VELOCITY, kByCapability, "nothing runs without the daemon"},
     {"LOCAL_keypad", BUSHD_CAN_KEYPAD, kByCapability, "RXD is not connected"},

@@ -32,6 +32,7 @@ struct Kind {
 using Kinds = std::map<std::string, Kind>;
 Kinds setup_kinds();
 Kinds motion_kinds();
+Kinds program_kinds();
 
 bushd_run_state any_run_state();
 

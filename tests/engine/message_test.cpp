@@ -14,6 +14,7 @@ const Kinds& kinds() {
   static const Kinds all = [] {
     Kinds both = setup_kinds();
     both.merge(motion_kinds());
+    both.merge(program_kinds());
     return both;
   }();
   return all;

@@ -127,6 +127,18 @@ void put(const bushd_set_velocity& m, Fields& f) {
 void put(const bushd_set_outputs& m, Fields& f) {
   f.add("step_low", m.step_low).add("direction_low", m.direction_low).add("enabled", m.enabled);
 }
+void put(const bushd_program_put& m, Fields& f) {
+  f.add("offset", m.offset).add("total", m.total).add_list("bytes", m.bytes, m.count, 1);
+}
+void put(const bushd_program_control& m, Fields& f) {
+  f.add("action", m.action).add("number", m.number).add("value", m.value);
+}
+void put(const bushd_program_state& m, Fields& f) {
+  f.add("stage", m.stage).add("reason", m.reason).add("number", m.number).add("flags", m.flags);
+  f.add("motors", m.motors).add("memory", m.memory).add("size", m.size).add("crc", m.crc);
+  f.add("frame", m.frame).add("point", m.point).add("repeats", m.repeats);
+  f.add("start_tick", m.start_tick).add("tick", m.tick);
+}
 void put(const bushd_local& m, Fields& f) {
   f.add("motors", m.motors).add("keypad", m.keypad).add("keypad_ticks", m.keypad_ticks);
 }
@@ -334,6 +346,14 @@ std::string message_text(const bushd_frame& frame) {
       return text("set_velocity", frame, bushd_decode_set_velocity);
     case BUSHD_MSG_OUTPUTS:
       return text("set_outputs", frame, bushd_decode_set_outputs);
+    case BUSHD_MSG_PROGRAM_PUT:
+      return text("program_put", frame, bushd_decode_program_put);
+    case BUSHD_MSG_PROGRAM:
+      return text("program_control", frame, bushd_decode_program_control);
+    case BUSHD_MSG_PROGRAM_STATE:
+      return empty_text("get_program_state", frame);
+    case BUSHD_TYPE_REPLY | BUSHD_MSG_PROGRAM_STATE:
+      return text("program_state", frame, bushd_decode_program_state);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
       return text("tables", frame, bushd_decode_tables);
     case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
@@ -349,13 +369,43 @@ std::string message_text(const bushd_frame& frame) {
 }
 
 std::set<std::string> message_names() {
-  return {"identify",         "identity",     "configure",   "table_begin",     "table_data",
-          "table_end",        "assign",       "control",     "set_position",    "poll",
-          "report",           "sync",         "ticks",       "acknowledgement", "table_ticks",
-          "table_run",        "emergency",    "set_address", "get_tables",      "tables",
-          "set_inputs",       "emission",     "home",        "local",           "trigger",
-          "position_compare", "motor_inputs", "line_run",    "travel",          "currents",
-          "line_trigger",     "set_velocity", "set_outputs"};
+  return {"identify",
+          "identity",
+          "configure",
+          "table_begin",
+          "table_data",
+          "table_end",
+          "assign",
+          "control",
+          "set_position",
+          "poll",
+          "report",
+          "sync",
+          "ticks",
+          "acknowledgement",
+          "table_ticks",
+          "table_run",
+          "emergency",
+          "set_address",
+          "get_tables",
+          "tables",
+          "set_inputs",
+          "emission",
+          "home",
+          "local",
+          "trigger",
+          "position_compare",
+          "motor_inputs",
+          "line_run",
+          "travel",
+          "currents",
+          "line_trigger",
+          "set_velocity",
+          "set_outputs",
+          "program_put",
+          "program_control",
+          "get_program_state",
+          "program_state"};
 }
 
 }  // namespace bushd::test

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "engine/message.h"
+#include "engine/program.h"
 #include "engine/run_state.h"
 #include "engine/velocity.h"
 #include "fuzz/fuzz.h"
@@ -303,6 +304,36 @@ void decode_trigger(Bytes payload) {
   decoded(payload, &compare, bushd_decode_position_compare, bushd_encode_position_compare);
 }
 
+void decode_program(Bytes payload) {
+  bushd_program_put put;
+  if (decoded(payload, &put, bushd_decode_program_put, bushd_encode_program_put)) {
+    BUSHD_REQUIRE(put.count >= 1 && std::uint32_t{put.offset} + put.count <= put.total);
+  }
+  bushd_program_control control;
+  if (decoded(payload, &control, bushd_decode_program_control, bushd_encode_program_control)) {
+    BUSHD_REQUIRE((control.number != 0) == (control.action == BUSHD_PROGRAM_RUN));
+  }
+  bushd_program_state state;
+  decoded(payload, &state, bushd_decode_program_state, bushd_encode_program_state);
+  // The payload as a program: whoever has checked it reads it whole, frame by frame.
+  bushd_program program;
+  if (bushd_program_check(payload.data(), payload.size(), UINT16_MAX, &program) != BUSHD_OK) return;
+  BUSHD_REQUIRE(program.motors != 0 && program.end == payload.data() + payload.size());
+  const std::uint8_t* at = program.frames;
+  for (bool ended = false; !ended;) {
+    BUSHD_REQUIRE(at < program.end);
+    const bushd_program_frame frame = bushd_next_program_frame(&program, &at);
+    ended = frame.kind == BUSHD_PROGRAM_END;
+    BUSHD_REQUIRE((frame.motors & ~program.motors) == 0);
+    for (std::uint16_t point = 0; point < frame.points; ++point) {
+      for (std::uint8_t nth = 0; nth < frame.motor_count; ++nth) {
+        bushd_program_entry_of(&frame, point, nth);
+      }
+    }
+  }
+  BUSHD_REQUIRE(at == program.end);
+}
+
 // It goes on from what is known, here nothing but how many motors there are.
 void decode_report(Bytes payload) {
   bushd_report report{};
@@ -349,6 +380,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   bushd::fuzz::decode_table_run(payload);
   bushd::fuzz::decode_lines(payload);
   bushd::fuzz::decode_trigger(payload);
+  bushd::fuzz::decode_program(payload);
   bushd::fuzz::decode_for_master(payload);
   return 0;
 }

@@ -32,6 +32,10 @@ def c_encoder(index, message, fields):
         lines.append(f"  static const uint16_t codes[] = {{{', '.join(map(str, fields['codes']))}}};")
         lines.append(f"  return bushd_encode_table_data({fields['bank']}, {fields['offset']}, {fields['count']}, codes, "
                      "payload);")
+    elif message == "program_put":
+        lines.append("  " + c_array("uint8_t", "bytes", fields["bytes"]).replace("\n", "\n  "))
+        lines.append(f"  const bushd_program_put message = {{{fields['offset']}, {fields['total']}, sizeof bytes, bytes}};")
+        lines.append("  return bushd_encode_program_put(&message, payload);")
     elif message == "poll":
         entries = ", ".join(f"{{{', '.join(map(str, entry))}}}" for entry in fields["entries"])
         lines.append(f"  static const bushd_poll_entry entries[] = {{{entries}}};")

@@ -29,10 +29,11 @@ PARTS = {
     "unique_id": [("unique_id", 8)],
     "delays": [],
     "displacements": [],
+    "bytes": [],
 }
 SHORTER = {"version": "protocol_version", "firmware": "firmware_version"}  # names in the drawings
 # Messages of one byte that are told in words.
-WITHOUT_DRAWING = {"control", "emergency", "acknowledgement", "get_tables"}
+WITHOUT_DRAWING = {"control", "emergency", "acknowledgement", "get_tables", "get_program_state"}
 
 
 def described(layout):
