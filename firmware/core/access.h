@@ -49,6 +49,27 @@ static inline bool bushd_mcu_runs_so_slowly(const bushd_mcu* mcu, bushd_delay de
   return bushd_delay_is_code(delay) || !mcu->config.no_slow_runs;
 }
 
+// Motors that a program has, from its RUN until it has ended.
+static inline uint16_t bushd_mcu_program_motors(const bushd_mcu* mcu) {
+#if BUSHD_PROGRAMS
+  return mcu->config.program != NULL ? mcu->config.program->motors : (uint16_t)0;
+#else
+  (void)mcu;
+  return 0;
+#endif
+}
+// Those of them that go on when no master is heard.
+static inline uint16_t bushd_mcu_moved_without_host(const bushd_mcu* mcu) {
+#if BUSHD_PROGRAMS
+  const bushd_mcu_program* p = mcu->config.program;
+  const bool alone = p != NULL && (p->program.flags & BUSHD_PROGRAM_WITHOUT_HOST) != 0;
+  return alone ? p->motors : (uint16_t)0;
+#else
+  (void)mcu;
+  return 0;
+#endif
+}
+
 // Whether each step keeps the slot of its own time; if not, the emission makes the masks from the
 // counts.
 static inline bool bushd_mcu_steps_keep_slots(const bushd_mcu* mcu) {

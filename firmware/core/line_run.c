@@ -20,12 +20,13 @@ static inline bool is_on_line(const bushd_mcu* mcu, uint8_t m) {
   return (mcu->line.motors & motor_bit(m)) != 0;
 }
 
-static bushd_status check_table(const bushd_mcu* mcu, const bushd_line_part* part) {
-  const bushd_table* table = bushd_mcu_checked_table(mcu, part->bank);
+bushd_status bushd_mcu_check_line_table(const bushd_mcu* mcu, uint8_t bank,
+                                        uint16_t shortest_delay) {
+  const bushd_table* table = bushd_mcu_checked_table(mcu, bank);
   if (table == NULL) return BUSHD_E_NO_TABLE;
   const bool slow_only = (mcu->config.disabled_capabilities & BUSHD_CAN_TABLE_TICKS) != 0;
   if (slow_only &&
-      !bushd_run_is_slow(table, part->shortest_delay, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
+      !bushd_run_is_slow(table, shortest_delay, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
     return BUSHD_E_CAPACITY;
   }
   const uint32_t most = bushd_table_max_steps_per_tick(table, mcu->tick_ns);
@@ -116,7 +117,8 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
   if (status != BUSHD_OK) return status;
   bool barred;
   status = check_entries(mcu, message, &barred);
-  if (status == BUSHD_OK) status = check_table(mcu, part);
+  if (status == BUSHD_OK)
+    status = bushd_mcu_check_line_table(mcu, part->bank, part->shortest_delay);
   if (status != BUSHD_OK) return status;
   if (barred) return BUSHD_E_FORBIDDEN;
   if (is_taken(mcu)) return BUSHD_E_STATE;
@@ -125,6 +127,14 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
   if (!make(mcu, part, &ticks, &spare_ns)) return BUSHD_E_CAPACITY;
   begin(mcu, range.mask, message->first_tick, ticks);
   return BUSHD_OK;
+}
+
+bool bushd_mcu_begin_line(bushd_mcu* mcu, const bushd_line_run* message, uint16_t motors) {
+  uint32_t ticks;
+  uint32_t spare_ns;
+  if (is_taken(mcu) || !make(mcu, &message->line, &ticks, &spare_ns)) return false;
+  begin(mcu, motors, message->first_tick, ticks);
+  return true;
 }
 
 static bushd_status check_waiting(const bushd_mcu* mcu, const bushd_line_part* part) {
@@ -136,14 +146,14 @@ static bushd_status check_waiting(const bushd_mcu* mcu, const bushd_line_part* p
     const uint16_t forbidden = bushd_mcu_forbidden(mcu, entry.direction);
     if ((forbidden & motor_bit(entry.motor)) != 0) return BUSHD_E_FORBIDDEN;
   }
-  return check_table(mcu, part);
+  return bushd_mcu_check_line_table(mcu, part->bank, part->shortest_delay);
 }
 
 bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, uint16_t* motors) {
   const bushd_status status = check_waiting(mcu, part);
   if (status != BUSHD_OK) return status;
   *motors = motors_of(part);
-  if (is_taken(mcu) || (bushd_mcu_moving(mcu) & *motors) != 0) return BUSHD_E_STATE;
+  if (is_taken(mcu) || (bushd_mcu_engaged(mcu) & *motors) != 0) return BUSHD_E_STATE;
   uint32_t ticks;
   uint32_t spare_ns;
   if (!make(mcu, part, &ticks, &spare_ns)) return BUSHD_E_CAPACITY;

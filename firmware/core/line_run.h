@@ -25,6 +25,12 @@ typedef struct bushd_mcu_line {
 } bushd_mcu_line;
 
 bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message);
+// The same, but for what ticks and epochs ask of a master's frame: of a program, whose motors rest.
+// `motors` are those of its entries. False: another line is under way, or it would take too long.
+bool bushd_mcu_begin_line(bushd_mcu* mcu, const bushd_line_run* message, uint16_t motors);
+// Whether lines can go by the table in this bank, so fast.
+bushd_status bushd_mcu_check_line_table(const bushd_mcu* mcu, uint8_t bank,
+                                        uint16_t shortest_delay);
 // Holds a line of motors at rest for the trigger (trigger.c): all is ready but its beginning.
 // Returns the motors.
 bushd_status bushd_mcu_hold_line(bushd_mcu* mcu, const bushd_line_part* part, uint16_t* motors);

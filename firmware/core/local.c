@@ -171,7 +171,7 @@ bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
   if (message->keypad != 0 && !mcu->config.keypad) return BUSHD_E_FORMAT;
   const uint16_t added =
       (uint16_t)((message->motors & ~settings->motors) | (message->keypad & ~settings->keypad));
-  if (added & bushd_mcu_moving(mcu)) return BUSHD_E_STATE;
+  if (added & (bushd_mcu_moving(mcu) | bushd_mcu_program_motors(mcu))) return BUSHD_E_STATE;
   const bool first = settings->motors == 0 && message->motors != 0;
   // A key that moves others would be forgotten.
   if (first && (mcu->local.held & mcu->autonomous) != 0) return BUSHD_E_STATE;

@@ -12,6 +12,7 @@
 #include "firmware/core/line_run.h"
 #include "firmware/core/local.h"
 #include "firmware/core/motor.h"
+#include "firmware/core/program_run.h"
 #include "firmware/core/requests.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
@@ -62,6 +63,9 @@ void bushd_mcu_boot(bushd_mcu* mcu, const bushd_port* port, const bushd_mcu_conf
   mcu->port = *port;
   mcu->config = *config;
   if (config->scratch != NULL) memset(config->scratch, 0, sizeof *config->scratch);
+#if BUSHD_PROGRAMS
+  bushd_mcu_boot_program(mcu);
+#endif
   mcu->tick_ns = BUSHD_BOOT_TICK_NS;
   mcu->low_water_ticks = mcu->reports.low_water_ticks = UINT16_MAX;
   bushd_mcu_drive_enable(mcu);
@@ -130,6 +134,9 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
   const uint16_t by_people = mcu->local.settings.motors | mcu->local.settings.keypad;
   if ((mcu->autonomous | by_people) != 0) move_by_itself(mcu);
   bushd_mcu_watch_comm_timeout(mcu);
+#if BUSHD_PROGRAMS
+  if (bushd_mcu_program_motors(mcu) != 0) bushd_mcu_go_on_with_program(mcu);
+#endif
   bushd_mcu_emit(mcu, &mcu->slot_buffer[mcu->front ^ 1u]);
   bushd_mcu_choose_currents(mcu);
   if (mcu->autonomous != 0) mcu->autonomous &= bushd_mcu_moving(mcu);

@@ -18,6 +18,7 @@
 #include "engine/frame.h"
 #include "engine/message.h"
 #include "firmware/core/port.h"
+#include "firmware/core/program.h"
 #include "firmware/core/slot_buffer.h"
 
 #ifdef __cplusplus
@@ -28,6 +29,7 @@ typedef struct bushd_mcu bushd_mcu;  // mcu_state.h
 typedef struct bushd_mcu_currents bushd_mcu_currents;
 typedef struct bushd_mcu_velocity bushd_mcu_velocity;
 typedef struct bushd_mcu_scratch bushd_mcu_scratch;
+typedef struct bushd_mcu_program bushd_mcu_program;
 
 #define BUSHD_FIRMWARE_VERSION 2u
 #define BUSHD_BOOT_TICK_NS 2560000u  // tick length until the host configures one
@@ -60,7 +62,10 @@ typedef struct bushd_mcu_config {
   bushd_mcu_velocity* velocity;
   uint8_t velocity_motors;     // at most BUSHD_MAX_VELOCITY_MOTORS
   bushd_mcu_scratch* scratch;  // NULL: it has no BUSHD_SCRATCH_BANK
-  uint16_t* codes;             // table memory
+#if BUSHD_PROGRAMS
+  bushd_mcu_program* program;  // NULL: it carries out none
+#endif
+  uint16_t* codes;  // table memory
   uint16_t code_count;
   // BUSHD_MCU_MAX_REPLY bytes for answers. May be the end of the receiver's buffer, if the port
   // keeps the receiver out of it from the making of an answer until it is sent.

@@ -19,6 +19,7 @@ extern "C" {
 #include "firmware/core/local.h"
 #include "firmware/core/motor.h"
 #include "firmware/core/position_compare.h"
+#include "firmware/core/program.h"
 #include "firmware/core/report.h"
 #include "firmware/core/requests.h"
 #include "firmware/core/slot_buffer.h"

@@ -37,6 +37,7 @@ int8_t bushd_mcu_heading(const bushd_mcu* mcu, uint8_t m, uint32_t next) {
   switch (bushd_mcu_owner_of_motor(mcu, m)) {
     case BUSHD_MCU_OWNER_QUEUE:
     case BUSHD_MCU_OWNER_TRIGGER:
+    case BUSHD_MCU_OWNER_PROGRAM:
       return queued_heading(mcu, m, next);
     case BUSHD_MCU_OWNER_TABLE_RUN:
     case BUSHD_MCU_OWNER_LINE:
@@ -91,6 +92,7 @@ static void ramp_down(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stream_motion* 
   switch (bushd_mcu_owner_of_motor(mcu, m)) {
     case BUSHD_MCU_OWNER_QUEUE:
     case BUSHD_MCU_OWNER_TRIGGER:
+    case BUSHD_MCU_OWNER_PROGRAM:
       if (queued->moves) bushd_mcu_ramp_down_stream(mcu, m, queued->delay);
       break;
     case BUSHD_MCU_OWNER_LINE:

@@ -1,15 +1,15 @@
 // A motor has one owner at a time, which decides what it does next. This file says which, and what
 // depends on it: how the next tick is made, how it stops, what a limit does, what may follow.
 //
-// The owner is told from the motor's mode, and from two masks: the motors on a line and those that
-// are armed. Who takes a motor gives it a mode (bushd_mcu_give_motor), and in the end gives it back
-// to the queue. docs/states.md has the picture.
+// The owner is told from the motor's mode, and from three masks: the motors on a line, those that
+// are armed, and those of a program. Who takes a motor gives it a mode (bushd_mcu_give_motor), and
+// in the end gives it back to the queue. docs/states.md has the picture.
 #ifndef BUSHD_FIRMWARE_CORE_OWNER_H
 #define BUSHD_FIRMWARE_CORE_OWNER_H
 
 #include "firmware/core/access.h"
 
-// All but the last are numbered as the modes are.
+// All but the last two are numbered as the modes are.
 typedef enum bushd_mcu_motor_owner {
   BUSHD_MCU_OWNER_QUEUE = BUSHD_MCU_STREAM,         // ticks of a master, or rest
   BUSHD_MCU_OWNER_TRIGGER = BUSHD_MCU_RUN_WAITS,    // it rests until the edge comes
@@ -19,14 +19,17 @@ typedef enum bushd_mcu_motor_owner {
   BUSHD_MCU_OWNER_TRAVEL = BUSHD_MCU_TRAVEL,
   BUSHD_MCU_OWNER_LOCAL = BUSHD_MCU_LOCAL,
   BUSHD_MCU_OWNER_VELOCITY = BUSHD_MCU_VELOCITY,
-  BUSHD_MCU_OWNER_LINE = 8  // also before its start, and while the line ramps down
+  BUSHD_MCU_OWNER_LINE = 8,    // also before its start, and while the line ramps down
+  BUSHD_MCU_OWNER_PROGRAM = 9  // it rests until a frame moves it; then by a table run, or a line
 } bushd_mcu_motor_owner;
 
 static inline bushd_mcu_motor_owner bushd_mcu_owner_of_motor(const bushd_mcu* mcu, uint8_t m) {
   const uint8_t mode = mcu->motor[m].mode;
   if (mode == BUSHD_MCU_STREAM) {
     const bool armed = (mcu->trigger.armed & motor_bit(m)) != 0;
-    return armed ? BUSHD_MCU_OWNER_TRIGGER : BUSHD_MCU_OWNER_QUEUE;
+    if (armed) return BUSHD_MCU_OWNER_TRIGGER;
+    const bool programmed = (bushd_mcu_program_motors(mcu) & motor_bit(m)) != 0;
+    return programmed ? BUSHD_MCU_OWNER_PROGRAM : BUSHD_MCU_OWNER_QUEUE;
   }
   if ((mcu->line.motors & motor_bit(m)) != 0) return BUSHD_MCU_OWNER_LINE;
   return mode == BUSHD_MCU_RUN_WAITS ? BUSHD_MCU_OWNER_TABLE_RUN : (bushd_mcu_motor_owner)mode;
@@ -57,7 +60,7 @@ static inline bool bushd_mcu_may_be_followed(const bushd_mcu_motor* motor) {
 }
 // Motors that ticks and runs say nothing to, until they are at rest.
 static inline uint16_t bushd_mcu_not_for_ticks(const bushd_mcu* mcu) {
-  return mcu->autonomous | mcu->trigger.armed;
+  return mcu->autonomous | mcu->trigger.armed | bushd_mcu_program_motors(mcu);
 }
 // Motors that move by themselves for a master, as a mask: one homes or travels at a time.
 static inline uint16_t bushd_mcu_moved_by_request(const bushd_mcu* mcu) {

@@ -21,6 +21,12 @@ static bushd_mcu_slots in_slots(const bushd_mcu* mcu, uint32_t us) {
   return time;
 }
 
+static void set_width(bushd_mcu* mcu, uint32_t us) {
+  bushd_mcu_slots* width = &mcu->position_compare.width;
+  *width = in_slots(mcu, us);
+  if (width->ticks == 0 && width->slots == 0) width->slots = 1;
+}
+
 bushd_status bushd_mcu_take_position_compare(bushd_mcu* mcu,
                                              const bushd_position_compare* message) {
   bushd_mcu_position_compare* compare = &mcu->position_compare;
@@ -31,9 +37,18 @@ bushd_status bushd_mcu_take_position_compare(bushd_mcu* mcu,
   compare->arrivals = message->arrivals & 3u;
   compare->position_steps = message->position_steps;
   compare->delay = in_slots(mcu, message->delay_us);
-  compare->width = in_slots(mcu, message->width_us);
-  if (compare->width.ticks == 0 && compare->width.slots == 0) compare->width.slots = 1;
+  set_width(mcu, message->width_us);
   return BUSHD_OK;
+}
+
+bool bushd_mcu_pulse_now(bushd_mcu* mcu, uint32_t width_us) {
+  bushd_mcu_position_compare* compare = &mcu->position_compare;
+  if (compare->pulse != PULSE_NONE) return false;
+  compare->arrivals = 0;
+  set_width(mcu, width_us);
+  compare->next.ticks = compare->next.slots = 0;
+  compare->pulse = PULSE_RISES;
+  return true;
 }
 
 static void add(const bushd_mcu* mcu, bushd_mcu_slots* time, const bushd_mcu_slots* more) {

@@ -2,6 +2,7 @@
 #ifndef BUSHD_FIRMWARE_CORE_POSITION_COMPARE_H
 #define BUSHD_FIRMWARE_CORE_POSITION_COMPARE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "engine/message.h"
@@ -27,6 +28,9 @@ typedef struct bushd_mcu_position_compare {
 } bushd_mcu_position_compare;
 
 bushd_status bushd_mcu_take_position_compare(bushd_mcu* mcu, const bushd_position_compare* message);
+// A pulse of a program, from the beginning of the tick that is prepared on. It takes the output: no
+// motor's arrival makes one afterwards. False: another one is not over.
+bool bushd_mcu_pulse_now(bushd_mcu* mcu, uint32_t width_us);
 // Precondition: a pulse may begin or is under way. `slot_buffer` has its steps.
 void bushd_mcu_emit_position_compare(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer);
 

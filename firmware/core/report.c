@@ -52,7 +52,7 @@ static inline void report_all(bushd_mcu* mcu, bushd_report* report) {
   report->flags = mcu->flags;
   report->epoch = mcu->stream.epoch;
   report->boot_number = mcu->config.boot_number;
-  report->moving = bushd_mcu_moving(mcu);
+  report->moving = bushd_mcu_moving(mcu) | bushd_mcu_program_motors(mcu);
   report->tick = mcu->tick;
   report->tick_ns = mcu->port.time_in_tick_ns(mcu->port.context);
   report->reset_cause = mcu->config.reset_cause;
@@ -66,7 +66,7 @@ static inline void report_all(bushd_mcu* mcu, bushd_report* report) {
   report->rejected_frames = mcu->reception.rejected_frames;
   report->last_rejection = mcu->reception.last_rejection;
   report->ramp_downs = mcu->ramp_downs;
-  report->autonomous = mcu->autonomous;
+  report->autonomous = mcu->autonomous | bushd_mcu_program_motors(mcu);
   report->low_water_ticks = mcu->low_water_ticks;
   report->homed = mcu->homed;
   report->homing = mcu->homing.stage;

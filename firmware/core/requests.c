@@ -14,6 +14,7 @@
 #include "firmware/core/local.h"
 #include "firmware/core/owner.h"
 #include "firmware/core/position_compare.h"
+#include "firmware/core/program.h"
 #include "firmware/core/report.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
@@ -37,6 +38,9 @@ static uint32_t capabilities_of(const bushd_mcu* mcu) {
   if (mcu->config.keypad) all |= BUSHD_CAN_KEYPAD;
   if (mcu->config.scratch != NULL) all |= BUSHD_CAN_SCRATCH;
   if (BUSHD_SLOW_RUNS && !mcu->config.no_slow_runs) all |= BUSHD_CAN_SLOW_RUNS;
+#if BUSHD_PROGRAMS
+  if (mcu->config.program != NULL) all |= BUSHD_CAN_PROGRAM;
+#endif
   return all & ~(uint32_t)mcu->config.disabled_capabilities;
 }
 
@@ -166,6 +170,16 @@ static bushd_status answer_tables(bushd_mcu* mcu, const bushd_frame* frame, answ
   return BUSHD_OK;
 }
 
+#if BUSHD_PROGRAMS
+static bushd_status answer_program_state(bushd_mcu* mcu, const bushd_frame* frame, answer* a) {
+  if (frame->payload_size != 0) return BUSHD_E_LENGTH;
+  if (!a->due) return BUSHD_OK;
+  const bushd_program_state state = bushd_mcu_state_of_program(mcu);
+  a->size = bushd_encode_program_state(&state, a->payload);
+  return BUSHD_OK;
+}
+#endif
+
 static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
   bushd_sync sync;
   const bushd_status status = bushd_decode_sync(frame->payload, frame->payload_size, &sync);
@@ -228,6 +242,10 @@ static uint32_t capability_of(uint8_t type) {
       return BUSHD_CAN_CURRENTS;
     case BUSHD_MSG_VELOCITY:
       return BUSHD_CAN_VELOCITY;
+    case BUSHD_MSG_PROGRAM_PUT:
+    case BUSHD_MSG_PROGRAM:
+    case BUSHD_MSG_PROGRAM_STATE:
+      return BUSHD_CAN_PROGRAM;
     default:
       return 0;
   }
@@ -287,6 +305,14 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       HANDLE(currents, bushd_mcu_set_currents);
     case BUSHD_MSG_VELOCITY:
       HANDLE(set_velocity, bushd_mcu_take_velocity);
+#if BUSHD_PROGRAMS
+    case BUSHD_MSG_PROGRAM_PUT:
+      HANDLE(program_put, bushd_mcu_put_program);
+    case BUSHD_MSG_PROGRAM:
+      HANDLE(program_control, bushd_mcu_control_program);
+    case BUSHD_MSG_PROGRAM_STATE:
+      return answer_program_state(mcu, frame, a);
+#endif
     case BUSHD_MSG_SYNC:
     case BUSHD_MSG_TICKS:
     case BUSHD_MSG_TABLE_TICKS:

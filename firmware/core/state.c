@@ -22,12 +22,12 @@ uint16_t bushd_mcu_moving(const bushd_mcu* mcu) {
 }
 
 uint16_t bushd_mcu_engaged(const bushd_mcu* mcu) {
-  return (uint16_t)(bushd_mcu_moving(mcu) | mcu->trigger.armed);
+  return (uint16_t)(bushd_mcu_moving(mcu) | mcu->trigger.armed | bushd_mcu_program_motors(mcu));
 }
 
 static bool is_moving(const bushd_mcu* mcu) {
   return (mcu->slot_buffer[0].active | mcu->slot_buffer[1].active) != 0 ||
-         bushd_mcu_moving(mcu) != 0;
+         (bushd_mcu_moving(mcu) | bushd_mcu_program_motors(mcu)) != 0;
 }
 
 void bushd_mcu_update_state(bushd_mcu* mcu) {

@@ -10,7 +10,8 @@ typedef struct bushd_mcu bushd_mcu;
 
 // Motors that move, or have ticks to come.
 uint16_t bushd_mcu_moving(const bushd_mcu* mcu);
-// These, and motors that wait for the trigger: what a resting motor may be asked must wait too.
+// These, motors that wait for the trigger, and those of a program: what a resting motor may be
+// asked must wait too.
 uint16_t bushd_mcu_engaged(const bushd_mcu* mcu);
 // The state that it reports, from faults, flags and motion.
 void bushd_mcu_update_state(bushd_mcu* mcu);

@@ -28,6 +28,7 @@ static void end_in_silence(bushd_mcu* mcu, uint8_t m, bool runs, uint32_t next) 
 
 static void watch_line(bushd_mcu* mcu, uint32_t next) {
   if (mcu->line.motors == 0 || ticks_after(next, bushd_mcu_line_deadline(mcu)) < 0) return;
+  if ((mcu->line.motors & bushd_mcu_moved_without_host(mcu)) != 0) return;
   uint16_t concerned = bushd_mcu_ramp_down_line(mcu);
   for (uint8_t m = 0; concerned != 0; ++m, concerned = (uint16_t)(concerned >> 1)) {
     if (concerned & 1u) end_in_silence(mcu, m, true, next);
@@ -38,11 +39,14 @@ void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu) {
   const uint32_t next = mcu->tick + 1u;
   watch_line(mcu, next);
   if (mcu->reception.silent_ticks < mcu->reception.comm_timeout_ticks) return;
-  if (mcu->trigger.armed != 0) mcu->faults |= BUSHD_FAULT_LINK;
+  const uint16_t alone = bushd_mcu_moved_without_host(mcu);
+  const uint16_t wait = mcu->trigger.armed | (bushd_mcu_program_motors(mcu) & (uint16_t)~alone);
+  if (wait != 0) mcu->faults |= BUSHD_FAULT_LINK;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     bushd_mcu_motor* motor = &mcu->motor[m];
     const bool runs = motor->mode == BUSHD_MCU_TABLE_RUN;
     if (!runs && motor->mode != BUSHD_MCU_RUN_WAITS) continue;
+    if ((alone & motor_bit(m)) != 0) continue;
     const bool on_line = bushd_mcu_owner_of_motor(mcu, m) == BUSHD_MCU_OWNER_LINE;
     if (on_line ? runs : bushd_run_done(&motor->made.run)) continue;
     if (runs) bushd_mcu_ramp_down_run(mcu, m);

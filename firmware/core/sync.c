@@ -117,8 +117,12 @@ static void correct(bushd_mcu* mcu, const bushd_sync* sync, int32_t time_in_tick
       return;
     }
   }
-  if (bushd_mcu_moving(mcu) != 0) {
+  const uint16_t moving = bushd_mcu_moving(mcu);
+  if ((moving & ~bushd_mcu_moved_without_host(mcu)) != 0) {
     mcu->faults |= BUSHD_FAULT_SYNC;
+  } else if (moving != 0) {
+    // Its clock was its own for long. It comes into step as soon as the program lets all rest.
+    mcu->flags &= (uint8_t)~BUSHD_FLAG_SYNCED;
   } else {
     adopt(mcu, sync);
   }

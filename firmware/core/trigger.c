@@ -61,7 +61,7 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
     if (status != BUSHD_OK) return status;
     mask |= motor_bit(entry.motor);
   }
-  if (bushd_mcu_moving(mcu) & mask) return BUSHD_E_STATE;
+  if (bushd_mcu_engaged(mcu) & mask) return BUSHD_E_STATE;
   mcu->stream.starting &= (uint16_t)~mask;
   at = message->entries;
   for (uint8_t i = 0; i < message->count; ++i) {

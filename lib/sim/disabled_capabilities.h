@@ -18,6 +18,7 @@ inline void disable_capabilities(std::uint32_t capabilities, bushd_mcu_config* c
   if ((capabilities & BUSHD_CAN_VELOCITY) != 0) config->velocity_motors = 0;
   if ((capabilities & BUSHD_CAN_KEYPAD) != 0) config->keypad = false;
   if ((capabilities & BUSHD_CAN_SCRATCH) != 0) config->scratch = nullptr;
+  if ((capabilities & BUSHD_CAN_PROGRAM) != 0) config->program = nullptr;
   if ((capabilities & BUSHD_CAN_SLOW_RUNS) != 0) config->no_slow_runs = true;
 }
 

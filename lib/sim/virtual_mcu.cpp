@@ -12,7 +12,10 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
       sink_(sink),
       supply_(options.supply ? std::optional<SupplyCurrent>(*options.supply) : std::nullopt),
       queue_(std::size_t{options.queue_ticks} * options.motors),
-      codes_(options.code_count) {
+      codes_(options.code_count),
+      program_bytes_(options.program_bytes) {
+  program_.bytes = program_bytes_.data();
+  program_.memory = options.program_bytes;
   bushd_virtual_config config{};
   config.mcu.address = options.address;
   config.mcu.motors = options.motors;
@@ -26,6 +29,7 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   config.mcu.velocity_motors = options.velocity_motors;
   config.mcu.keypad = true;
   config.mcu.scratch = &scratch_;
+  config.mcu.program = &program_;
   disable_capabilities(options.disabled_capabilities, &config.mcu);
   const std::uint64_t unique_id = options.unique_id != 0 ? options.unique_id : index + 1;
   for (std::size_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {

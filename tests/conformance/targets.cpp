@@ -58,7 +58,8 @@ class Atmega2560 final : public Avr {
             .queue_ticks = 64,
             .code_count = 952,
             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_CURRENTS |
-                                     BUSHD_CAN_VELOCITY | BUSHD_CAN_SCRATCH | BUSHD_CAN_SLOW_RUNS};
+                                     BUSHD_CAN_VELOCITY | BUSHD_CAN_SCRATCH | BUSHD_CAN_SLOW_RUNS |
+                                     BUSHD_CAN_PROGRAM};
   }
 };
 
@@ -75,7 +76,7 @@ class Atmega1284p final : public Avr {
             .code_count = 1536,
             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN |
                                      BUSHD_CAN_COMMON_DIR | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH |
-                                     BUSHD_CAN_SLOW_RUNS,
+                                     BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM,
             .current_motors = 1,
             .velocity_motors = 2};
   }
@@ -89,6 +90,7 @@ class Lm3s6965 final : public McuUnderTest {
     return {.slots = 128,
             .queue_ticks = 512,
             .code_count = 12288,
+            .program_bytes = 4096,
             .disabled_capabilities = BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD};
   }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }

@@ -80,7 +80,10 @@ Plan plan_move(const Law& law, std::int64_t steps, std::uint32_t tick_ns, bushd_
 Rig::Rig(RigOptions options)
     : options_(options),
       queue_(std::size_t{options.queue_ticks} * options.motors, 0x5A5A),  // as RAM may be at boot
-      codes_(options.code_count, 0xA5A5) {
+      codes_(options.code_count, 0xA5A5),
+      program_bytes_(options.program_bytes, 0x5A) {
+  program_.bytes = program_bytes_.data();
+  program_.memory = options.program_bytes;
   bushd_port port{};
   port.context = this;
   port.transmit = [](void* context, const std::uint8_t* wire, std::size_t size,
@@ -117,6 +120,7 @@ Rig::Rig(RigOptions options)
   config.velocity_motors = options.velocity_motors;
   config.keypad = true;
   config.scratch = &scratch_;
+  config.program = &program_;
   sim::disable_capabilities(options.disabled_capabilities, &config);
   // These are the port's: the core sees by itself that it gives no function for them.
   config.disabled_capabilities = static_cast<std::uint16_t>(

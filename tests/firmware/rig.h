@@ -36,6 +36,7 @@ struct RigOptions {
   bool stores_address = true;
   std::uint8_t current_motors = 1;  // whose windings' currents the port controls; >= 1
   std::uint8_t velocity_motors = 2;
+  std::uint16_t program_bytes = 1024;
 };
 
 struct Answer {
@@ -243,6 +244,8 @@ class Rig {
   std::array<bushd_mcu_velocity, BUSHD_MAX_VELOCITY_MOTORS> velocity_{};
   std::vector<Winding> windings_;
   bushd_mcu_scratch scratch_{};
+  std::vector<std::uint8_t> program_bytes_;
+  bushd_mcu_program program_{};
   std::uint32_t sync_id_ = 0;
   std::uint32_t port_tick_ns_ = 0;
   std::uint16_t direction_ = 0;

@@ -52,6 +52,8 @@ void CoreRig::boot() {
           [](void*, std::uint8_t motor, std::uint16_t ma, bool) {
             BUSHD_REQUIRE(motor < BUSHD_MAX_CURRENT_MOTORS && ma <= BUSHD_MAX_CURRENT_MA);
           }};
+  program_.bytes = program_bytes_.data();
+  program_.memory = static_cast<std::uint16_t>(program_bytes_.size());
   currents_ = {};
   velocity_ = {};
   bushd_mcu_config config = {.address = address_,
@@ -73,6 +75,7 @@ void CoreRig::boot() {
                              .velocity = velocity_.data(),
                              .velocity_motors = static_cast<std::uint8_t>(velocity_.size()),
                              .scratch = scratch_.data(),
+                             .program = &program_,
                              .codes = codes_.data(),
                              .code_count = configuration_.codes,
                              .reply = reply(),

@@ -75,6 +75,8 @@ class CoreRig : public Programmed {
   std::vector<bushd_mcu_scratch> scratch_ = std::vector<bushd_mcu_scratch>(1);
   std::array<bushd_mcu_currents, BUSHD_MAX_CURRENT_MOTORS> currents_{};
   std::array<bushd_mcu_velocity, BUSHD_MAX_VELOCITY_MOTORS> velocity_{};
+  std::array<std::uint8_t, 128> program_bytes_{};
+  bushd_mcu_program program_{};
   std::vector<std::uint8_t> reply_ = std::vector<std::uint8_t>(BUSHD_MCU_MAX_REPLY);
   bushd_mcu mcu_{};
   bushd_report report_{};

@@ -8,12 +8,14 @@ operations change: an input that the MCU refuses from its first frame on reaches
 """
 import pathlib
 import struct
+import zlib
 
 CORPORA = pathlib.Path(__file__).parent / "corpus"
 TICK_NS = 2_560_000
 (IDENTIFY, CONFIGURE, TABLE_BEGIN, TABLE_DATA, TABLE_END, ASSIGN, CONTROL, SET_POSITION, POLL, SYNC, TICKS,
  TABLE_TICKS, TABLE_RUN, EMERGENCY, SET_ADDRESS, TABLES, INPUTS, EMISSION, HOME, LOCAL, TRIGGER,
- POSITION_COMPARE, MOTOR_INPUTS, LINE_RUN, TRAVEL, CURRENTS, LINE_TRIGGER) = range(1, 0x1C)
+ POSITION_COMPARE, MOTOR_INPUTS, LINE_RUN, TRAVEL, CURRENTS, LINE_TRIGGER, VELOCITY, OUTPUTS, PROGRAM_PUT, PROGRAM,
+ PROGRAM_STATE) = range(1, 0x21)
 FINE, REPLACE, START = 1, 2, 4
 EMERGENCY_PIN, FORWARD, REVERSE = 1, 2, 4
 
@@ -144,6 +146,23 @@ def travel(number, kind, edge=0, sensor=0, steps=0, delay_us=0, wait_us=0):
     return frame(TRAVEL, struct.pack("<BBBbBBIII", number, kind, 0, 1 if kind else 0, edge, sensor, steps, delay_us, wait_us))
 
 
+def program(frames, flags=0):
+    """Of motors 0 and 1, loaded and committed."""
+    text = struct.pack("<BBH", 1, flags, 3) + 2 * struct.pack("<Bii", 0, -300, 300) + frames + b"\0"
+    half = len(text) // 2
+    return (frame(PROGRAM_PUT, struct.pack("<HH", 0, len(text)) + text[:half])
+            + frame(PROGRAM_PUT, struct.pack("<HH", half, len(text)) + text[half:]) + program_action(1, 0, zlib.crc32(text)))
+
+
+def program_action(action, number=0, value=0):
+    return frame(PROGRAM, struct.pack("<BBI", action, number, value))
+
+
+SCAN = (struct.pack("<BH", 8, 2) + struct.pack("<BHBHH", 3, 3, 0, 0, 2) + struct.pack("<4i", 40, -11, 0, 20)
+        + struct.pack("<BI", 7, 9000) + struct.pack("<BI", 5, 12000) + struct.pack("<BBBI", 6, 1, 1, 40000)
+        + struct.pack("<BHiHiH", 1, 3, 5, 0, -5, 120) + b"\x09")
+
+
 def ready(fine=0, before=b""):
     return (pins(0) + configure(fine) + before + in_step() + table() + assign(0, 1, 2, 3)
             + frame(CONTROL, b"\1") + passes(2))
@@ -211,6 +230,11 @@ SEEDS = {
     "line-run-into-limit": ready(1, inputs(positive=3)) + line_run(70, 90, 90, first=20, begun=9) + passes(25) + pins(2)
                            + passes(60),
     "position-compare": ready(0) + frame(POSITION_COMPARE, struct.pack("<BBiII", 0, 3, 3, 700, 4000)) + MOVE[0] + passes(20),
+    "program": ready(0) + program(SCAN) + program_action(2, 1, 20) + passes(80) + pins(2) + passes(90) + frame(PROGRAM_STATE) + poll(7),
+    "program-paused": ready(1) + program(SCAN) + program_action(2, 1, 20) + passes(20) + program_action(4) + passes(40)
+                      + program_action(5) + passes(30) + program_action(3, 0, 1) + passes(9) + program_action(0) + program_action(2, 2, 200),
+    "program-alone": ready(0, inputs(positive=1)) + program(SCAN, 1) + program_action(2, 1, 20) + passes(15) + sync(1, 30000, 1) + passes(15)
+                     + pins(1) + passes(60) + program_action(2, 2, 140) + frame(EMERGENCY, b"\0", True) + passes(30),
     "burst": ready(0, emission(1)) + MOVE[0] + passes(12),
     "common-dir": ready(0, emission(2)) + MOVE[0] + passes(12),
     "staggered": ready(0, emission(3, settle_us=60)) + MOVE[0] + passes(12),

@@ -5,7 +5,8 @@ namespace bushd::sim::virtual_mcu_test {
 namespace {
 
 constexpr std::uint32_t kAll =
-    ((UINT32_C(2) * BUSHD_CAN_SCRATCH) - 1) | BUSHD_CAN_SLOW_RUNS;  // that one can be without
+    // Those that one can be without.
+    ((UINT32_C(2) * BUSHD_CAN_SCRATCH) - 1) | BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM;
 
 class DisabledCapability : public McuAlone, public testing::WithParamInterface<std::uint32_t> {
  protected:
@@ -27,6 +28,7 @@ std::vector<std::uint32_t> every_one_none_and_all() {
   std::vector<std::uint32_t> disabled{0, kAll};
   for (std::uint32_t bit = 1; bit <= BUSHD_CAN_SCRATCH; bit *= 2) disabled.push_back(bit);
   disabled.push_back(BUSHD_CAN_SLOW_RUNS);
+  disabled.push_back(BUSHD_CAN_PROGRAM);
   return disabled;
 }
 INSTANTIATE_TEST_SUITE_P(Of, DisabledCapability, testing::ValuesIn(every_one_none_and_all()),

@@ -14,11 +14,14 @@
 
 #define QUEUE_TICKS 512u
 #define TABLE_CODES 12288u
+#define PROGRAM_BYTES 4096u
 
 static bushd_mcu mcu;
 static int16_t queue[QUEUE_TICKS * BUSHD_MOTORS_PER_MCU];
 static uint16_t codes[TABLE_CODES];
 static bushd_mcu_scratch scratch;
+static uint8_t program_bytes[PROGRAM_BYTES];
+static bushd_mcu_program program = {.bytes = program_bytes, .memory = PROGRAM_BYTES};
 static uint8_t reply[BUSHD_MCU_MAX_REPLY];
 static bool eeprom_failed;
 static uint16_t motor_inputs;
@@ -131,6 +134,7 @@ static void boot(void) {
                              .codes = codes,
                              .code_count = TABLE_CODES,
                              .scratch = &scratch,
+                             .program = &program,
                              .reply = reply};
   journal_state kept;
   name_parts_of_core();

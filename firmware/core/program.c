@@ -1,0 +1,209 @@
+// The program in the memory of the MCU, and what is asked of it. How it is carried out:
+// program_run.c.
+#include "firmware/core/program.h"
+
+#include <string.h>
+
+#include "firmware/core/access.h"
+#include "firmware/core/line_run.h"
+#include "firmware/core/program_run.h"
+#include "firmware/core/state.h"
+
+#if BUSHD_PROGRAMS
+
+static bool is_whole(const bushd_mcu_program* p) {
+  return p->stage >= BUSHD_PROGRAM_LOADED;
+}
+
+static bool has_motors(const bushd_mcu_program* p) {
+  return p->motors != 0;
+}
+
+static void forget(bushd_mcu_program* p) {
+  p->stage = BUSHD_PROGRAM_NONE;
+  p->size = p->received = 0;
+  p->crc = 0;
+  memset(&p->program, 0, sizeof p->program);
+}
+
+void bushd_mcu_boot_program(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (p == NULL) return;
+  uint8_t* const bytes = p->bytes;
+  const uint16_t memory = p->memory;
+  memset(p, 0, sizeof *p);
+  p->bytes = bytes;
+  p->memory = memory;
+}
+
+bushd_status bushd_mcu_put_program(bushd_mcu* mcu, const bushd_program_put* message) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (has_motors(p)) return BUSHD_E_STATE;
+  if (message->total > p->memory) return BUSHD_E_CAPACITY;
+  if (message->offset == 0) {
+    forget(p);
+    p->stage = BUSHD_PROGRAM_LOADING;
+    p->size = message->total;
+  }
+  // In order; one may come again.
+  if (p->stage != BUSHD_PROGRAM_LOADING || message->offset > p->received ||
+      message->total != p->size) {
+    return BUSHD_E_STATE;
+  }
+  memcpy(p->bytes + message->offset, message->bytes, message->count);
+  const uint16_t end = (uint16_t)(message->offset + message->count);
+  if (end > p->received) p->received = end;
+  return BUSHD_OK;
+}
+
+// What its frames need of the MCU but tables, which may come later.
+static bushd_status check_kinds(const bushd_mcu* mcu, const bushd_program* program) {
+  const uint16_t disabled = mcu->config.disabled_capabilities;
+  for (const uint8_t* at = program->frames; at != program->end;) {
+    const bushd_program_frame frame = bushd_next_program_frame(program, &at);
+    const bool line = bushd_program_is_line(frame.kind);
+    if (line && (disabled & BUSHD_CAN_LINE_RUN) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
+    const bool pulse = frame.kind == BUSHD_PROGRAM_PULSE;
+    if (pulse && (disabled & BUSHD_CAN_POSITION_COMPARE) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
+    const bool waits = frame.kind == BUSHD_PROGRAM_WAIT_INPUT;
+    const bool of_motor = frame.input < BUSHD_PROGRAM_SYSTEM_INPUT;
+    if (waits && of_motor && frame.input >= mcu->config.motors) return BUSHD_E_FORMAT;
+  }
+  return BUSHD_OK;
+}
+
+static bushd_status commit(bushd_mcu* mcu, uint32_t crc) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (is_whole(p)) return crc == p->crc ? BUSHD_OK : BUSHD_E_CRC;  // its answer was lost
+  if (p->stage != BUSHD_PROGRAM_LOADING || p->received != p->size) return BUSHD_E_STATE;
+  if (~bushd_crc32(BUSHD_CRC32_START, p->bytes, p->size) != crc) return BUSHD_E_CRC;
+  bushd_program program;
+  bushd_status status = bushd_program_check(p->bytes, p->size, bushd_mcu_own_motors(mcu), &program);
+  if (status == BUSHD_OK) status = check_kinds(mcu, &program);
+  if (status != BUSHD_OK) return status;
+  p->program = program;
+  p->crc = crc;
+  p->reason = BUSHD_PROGRAM_NO_REASON;
+  p->stage = BUSHD_PROGRAM_LOADED;
+  return BUSHD_OK;
+}
+
+static bushd_status check_tables(const bushd_mcu* mcu, const bushd_program* program) {
+  for (const uint8_t* at = program->frames; at != program->end;) {
+    const bushd_program_frame frame = bushd_next_program_frame(program, &at);
+    if (!bushd_program_is_line(frame.kind)) continue;
+    const bushd_status status = bushd_mcu_check_line_table(mcu, frame.bank, frame.shortest_delay);
+    if (status != BUSHD_OK) return status;
+  }
+  return BUSHD_OK;
+}
+
+static bushd_status check_motors(const bushd_mcu* mcu, const bushd_mcu_program* p) {
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((p->program.motors & motor_bit(m)) == 0) continue;
+    const bushd_program_motor part = bushd_mcu_program_part_of(p, m);
+    if (mcu->motor[m].table != (int8_t)part.bank) return BUSHD_E_NO_TABLE;
+    const int32_t at = bushd_mcu_position_at_rest(mcu, m);
+    if (at < part.least_steps || at > part.most_steps) return BUSHD_E_FORMAT;
+  }
+  return check_tables(mcu, &p->program);
+}
+
+static bushd_status run(bushd_mcu* mcu, uint8_t number, uint32_t first_tick) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (is_whole(p) && number == p->number) return BUSHD_OK;  // its answer was lost
+  if (!is_whole(p) || has_motors(p)) return BUSHD_E_STATE;
+  bushd_mcu_update_state(mcu);
+  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
+  if (bushd_mcu_engaged(mcu) & p->program.motors) return BUSHD_E_STATE;
+  if (ticks_after(first_tick, bushd_mcu_first_open(mcu)) < 0) return BUSHD_E_LATE;
+  if (ticks_after(first_tick, mcu->tick) > BUSHD_MCU_PROGRAM_FARTHEST_START)
+    return BUSHD_E_CAPACITY;
+  const bushd_status status = check_motors(mcu, p);
+  if (status != BUSHD_OK) return status;
+  p->number = number;
+  p->start_tick = first_tick;
+  p->motors = p->program.motors;
+  p->at = p->program.frames;
+  p->next_frame = p->point = 0;
+  p->depth = 0;
+  p->repeats = 0;
+  p->moving = 0;
+  p->has_frame = p->resumes = false;
+  p->frame = (bushd_program_frame){0};
+  p->reason = BUSHD_PROGRAM_NO_REASON;
+  p->stage = BUSHD_PROGRAM_WAITS;
+  mcu->local.held &= (uint16_t)~p->motors;
+  return BUSHD_OK;
+}
+
+static bool is_waiting(const bushd_mcu_program* p) {
+  return p->has_frame &&
+         (p->frame.kind == BUSHD_PROGRAM_WAIT || p->frame.kind == BUSHD_PROGRAM_WAIT_INPUT);
+}
+
+static bushd_status pause(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (p->stage == BUSHD_PROGRAM_PAUSES || p->stage == BUSHD_PROGRAM_PAUSED) return BUSHD_OK;
+  if (p->stage != BUSHD_PROGRAM_RUNS) return BUSHD_E_STATE;
+  if (is_waiting(p)) p->until -= mcu->uptime;
+  bushd_mcu_stop_program_motors(mcu, BUSHD_STOP_RAMP, bushd_mcu_first_open(mcu));
+  p->stage = BUSHD_PROGRAM_PAUSES;
+  return BUSHD_OK;
+}
+
+static bushd_status resume(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (p->stage == BUSHD_PROGRAM_RUNS) return BUSHD_OK;
+  if (p->stage != BUSHD_PROGRAM_PAUSED) return BUSHD_E_STATE;
+  if (is_waiting(p)) p->until += mcu->uptime;
+  p->resumes = true;
+  p->stage = BUSHD_PROGRAM_RUNS;
+  return BUSHD_OK;
+}
+
+bushd_status bushd_mcu_control_program(bushd_mcu* mcu, const bushd_program_control* message) {
+  bushd_mcu_program* p = mcu->config.program;
+  switch (message->action) {
+    case BUSHD_PROGRAM_COMMIT:
+      return commit(mcu, message->value);
+    case BUSHD_PROGRAM_RUN:
+      return run(mcu, message->number, message->value);
+    case BUSHD_PROGRAM_STOP:
+      if (has_motors(p)) {
+        bushd_mcu_end_program(mcu, BUSHD_PROGRAM_STOPPED, (bushd_stop_mode)message->value,
+                              bushd_mcu_first_open(mcu));
+      }
+      return BUSHD_OK;
+    case BUSHD_PROGRAM_PAUSE:
+      return pause(mcu);
+    case BUSHD_PROGRAM_RESUME:
+      return resume(mcu);
+    default:
+      if (has_motors(p)) return BUSHD_E_STATE;
+      forget(p);
+      return BUSHD_OK;
+  }
+}
+
+bushd_program_state bushd_mcu_state_of_program(const bushd_mcu* mcu) {
+  const bushd_mcu_program* p = mcu->config.program;
+  const bushd_program_state state = {
+      .stage = p->stage,
+      .reason = p->reason,
+      .number = p->number,
+      .flags = p->program.flags,
+      .motors = p->program.motors,
+      .memory = p->memory,
+      .size = is_whole(p) ? p->size : p->received,
+      .crc = p->crc,
+      .frame = p->next_frame == 0 ? (uint16_t)0 : (uint16_t)(p->next_frame - 1u),
+      .point = p->point,
+      .repeats = p->repeats,
+      .start_tick = p->start_tick,
+      .tick = mcu->tick,
+  };
+  return state;
+}
+
+#endif

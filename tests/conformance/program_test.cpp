@@ -1,0 +1,141 @@
+// Programs of an image and of its virtual twin, begun in one tick: the same steps in the same
+// slots, also while nobody says a word.
+#include "engine/program.h"
+
+#include <vector>
+
+#include "conformance/script.h"
+
+namespace bushd::sim::program_test {
+namespace {
+
+void append(Bytes& bytes, std::uint32_t value, int size) {
+  for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
+}
+
+class ProgramScript : public Script, public testing::WithParamInterface<Target> {
+ protected:
+  ProgramScript() : Script(GetParam()) {}
+  static constexpr std::uint8_t kFirst = 1;
+  static constexpr std::uint8_t kSecond = 6;
+  static constexpr unsigned kMotors = 1u << kFirst | 1u << kSecond;
+
+  // Three times: both along a line to two points, a pulse, a wait, one of them back.
+  static Bytes program(std::uint8_t flags) {
+    Bytes bytes = {BUSHD_PROGRAM_FORMAT, flags};
+    append(bytes, kMotors, 2);
+    for (int motor = 0; motor < 2; ++motor) {
+      bytes.push_back(0);
+      append(bytes, 0u - 5000u, 4);
+      append(bytes, 5000, 4);
+    }
+    for (const std::uint8_t byte : {8, 3, 0, 3}) bytes.push_back(byte);
+    append(bytes, kMotors, 2);
+    for (const std::uint8_t byte : {0, 0, 0, 2, 0}) bytes.push_back(byte);
+    for (const std::int32_t steps : {200, -77, 150, 40}) {
+      append(bytes, static_cast<std::uint32_t>(steps), 4);
+    }
+    bytes.push_back(7);
+    append(bytes, 4000, 4);
+    bytes.push_back(5);
+    append(bytes, 30'000, 4);
+    bytes.push_back(2);
+    append(bytes, 1u << kFirst, 2);
+    append(bytes, 0u - 90u, 4);
+    append(bytes, 95, 2);
+    bytes.push_back(9);
+    bytes.push_back(0);
+    return bytes;
+  }
+  void load(const Bytes& bytes) {
+    for (std::size_t at = 0; at < bytes.size(); at += 40) {
+      Bytes part;
+      append(part, static_cast<std::uint32_t>(at), 2);
+      append(part, static_cast<std::uint32_t>(bytes.size()), 2);
+      const std::size_t end = std::min(at + 40, bytes.size());
+      part.insert(part.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at),
+                  bytes.begin() + static_cast<std::ptrdiff_t>(end));
+      ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_PROGRAM_PUT, part));
+    }
+    const std::uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, bytes.data(), bytes.size());
+    ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_COMMIT, 0, crc));
+  }
+  void control(std::uint8_t action, std::uint8_t number = 0, std::uint32_t value = 0) {
+    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_PROGRAM, bushd_encode_program_control,
+                                bushd_program_control{action, number, value}));
+  }
+  bushd_program_state state(std::uint8_t address) {
+    bushd_program_state state{};
+    const auto reply = master_.request(address, BUSHD_MSG_PROGRAM_STATE, Bytes{});
+    EXPECT_TRUE(reply && bushd_decode_program_state(reply->payload.data(), reply->payload.size(),
+                                                    &state) == BUSHD_OK);
+    return state;
+  }
+  void expect_alike() {
+    for (const std::uint8_t motor : {kFirst, kSecond}) {
+      expect_the_same_steps(motor, steps(0, motor).size());
+      expect_the_same_times(motor);
+    }
+    const bushd_program_state expected = state(kVirtual);
+    const bushd_program_state told = state(kReal);
+    EXPECT_EQ(told.stage, expected.stage);
+    EXPECT_EQ(told.reason, expected.reason);
+    EXPECT_EQ(told.frame, expected.frame);
+    EXPECT_EQ(told.point, expected.point);
+    EXPECT_EQ(told.repeats, expected.repeats);
+    EXPECT_EQ(told.crc, expected.crc);
+    EXPECT_EQ(told.memory, expected.memory);
+    expect_the_same_reports();
+  }
+};
+BUSHD_FOR_TARGETS(ProgramScript, targets_with(BUSHD_CAN_PROGRAM));
+
+class DeniedProgram : public ProgramScript {};
+BUSHD_FOR_TARGETS(DeniedProgram, targets_without(BUSHD_CAN_PROGRAM));
+
+TEST_P(DeniedProgram, IsRefused) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {}));
+  EXPECT_EQ(master_.acknowledged(kReal, BUSHD_MSG_PROGRAM_PUT, Bytes{0, 0, 9, 0, 1}),
+            BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(master_.acknowledged(kReal, BUSHD_MSG_PROGRAM, Bytes(6)), BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(master_.acknowledged(kReal, BUSHD_MSG_PROGRAM_STATE, Bytes{}), BUSHD_E_UNKNOWN_MESSAGE);
+}
+
+TEST_P(ProgramScript, GoesOnInSilenceAsItsTwinDoes) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kFirst, kSecond}));
+  ASSERT_NO_FATAL_FAILURE(load(program(BUSHD_PROGRAM_WITHOUT_HOST)));
+  ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_RUN, 1, master_.poll(kReal).tick + 40));
+  pass_ticks(4000);
+  EXPECT_EQ(state(kReal).stage, BUSHD_PROGRAM_ENDED);
+  EXPECT_EQ(state(kReal).reason, BUSHD_PROGRAM_DONE);
+  EXPECT_EQ(state(kReal).repeats, 3u);
+  EXPECT_EQ(master_.poll(kReal).motor[kFirst].position_steps, 150 - 90);
+  EXPECT_EQ(master_.poll(kReal).motor[kSecond].position_steps, 40);
+  EXPECT_EQ(recorder_.times(1, Signal::kPositionCompare, 0, true).size(), 3u);
+  expect_alike();
+}
+
+TEST_P(ProgramScript, StopsOnRequest) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_COARSE, {kFirst, kSecond}));
+  ASSERT_NO_FATAL_FAILURE(load(program(0)));
+  ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_RUN, 1, master_.poll(kReal).tick + 40));
+  pass_ticks(40);
+  for (int ticks = 0; ticks < 140; ticks += 20) {
+    master_.poll(kReal);
+    pass_ticks(20);
+  }
+  ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_STOP));
+  pass_ticks(150);
+  EXPECT_EQ(state(kReal).stage, BUSHD_PROGRAM_ENDED);
+  EXPECT_EQ(state(kReal).reason, BUSHD_PROGRAM_STOPPED);
+  // Each was asked in a tick of its own, so what they made differs: the counts are those of the
+  // pins.
+  for (const std::uint8_t motor : {kFirst, kSecond}) {
+    std::int32_t position = 0;
+    for (const Step& step : steps(1, motor)) position += step.positive ? 1 : -1;
+    EXPECT_EQ(master_.poll(kReal).motor[motor].position_steps, position);
+  }
+}
+
+}  // namespace
+}  // namespace bushd::sim::program_test
