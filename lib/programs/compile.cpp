@@ -1,0 +1,182 @@
+#include "programs/compile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/overloaded.h"
+#include "engine/program.h"
+
+namespace bushd::programs {
+namespace {
+
+class Writer {
+ public:
+  void put(std::uint64_t value, int size) {
+    for (int i = 0; i < size; ++i) bytes_.push_back(static_cast<std::uint8_t>(value >> 8 * i));
+  }
+  std::vector<std::uint8_t> take() { return std::move(bytes_); }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+class Compiler {
+ public:
+  Compiler(const Program& program, const McuPlace& mcu, std::span<const MotorPlace> motors)
+      : program_(program), mcu_(mcu), motors_(motors), by_output_(motors.size()) {
+    std::iota(by_output_.begin(), by_output_.end(), std::size_t{0});
+    std::ranges::sort(by_output_, {}, [&](std::size_t i) { return motors_[i].output; });
+  }
+
+  Result<std::vector<std::uint8_t>> compile() {
+    head();
+    for (const Frame& frame : program_.frames) {
+      const auto put = std::visit(Overloaded{[&](const Move& move) { return put_move(move); },
+                                             [&](const Line& line) { return put_line(line); },
+                                             [&](const auto& other) {
+                                               put_other(other);
+                                               return Result<void>();
+                                             }},
+                                  frame.what);
+      if (!put) return fail(frame.place + ": " + put.error().text());
+    }
+    out_.put(BUSHD_PROGRAM_END, 1);
+    std::vector<std::uint8_t> bytes = out_.take();
+    if (bytes.size() <= mcu_.memory) return bytes;
+    return fail("the program has " + std::to_string(bytes.size()) + " bytes, but " + mcu_.name +
+                " has memory for " + std::to_string(mcu_.memory) +
+                ": use fewer points or frames, or repeat them");
+  }
+
+ private:
+  void head() {
+    out_.put(BUSHD_PROGRAM_FORMAT, 1);
+    out_.put(program_.without_host ? BUSHD_PROGRAM_WITHOUT_HOST : 0, 1);
+    unsigned mask = 0;
+    for (const MotorPlace& motor : motors_) mask |= 1u << motor.output;
+    out_.put(mask, 2);
+    for (const std::size_t i : by_output_) {
+      out_.put(motors_[i].bank, 1);
+      out_.put(static_cast<std::uint32_t>(motors_[i].least_steps), 4);
+      out_.put(static_cast<std::uint32_t>(motors_[i].most_steps), 4);
+    }
+  }
+
+  Result<std::int32_t> steps_of(std::size_t i, double value, bool relative) const {
+    const MotorPlace& motor = motors_[i];
+    const units::Coordinates plain;
+    const units::Coordinates& scale = program_.steps ? plain : motor.coordinates;
+    const auto steps = relative ? scale.steps_of_distance(value) : scale.steps_of_user(value);
+    if (!steps) return fail("motor \"" + motor.name + "\": " + steps.error().message);
+    if (program_.steps && static_cast<double>(*steps) != value) {
+      return fail("motor \"" + motor.name + "\": not a whole number of steps; allowed: whole ones");
+    }
+    return static_cast<std::int32_t>(*steps);
+  }
+
+  // So many time units that no step comes sooner than the motor's limit and this speed allow.
+  Result<std::uint16_t> delay_of(std::size_t i, std::optional<double> speed,
+                                 std::uint32_t unit_ns) const {
+    const MotorPlace& motor = motors_[i];
+    std::uint64_t delay = (motor.shortest_delay_ns + unit_ns - 1) / unit_ns;
+    if (speed) {
+      const units::Coordinates plain;
+      const auto of_speed = (program_.steps ? plain : motor.coordinates).delay_at(*speed, unit_ns);
+      if (!of_speed) return fail("motor \"" + motor.name + "\": " + of_speed.error().message);
+      delay = std::max(delay, *of_speed);
+    }
+    if (delay <= UINT16_MAX) return static_cast<std::uint16_t>(delay);
+    return fail("motor \"" + motor.name + "\": a step of " + std::to_string(delay) +
+                " time units of its table, but a program has delays up to 65535: use a higher "
+                "speed, or a table with a longer time unit");
+  }
+
+  unsigned mask_of(const Point& point) const {
+    unsigned mask = 0;
+    for (std::size_t i = 0; i < point.size(); ++i) {
+      if (point[i]) mask |= 1u << motors_[i].output;
+    }
+    return mask;
+  }
+
+  Result<void> put_move(const Move& move) {
+    out_.put(move.relative ? BUSHD_PROGRAM_MOVE_BY : BUSHD_PROGRAM_MOVE_TO, 1);
+    out_.put(mask_of(move.to), 2);
+    for (const std::size_t i : by_output_) {
+      if (!move.to[i]) continue;
+      const auto steps = steps_of(i, *move.to[i], move.relative);
+      if (!steps) return fail(steps.error());
+      const auto delay = delay_of(i, move.speed, motors_[i].table->time_unit_ns);
+      if (!delay) return fail(delay.error());
+      out_.put(static_cast<std::uint32_t>(*steps), 4);
+      out_.put(*delay, 2);
+    }
+    return {};
+  }
+
+  Result<void> put_line(const Line& line) {
+    if (!mcu_.lines) {
+      return fail(mcu_.name + " makes no lines by itself: use moves, or another MCU");
+    }
+    if (mcu_.line_table == nullptr) {
+      return fail(mcu_.name + " has no table bank left for lines: let more motors share a table");
+    }
+    std::uint16_t shortest_delay = 0;
+    for (const std::size_t i : by_output_) {
+      if (!line.points.front()[i]) continue;
+      const auto delay = delay_of(i, line.speed, mcu_.line_table->time_unit_ns);
+      if (!delay) return fail(delay.error());
+      shortest_delay = std::max(shortest_delay, *delay);
+    }
+    out_.put(line.relative ? BUSHD_PROGRAM_LINE_BY : BUSHD_PROGRAM_LINE_TO, 1);
+    out_.put(mask_of(line.points.front()), 2);
+    out_.put(mcu_.line_bank, 1);
+    out_.put(shortest_delay, 2);
+    out_.put(line.points.size(), 2);
+    for (const Point& point : line.points) {
+      for (const std::size_t i : by_output_) {
+        if (!point[i]) continue;
+        const auto steps = steps_of(i, *point[i], line.relative);
+        if (!steps) return fail(steps.error());
+        out_.put(static_cast<std::uint32_t>(*steps), 4);
+      }
+    }
+    return {};
+  }
+
+  void put_other(const Wait& wait) {
+    out_.put(BUSHD_PROGRAM_WAIT, 1);
+    out_.put(wait.us, 4);
+  }
+  void put_other(const WaitInput& wait) {
+    out_.put(BUSHD_PROGRAM_WAIT_INPUT, 1);
+    out_.put(wait.input, 1);
+    out_.put(wait.active ? 1 : 0, 1);
+    out_.put(wait.longest_us, 4);
+  }
+  void put_other(const Pulse& pulse) {
+    out_.put(BUSHD_PROGRAM_PULSE, 1);
+    out_.put(pulse.us, 4);
+  }
+  void put_other(const Repeat& repeat) {
+    out_.put(BUSHD_PROGRAM_REPEAT, 1);
+    out_.put(repeat.count, 2);
+  }
+  void put_other(const Next&) { out_.put(BUSHD_PROGRAM_NEXT, 1); }
+
+  const Program& program_;
+  const McuPlace& mcu_;
+  std::span<const MotorPlace> motors_;
+  std::vector<std::size_t> by_output_;
+  Writer out_;
+};
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> compile(const Program& program, const McuPlace& mcu,
+                                          std::span<const MotorPlace> motors) {
+  return Compiler(program, mcu, motors).compile();
+}
+
+}  // namespace bushd::programs

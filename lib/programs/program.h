@@ -1,0 +1,87 @@
+// A program as a person writes it: frames for motors of one MCU, in a TOML file.
+//
+//     motors = ["theta", "x"]        # of one MCU; the order of numbers below
+//     without_host = false           # true: it goes on when no host is heard
+//     unit = "user"                  # of positions: "user", or "steps"
+//
+//     [[frame]]
+//     move_to = [10.5, -2]           # or { x = -2 }: one of them
+//     speed = 3                      # user units or steps per s: none of them is faster
+//     [[frame]]
+//     repeat = 3                     # the frames until next; 0: without end
+//     [[frame]]
+//     line_by = [[1, 0], [0, 1]]     # points; or a file of columns: line_to = "points.csv"
+//     [[frame]]
+//     pulse_us = 50                  # at the position compare output
+//     [[frame]]
+//     wait_s = 0.5
+//     [[frame]]
+//     wait_input = 3                 # of a motor; "emergency", "forward", "reverse", "trigger"
+//     active = true                  # false: until it is not
+//     longest_s = 10                 # left out: for ever
+//     [[frame]]
+//     next = true
+//
+// END is what the file's end is.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/result.h"
+
+namespace bushd::programs {
+
+// Positions or distances; none: this motor does not take part.
+using Point = std::vector<std::optional<double>>;
+
+struct Move {
+  bool relative = false;
+  Point to;
+  std::optional<double> speed = {};
+};
+// All points have the same motors.
+struct Line {
+  bool relative = false;
+  std::vector<Point> points;
+  std::optional<double> speed = {};
+};
+struct Wait {
+  std::uint32_t us = 0;
+};
+struct WaitInput {
+  std::uint8_t input = 0;  // as in the MCU (engine/program.h)
+  bool active = true;
+  std::uint32_t longest_us = 0;  // 0: for ever
+};
+struct Pulse {
+  std::uint32_t us = 0;
+};
+struct Repeat {
+  std::uint16_t count = 0;  // 0: without end
+};
+struct Next {};
+
+struct Frame {
+  std::variant<Move, Line, Wait, WaitInput, Pulse, Repeat, Next> what;
+  std::string place{};  // "scan.toml:7", for refusals
+};
+
+struct Program {
+  std::vector<std::string> motors;
+  bool without_host = false;
+  bool steps = false;  // positions are steps, not user units
+  std::vector<Frame> frames;
+};
+
+// Reads a file of points that the text names, relative to wherever the caller keeps such files.
+using ReadPoints = std::function<Result<std::string>(const std::string& file)>;
+
+// `file` is what errors say. Errors name file, line, key and what is allowed.
+Result<Program> parse(std::string_view text, const std::string& file, const ReadPoints& points);
+
+}  // namespace bushd::programs

@@ -1,0 +1,199 @@
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+
+#include "engine/program.h"
+#include "engine/run.h"
+#include "programs/compile.h"
+
+namespace bushd::programs {
+namespace {
+
+constexpr std::uint32_t kBeginsInATick = 8;  // docs/protocol.md, Programs
+
+class Walk {
+ public:
+  Walk(const Program& text, const McuPlace& mcu, std::span<const MotorPlace> motors,
+       const bushd_program& program)
+      : text_(text), mcu_(mcu), motors_(motors), program_(program), at_(program.frames) {
+    for (const MotorPlace& motor : motors_) {
+      out_.motors.push_back({motor.at_steps, motor.at_steps, motor.at_steps, 0});
+    }
+    for (std::size_t i = 0; i < motors_.size(); ++i) of_output_[motors_[i].output] = i;
+  }
+
+  Result<Rehearsal> walk() {
+    for (std::size_t carried_out = 0; !ended_; ++carried_out) {
+      if (carried_out == Rehearsal::kMostFrames) {
+        out_.cut = true;
+        return out_;
+      }
+      begin();
+      const bushd_program_frame frame = bushd_next_program_frame(&program_, &at_);
+      ++frame_;
+      auto made = carry_out(frame);
+      if (!made) return fail(made.error());
+    }
+    return out_;
+  }
+
+ private:
+  struct Pass {
+    const std::uint8_t* at;
+    std::size_t frame;
+    std::uint16_t left;  // 0: without end
+  };
+
+  void later(std::uint64_t ticks) {
+    out_.ticks += ticks;
+    if (ticks != 0) begun_ = 0;
+  }
+  void begin() {
+    if (begun_ == kBeginsInATick) later(1);
+    ++begun_;
+  }
+
+  std::uint64_t ticks_of(std::uint64_t ns) const { return (ns + mcu_.tick_ns - 1) / mcu_.tick_ns; }
+  std::uint64_t ticks_of(const bushd_table& table, std::uint64_t steps,
+                         std::uint16_t shortest_delay) const {
+    bushd_run run;
+    bushd_run_start(&run, &table, static_cast<std::uint32_t>(steps), 1, shortest_delay);
+    return ticks_of(bushd_run_units_left(&run) * table.time_unit_ns);
+  }
+
+  Result<void> carry_out(const bushd_program_frame& frame) {
+    switch (frame.kind) {
+      case BUSHD_PROGRAM_END:
+        ended_ = true;
+        break;
+      case BUSHD_PROGRAM_MOVE_TO:
+      case BUSHD_PROGRAM_MOVE_BY:
+        return move(frame);
+      case BUSHD_PROGRAM_LINE_TO:
+      case BUSHD_PROGRAM_LINE_BY:
+        return line(frame);
+      case BUSHD_PROGRAM_WAIT:
+        later(ticks_of(std::uint64_t{frame.us} * 1000));
+        break;
+      case BUSHD_PROGRAM_WAIT_INPUT:
+        out_.waits_for_inputs = true;
+        break;
+      case BUSHD_PROGRAM_PULSE:
+        ++out_.pulses;
+        break;
+      case BUSHD_PROGRAM_REPEAT:
+        passes_.push_back({at_, frame_, frame.count});
+        break;
+      default:
+        end_pass();
+    }
+    return {};
+  }
+
+  // One without end is gone through once.
+  void end_pass() {
+    Pass& pass = passes_.back();
+    if (pass.left == 0) {
+      out_.endless = true;
+      ended_ = true;
+    } else if (pass.left == 1) {
+      passes_.pop_back();
+    } else {
+      --pass.left;
+      at_ = pass.at;
+      frame_ = pass.frame;
+    }
+  }
+
+  Result<std::int64_t> go(const bushd_program_frame& frame, std::uint16_t point, std::uint8_t nth,
+                          std::size_t i) {
+    Rehearsal::Way& way = out_.motors[i];
+    const std::int64_t steps = bushd_program_entry_of(&frame, point, nth).steps;
+    const std::int64_t target =
+        bushd_program_is_relative(frame.kind) ? way.end_steps + steps : steps;
+    const MotorPlace& motor = motors_[i];
+    if (target < motor.least_steps || target > motor.most_steps) {
+      const std::string of_point =
+          frame.points > 1 ? ", point " + std::to_string(point + 1) : std::string();
+      return fail(text_.frames[frame_ - 1].place + of_point + ": motor \"" + motor.name +
+                  "\" would go to " + motor.coordinates.text(target) + ", but may go from " +
+                  motor.coordinates.text(motor.least_steps) + " to " +
+                  motor.coordinates.text(motor.most_steps));
+    }
+    const std::int64_t distance = std::abs(target - way.end_steps);
+    if (distance > INT32_MAX) {
+      return fail(text_.frames[frame_ - 1].place + ": motor \"" + motor.name +
+                  "\" would go more than 2^31 - 1 steps at once");
+    }
+    way.end_steps = target;
+    way.least_steps = std::min(way.least_steps, target);
+    way.most_steps = std::max(way.most_steps, target);
+    way.edges += static_cast<std::uint64_t>(distance);
+    return distance;
+  }
+
+  template <class Act>
+  Result<void> for_motors(const bushd_program_frame& frame, std::uint16_t point, Act&& act) {
+    std::uint8_t nth = 0;
+    for (std::uint8_t output = 0; output < BUSHD_MOTORS_PER_MCU; ++output) {
+      if ((frame.motors >> output & 1u) == 0) continue;
+      const auto distance = go(frame, point, nth, of_output_[output]);
+      if (!distance) return fail(distance.error());
+      act(static_cast<std::uint64_t>(*distance), nth, of_output_[output]);
+      ++nth;
+    }
+    return {};
+  }
+
+  Result<void> move(const bushd_program_frame& frame) {
+    std::uint64_t ticks = 0;
+    auto gone = for_motors(frame, 0, [&](std::uint64_t steps, std::uint8_t nth, std::size_t i) {
+      if (steps == 0) return;
+      const std::uint16_t shortest = bushd_program_entry_of(&frame, 0, nth).shortest_delay;
+      ticks = std::max(ticks, ticks_of(*motors_[i].table, steps, shortest));
+    });
+    if (gone) later(ticks);
+    return gone;
+  }
+
+  Result<void> line(const bushd_program_frame& frame) {
+    for (std::uint16_t point = 0; point < frame.points; ++point) {
+      if (point != 0) begin();
+      std::uint64_t longest = 0;
+      auto gone = for_motors(frame, point, [&](std::uint64_t steps, std::uint8_t, std::size_t) {
+        longest = std::max(longest, steps);
+      });
+      if (!gone) return gone;
+      if (longest != 0) later(ticks_of(*mcu_.line_table, longest, frame.shortest_delay));
+    }
+    return {};
+  }
+
+  const Program& text_;
+  const McuPlace& mcu_;
+  std::span<const MotorPlace> motors_;
+  const bushd_program& program_;
+  const std::uint8_t* at_;
+  std::array<std::size_t, BUSHD_MOTORS_PER_MCU> of_output_{};
+  std::size_t frame_ = 0;    // frames begun, of the text
+  std::uint32_t begun_ = 0;  // in this tick
+  bool ended_ = false;
+  std::vector<Pass> passes_;
+  Rehearsal out_;
+};
+
+}  // namespace
+
+Result<Rehearsal> rehearse(const Program& text, const McuPlace& mcu,
+                           std::span<const MotorPlace> motors,
+                           std::span<const std::uint8_t> bytes) {
+  bushd_program program;
+  if (bushd_program_check(bytes.data(), bytes.size(), UINT16_MAX, &program) != BUSHD_OK) {
+    return fail("this is no program; compile it anew");
+  }
+  auto rehearsal = Walk(text, mcu, motors, program).walk();
+  if (rehearsal) rehearsal->bytes = bytes.size();
+  return rehearsal;
+}
+
+}  // namespace bushd::programs
