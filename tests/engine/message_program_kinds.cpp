@@ -31,54 +31,50 @@ Bytes any_program_control() {
 }  // namespace
 
 Kinds program_kinds() {
-  return {
-      {"program_put",
-       {any_program_put,
-        codec(bushd_decode_program_put, bushd_encode_program_put),
-        {},
-        true}},
-      {"program_control",
-       {any_program_control,
-        codec(bushd_decode_program_control, bushd_encode_program_control),
-        {{"action 6", set8(0, 6)},
-         {"a run without a number",
-          [](Bytes* p) {
-            (*p)[0] = BUSHD_PROGRAM_RUN;
-            (*p)[1] = 0;
-          }},
-         {"a number of what is no run",
-          [](Bytes* p) {
-            (*p)[0] = BUSHD_PROGRAM_COMMIT;
-            (*p)[1] = 1;
-          }},
-         {"a stop of a third kind",
-          [](Bytes* p) {
-            (*p)[0] = BUSHD_PROGRAM_STOP;
-            (*p)[1] = 0;
-            bushd_put_u32(&(*p)[2], 2);
-          }},
-         {"the value of what has none",
-          [](Bytes* p) {
-            (*p)[0] = BUSHD_PROGRAM_PAUSE;
-            (*p)[1] = 0;
-            bushd_put_u32(&(*p)[2], 1);
-          }}}}},
-      {"program_state",
-       {bytes_with(30,
-                   [](Bytes* p) {
-                     (*p)[0] = between<uint8_t>(0, 8);
-                     (*p)[1] = between<uint8_t>(0, 10);
-                     const auto memory = between<uint16_t>(0, UINT16_MAX);
-                     bushd_put_u16(&(*p)[6], memory);
-                     bushd_put_u16(&(*p)[8], between<uint16_t>(0, memory));
-                   }),
-        codec(bushd_decode_program_state, bushd_encode_program_state),
-        {{"stage 9", set8(0, 9)},
-         {"reason 11", set8(1, 11)},
-         {"more than it has memory", [](Bytes* p) {
-            bushd_put_u16(&(*p)[6], 7);
-            bushd_put_u16(&(*p)[8], 8);
-          }}}}}};
+  return {{"program_put",
+           {any_program_put, codec(bushd_decode_program_put, bushd_encode_program_put), {}, true}},
+          {"program_control",
+           {any_program_control,
+            codec(bushd_decode_program_control, bushd_encode_program_control),
+            {{"action 6", set8(0, 6)},
+             {"a run without a number",
+              [](Bytes* p) {
+                (*p)[0] = BUSHD_PROGRAM_RUN;
+                (*p)[1] = 0;
+              }},
+             {"a number of what is no run",
+              [](Bytes* p) {
+                (*p)[0] = BUSHD_PROGRAM_COMMIT;
+                (*p)[1] = 1;
+              }},
+             {"a stop of a third kind",
+              [](Bytes* p) {
+                (*p)[0] = BUSHD_PROGRAM_STOP;
+                (*p)[1] = 0;
+                bushd_put_u32(&(*p)[2], 2);
+              }},
+             {"the value of what has none",
+              [](Bytes* p) {
+                (*p)[0] = BUSHD_PROGRAM_PAUSE;
+                (*p)[1] = 0;
+                bushd_put_u32(&(*p)[2], 1);
+              }}}}},
+          {"program_state",
+           {bytes_with(30,
+                       [](Bytes* p) {
+                         (*p)[0] = between<uint8_t>(0, 8);
+                         (*p)[1] = between<uint8_t>(0, 10);
+                         const auto memory = between<uint16_t>(0, UINT16_MAX);
+                         bushd_put_u16(&(*p)[6], memory);
+                         bushd_put_u16(&(*p)[8], between<uint16_t>(0, memory));
+                       }),
+            codec(bushd_decode_program_state, bushd_encode_program_state),
+            {{"stage 9", set8(0, 9)},
+             {"reason 11", set8(1, 11)},
+             {"more than it has memory", [](Bytes* p) {
+                bushd_put_u16(&(*p)[6], 7);
+                bushd_put_u16(&(*p)[8], 8);
+              }}}}}};
 }
 
 }  // namespace bushd::test
