@@ -14,6 +14,12 @@ namespace {
 
 constexpr int kLastN = 31;
 constexpr const char* kMemory = "memory";  // in the store
+constexpr int kWrites = 16;                // the function
+
+bool writes(const camac::Block& block) {
+  return std::ranges::any_of(block.cycles,
+                             [](const camac::Naf& cycle) { return cycle.function == kWrites; });
+}
 
 std::string name_of(const config::Crate& crate, const config::CamacModule& module) {
   return "camac-" + std::to_string(crate.number) + "-" + std::to_string(module.station);
@@ -154,7 +160,9 @@ void Camac::request(const api::Asker& asker, const api::Camac& request) {
   result.requests = crate->crate.requests();
   crate->told &= result.requests;  // what is raised again before the next step is told again
   for (const auto& station : crate->stations) station->end_overtaken();
-  keep_memories(*crate);
+  // Positions that a motion counts are kept when it ends: each look at them would be a sync of the
+  // disk.
+  if (writes(request.block)) keep_memories(*crate);
   asker.answer(api::Completed{.outcome = api::Outcome::kDone,
                               .reason = std::to_string(result.block.tally) + " words",
                               .detail = std::move(result)});

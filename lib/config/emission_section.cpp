@@ -47,7 +47,7 @@ Result<void> read_settle(const TomlReader& reader, std::uint16_t* us) {
   return {};
 }
 
-// Places in kStepsNames, and what knows a key as a bit each.
+// Indices of kStepsNames. `known_with` has a bit for each value that allows the key.
 enum Steps : std::uint8_t { kEven, kBurst, kStaggered, kPhases };
 constexpr unsigned bit(Steps steps) {
   return 1u << steps;

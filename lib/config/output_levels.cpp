@@ -29,7 +29,7 @@ Result<void> read(const TomlReader& reader, const LevelKey& key, std::uint16_t o
   if (mcu->emission.settings.mode == BUSHD_EMISSION_PHASES) {
     return fail(reader.error(
         key.name,
-        fmt::format("says nothing where steps is \"phases\", on MCU \"{}\": its "
+        fmt::format("says nothing with steps = \"phases\", on MCU \"{}\": its "
                     "outputs switch windings. Remove it; transistors that are on when low "
                     "need inverters",
                     mcu->id)));

@@ -9,8 +9,8 @@
 //                            one DIR line is low in even slots and high in odd ones
 //     staggered   (claim 4)  pulse one after the other, dt_p apart if dt_p < dt_n = T_step / n_d,
 //                            else dt_n; n_d motors, in rising order
-//     both        (claims 11, 12)  so the motors that go left, in even slots, then those that go
-//                            right, in odd ones: T_step and dt_p are rounded up to even numbers
+//     both        (claims 11, 12)  those that go left pulse in turn in even slots, then those that
+//                            go right in odd ones; T_step and dt_p are even numbers of slots
 #ifndef BUSHD_ENGINE_EMISSION_H
 #define BUSHD_ENGINE_EMISSION_H
 

@@ -53,9 +53,9 @@ TEST(OutputLevels, AreHighOrLow) {
 TEST(OutputLevels, OfWindingsAreRefused) {
   const std::string phases = "steps = \"phases\"\n";
   EXPECT_THAT(error_of(of_mcu(phases + "step_active = \"low\"\n")),
-              HasSubstr("mcu[0].step_active: says nothing where steps is \"phases\""));
+              HasSubstr("mcu[0].step_active: says nothing with steps = \"phases\""));
   EXPECT_THAT(error_of(of_mcu(phases, of_motor("direction_active = \"low\"\n"))),
-              HasSubstr("motor[0].direction_active: says nothing where steps is \"phases\""));
+              HasSubstr("motor[0].direction_active: says nothing with steps = \"phases\""));
   EXPECT_EQ(outputs_of(of_mcu(phases + "enable_active = \"low\"\n")).enabled, BUSHD_ENABLED_LOW);
 }
 

@@ -136,7 +136,9 @@ class WebJog(BrowserTest):
         tab.mouse.up()
         # It has not been silent for so long yet that the page would not send this.
         tab.mouse.down()
-        self.wait_for_text(tab.get_by_test_id("connection"), re.compile("^silent for "))
+        self.wait_for_part(tab.get_by_test_id("jog-said"), "while held")
+        # What is older than 2 s when it comes is refused.
+        self.wait_for_text(tab.get_by_test_id("connection"), re.compile("^silent for ([2-9]|[1-9][0-9])"))
         tab.mouse.up()
 
         cable.mend()

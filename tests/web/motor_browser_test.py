@@ -47,8 +47,11 @@ class WebMotor(BrowserTest):
         tab.get_by_test_id("goto").click()
         self.start_move("b0", str(FAR))
         self.wait_until_travelled(300, "a0", "b0")
+        place = tab.get_by_test_id("ramp-mark")  # where it is in its table
+        place.wait_for(state="visible")
         tab.get_by_test_id("stop-motor").click()
         self.wait_for_text(tab.get_by_test_id("fact-state"), "at rest")
+        place.wait_for(state="hidden")
         self.wait_for_part(tab.get_by_test_id("notice").last, re.compile("move a0 stopped|stop a0 done"))
         motors = self.motors()
         self.assertEqual((motors["a0"]["moving"], motors["b0"]["moving"]), (False, True))

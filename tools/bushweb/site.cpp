@@ -273,13 +273,14 @@ void Site::close(PageId id) {
 }
 
 void Site::tick() {
-  const int turn = ++ticks_ % kTurns;
+  ticks_ = (ticks_ + 1) % kTicksPerSecond;
+  const int turn = ticks_ % kTurns;
   if (turn == 0) take_news();
   const Text still_here = alive(steady_us());
   for (const auto& [id, page] : pages_) {
     if (id % kTurns == static_cast<PageId>(turn)) tell_news(*page, still_here);
   }
-  if (ticks_ % kTicksPerSecond != 0) return;
+  if (ticks_ != 0) return;
   end_examinations();
   refresh_tokens();
   check_rights();

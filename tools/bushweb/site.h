@@ -112,8 +112,8 @@ class Site {
   };
   std::map<std::string, Examination> examinations_{};
   std::map<std::string, std::int64_t> heard_at_us_{};  // of each daemon's last state
-  int ticks_ = 0;
-  std::vector<Text> news_{};  // of the last round through all pages
+  int ticks_ = 0;                                      // of this second
+  std::vector<Text> news_{};                           // of the last round through all pages
   std::int64_t round_ = 0;
 };
 

@@ -101,12 +101,18 @@ export class RampPlot {
 
   private place(): void {
     const { plot, at } = this;
-    show(this.mark, at !== undefined);
-    if (!plot || !at) return;
+    const isShown = plot !== undefined && at !== undefined && isWithin(plot, "x", at.x) && isWithin(plot, "y", at.y);
+    show(this.mark, isShown);
+    if (!isShown) return;
     const x = plot.valToPos(at.x, "x");
     const y = plot.valToPos(at.y, "y");
     this.mark.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
   }
+}
+
+function isWithin(plot: uPlot, scale: string, value: number): boolean {
+  const { min, max } = plot.scales[scale] ?? {};
+  return min != null && max != null && min <= value && value <= max;
 }
 
 function shown(_: uPlot, value: number | null): string {

@@ -11,6 +11,7 @@ import { EditPlot } from "./edit_plot";
 
 const kCheckAfterMs = 300;
 const kShownChanges = 200;
+const kAskAgainMs = 5000;
 
 export class TablePanel {
   readonly root = el("section", { class: "panel", testid: "table-editor" });
@@ -143,6 +144,7 @@ export class TablePanel {
       this.daemon, "get table", { table: `${this.file}@${revision}` }, { quiet: true });
     if (revision !== this.compared) return; // another one has come meanwhile
     this.inService = answer?.detail.table;
+    if (answer && !this.inService) setTimeout(() => { this.compared = undefined; }, kAskAgainMs);
     this.plot.show(this.side, this.diagnostics);
     this.writeDifference();
   }
