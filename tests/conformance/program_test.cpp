@@ -29,9 +29,9 @@ class ProgramScript : public Script, public testing::WithParamInterface<Target> 
       append(bytes, 0u - 5000u, 4);
       append(bytes, 5000, 4);
     }
-    for (const std::uint8_t byte : {8, 3, 0, 3}) bytes.push_back(byte);
+    for (const std::uint8_t byte : Bytes{8, 3, 0, 3}) bytes.push_back(byte);
     append(bytes, kMotors, 2);
-    for (const std::uint8_t byte : {0, 0, 0, 2, 0}) bytes.push_back(byte);
+    for (const std::uint8_t byte : Bytes{0, 0, 0, 2, 0}) bytes.push_back(byte);
     for (const std::int32_t steps : {200, -77, 150, 40}) {
       append(bytes, static_cast<std::uint32_t>(steps), 4);
     }
