@@ -18,10 +18,10 @@ namespace {
 
 TEST(BusBudget, ByHand) {
   // 16 fine motors: 6 ticks a frame; 1 delimiter + 9 + 9 + 2 x 16 + 6 x 32 = 243 bytes every 15.36
-  // ms. Every 50 ms a poll, 10 + 1 + 5 bytes and 1 ms, and the window of a report, 10 + 72 + 96
+  // ms. Every 50 ms a poll, 10 + 1 + 5 bytes and 1 ms, and the window of a report, 10 + 57 + 96
   // bytes and 0.6 ms. A time mark: 10 + 19 bytes every 500 ms.
   const std::array<std::uint8_t, 1> one = {16};
-  const double bytes_per_s = 243 / 0.01536 + (16 + 178) / 0.05 + 29 / 0.5;
+  const double bytes_per_s = 243 / 0.01536 + (16 + 163) / 0.05 + 29 / 0.5;
   EXPECT_NEAR(bus_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one),
               bytes_per_s * 10 / 500'000 + 1.6 / 50, 1e-9);
   // Two MCUs without motors are still asked.
@@ -31,7 +31,7 @@ TEST(BusBudget, ByHand) {
   // One coarse motor: 16 ticks a frame, 1 + 9 + 9 + 2 + 16 bytes every 16 ms.
   const std::array<std::uint8_t, 1> single = {1};
   EXPECT_NEAR(bus_load(250'000, 1'000'000, BUSHD_FORMAT_COARSE, single),
-              (37 / 0.016 + (16 + 10 + 78) / 0.05 + 29 / 0.5) * 10 / 250'000 + 1.6 / 50, 1e-9);
+              (37 / 0.016 + (16 + 10 + 63) / 0.05 + 29 / 0.5) * 10 / 250'000 + 1.6 / 50, 1e-9);
 }
 
 TEST(BusBudget, GrowsWithEverythingThatCosts) {
