@@ -220,8 +220,11 @@ class Motor {
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by`: why, if nobody has asked for it.
   void stop(std::optional<std::string> ended_by = {});
-  // It moves and was stopped, and nobody has asked for that. At its target it settles.
-  void is_stopped_by_others() { moving_now().by_others = true; }
+  // It was stopped, and nobody has asked for that. At its target it settles. Nothing if the stop
+  // took its start back, so that it does not move.
+  void is_stopped_by_others() {
+    if (moves()) moving_now().by_others = true;
+  }
   // Somebody has stopped it, or paused it.
   bool stops() const { return axis_.stopping() && !is_withdrawn(); }
   // The plan is not yet what was requested, and can be changed.

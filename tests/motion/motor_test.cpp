@@ -100,6 +100,12 @@ TEST_F(MotorTest, AStopIsPlannedAtOnceAndToldWhenExecuted) {
 }
 
 // That is the MCU's own doing too, whoever has cleared the fault by then: the count is right.
+TEST_F(MotorTest, AStopThatTookTheStartBackIsNobodysStop) {
+  motor.is_stopped_by_others();
+  EXPECT_FALSE(motor.moves());
+  EXPECT_EQ(refusal(kSteps), "");
+}
+
 TEST_F(MotorTest, RunDownByAFaultThatAnotherMasterHasClearedIsNoMismatch) {
   motor.start(kSteps, kStart);
   report(kStart + 20);
