@@ -219,6 +219,10 @@ void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Reque
                  [&](const api::ArmLine& r) {
                    if (!r.while_connected || while_connected_.take(asker)) lines_.request(asker, r);
                  },
+                 [&](const api::PutProgram& r) { programs_.request(asker, r); },
+                 [&](const api::EraseProgram& r) { programs_.request(asker, r); },
+                 [&](const api::RunPrograms& r) { programs_.request(asker, r); },
+                 [&](const api::ListPrograms& r) { programs_.request(asker, r); },
              },
              request);
 }

@@ -34,6 +34,7 @@
 #include "daemon/services/pauses.h"
 #include "daemon/services/position_compare.h"
 #include "daemon/services/positions.h"
+#include "daemon/services/programs.h"
 #include "daemon/services/pseudo_axes.h"
 #include "daemon/services/state_publisher.h"
 #include "daemon/services/stops.h"
@@ -122,6 +123,7 @@ class Core {
   IdleDrivers idle_drivers_;
   HomingQueue homing_;
   Travels travels_;
+  Programs programs_;
   LocalInputs local_inputs_;
   Stops stops_;
   Jogs jogs_;

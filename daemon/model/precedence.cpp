@@ -62,7 +62,8 @@ void Precedence::note(const api::Asker& asker, const api::Request& request) {
                                 api::Arm, api::PositionCompare, api::ListTables, api::GetTable,
                                 api::SetTable, api::Confirm, api::GetHistory, api::Resume,
                                 api::Release, api::Configure, api::MoveLine, api::MovePath,
-                                api::Camac, api::Follow, api::ArmLine> auto&) {}},
+                                api::Camac, api::Follow, api::ArmLine, api::PutProgram,
+                                api::EraseProgram, api::RunPrograms, api::ListPrograms> auto&) {}},
       request);
 }
 
@@ -126,11 +127,14 @@ std::optional<Precedence::Overtaken> Precedence::overtaken(const api::Asker& ask
                         installation_.find_known(r.motors, false).motors);
           },
           // Only who lets these wait knows their motors.
-          [](const OneOf<api::MovePath, api::Follow, api::Camac> auto&) { return Answer(); },
+          [](const OneOf<api::MovePath, api::Follow, api::Camac, api::RunPrograms> auto&) {
+            return Answer();
+          },
           [](const OneOf<api::Stop, api::EmergencyStop, api::Pause, api::Hold, api::Disarm,
                          api::Enable, api::Disable, api::SetPosition, api::UseTable,
                          api::ReloadTables, api::PositionCompare, api::ListTables, api::GetTable,
-                         api::SetTable, api::Confirm, api::GetHistory, api::Configure> auto&) {
+                         api::SetTable, api::Confirm, api::GetHistory, api::Configure,
+                         api::PutProgram, api::EraseProgram, api::ListPrograms> auto&) {
             return Answer();
           }},
       request);

@@ -62,6 +62,17 @@ std::size_t memory_of(const CamacResult& result) {
   return sizeof result + result.block.responses.capacity() * sizeof(camac::Response);
 }
 
+std::size_t memory_of(const ProgramList& list) {
+  std::size_t bytes = sizeof list + list.programs.capacity() * sizeof(ProgramEntry);
+  for (const ProgramEntry& entry : list.programs) {
+    bytes += memory_of(entry.mcu) + memory_of(entry.program) + memory_of(entry.checksum) +
+             memory_of(entry.stage) + memory_of(entry.reason) +
+             entry.motors.capacity() * sizeof(ProgramEntry::Motor);
+    for (const ProgramEntry::Motor& motor : entry.motors) bytes += memory_of(motor.motor);
+  }
+  return bytes;
+}
+
 std::size_t memory_of(const TableFile& file) {
   const words::TableContent& content = file.content;
   std::size_t codes = content.accel.capacity();

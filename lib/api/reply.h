@@ -202,6 +202,72 @@ struct CamacResult {
   friend bool operator==(const CamacResult&, const CamacResult&) = default;
 };
 
+// The program of an MCU.
+struct ProgramEntry {
+  // What it does to a motor, by a walk through its frames from where the motor stands; of a repeat
+  // without end one pass. Of a program that the daemon does not know only the name.
+  struct Motor {
+    std::string motor{};
+    std::int64_t least_steps = 0;  // where it comes to, its beginning included
+    std::int64_t most_steps = 0;
+    std::int64_t end_steps = 0;
+    std::int64_t edges = 0;  // steps that it makes
+    static void fields(auto& self, auto& visit) {
+      visit("motor", self.motor);
+      visit("least_steps", self.least_steps);
+      visit("most_steps", self.most_steps);
+      visit("end_steps", self.end_steps);
+      visit("edges", self.edges);
+    }
+    friend bool operator==(const Motor&, const Motor&) = default;
+  };
+  std::string mcu{};
+  std::string program{};   // its name; "": none, or one that was put by another daemon
+  std::string checksum{};  // CRC-32 of its bytes, 8 hexadecimal digits; "": the MCU has none
+  std::string stage{};   // none, loading, loaded, waits, runs, pauses, paused, ends, ended, unknown
+  std::string reason{};  // why its last run has ended, in words; "": it has not
+  bool without_host = false;
+  std::int32_t bytes = 0;   // of it, or of what has arrived of it
+  std::int32_t memory = 0;  // bytes that one may have
+  std::int32_t frame = 0;   // that is carried out, or was last, from 1; 0: none yet
+  std::int32_t point = 0;   // of it, if it is a line, from 1
+  std::int64_t repeats = 0;
+  // The walk; of a program that the daemon knows.
+  std::int64_t duration_us = 0;  // without the time in which it waits for inputs
+  std::int64_t pulses = 0;
+  bool endless = false;  // it repeats without end: the rest is of one pass
+  bool waits_for_inputs = false;
+  bool cut = false;  // there are more frames to carry out than a walk has
+  std::vector<Motor> motors{};
+  static void fields(auto& self, auto& visit) {
+    visit("mcu", self.mcu);
+    visit("program", self.program);
+    visit("checksum", self.checksum);
+    visit("stage", self.stage);
+    visit("reason", self.reason);
+    visit("without_host", self.without_host);
+    visit("bytes", self.bytes);
+    visit("memory", self.memory);
+    visit("frame", self.frame);
+    visit("point", self.point);
+    visit("repeats", self.repeats);
+    visit("duration_us", self.duration_us);
+    visit("pulses", self.pulses);
+    visit("endless", self.endless);
+    visit("waits_for_inputs", self.waits_for_inputs);
+    visit("cut", self.cut);
+    visit.list("motor_count", "motors", self.motors);
+  }
+  friend bool operator==(const ProgramEntry&, const ProgramEntry&) = default;
+};
+struct ProgramList {
+  std::vector<ProgramEntry> programs{};
+  static void fields(auto& self, auto& visit) {
+    visit.list("program_count", "programs", self.programs);
+  }
+  friend bool operator==(const ProgramList&, const ProgramList&) = default;
+};
+
 struct Accepted {};
 
 struct Refused {
@@ -209,10 +275,10 @@ struct Refused {
 };
 
 // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
-// table requests; a history; settings; of a crate. (Its copies are compiled once, not in every file
-// that has one. So are those of Reply and Request.)
+// table requests; a history; settings; of a crate; programs. (Its copies are compiled once, not in
+// every file that has one. So are those of Reply and Request.)
 struct Detail : std::variant<std::monostate, std::vector<MotorResult>, MovePlan, TableList,
-                             TableFile, MotionHistory, Configuration, CamacResult> {
+                             TableFile, MotionHistory, Configuration, CamacResult, ProgramList> {
   using variant::variant;
   Detail();
   Detail(const Detail&);

@@ -366,11 +366,67 @@ struct Camac {
   }
 };
 
-struct Request
-    : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults, UseTable,
-                   ReloadTables, Home, Arm, Disarm, PositionCompare, ListTables, GetTable, SetTable,
-                   Confirm, GetHistory, Configure, Jog, Pause, Resume, Hold, Release, MoveLine,
-                   Camac, MovePath, Follow, ArmLine> {
+// A program for the MCU of its motors (docs/programs.md), in place of the one that this MCU has. It
+// is checked as things are, then sent; nothing of it runs before it has arrived whole. Refused
+// while a program of that MCU is under way. Result: ProgramList with this one.
+struct PutProgram {
+  static constexpr std::size_t kMostBytes = 256 * 1024;  // of all its texts
+
+  struct Points {
+    std::string file{};  // as the text names it
+    std::string text{};
+    static void fields(auto& self, auto& visit) {
+      visit("file", self.file);
+      visit("text", self.text);
+    }
+    friend bool operator==(const Points&, const Points&) = default;
+  };
+  std::string program{};  // its name: 1 to 64 of a-z A-Z 0-9 . _ -
+  std::string text{};     // TOML
+  std::vector<Points> points{};
+  bool dry_run = false;  // it is checked, and what it would do is told
+
+  static constexpr std::string_view kName = "put program";
+  static void fields(auto& self, auto& visit) {
+    visit("program", self.program);
+    visit("text", self.text);
+    visit.list("file_count", "points", self.points);
+    visit("dry_run", self.dry_run);
+  }
+};
+
+// The program goes out of the memory of its MCU. Refused while it is under way.
+struct EraseProgram {
+  std::string program{};
+
+  static constexpr std::string_view kName = "erase program";
+  static void fields(auto& self, auto& visit) { visit("program", self.program); }
+};
+
+// These programs, of MCUs of one bus, begin with the same tick, or none does. Their motors are at
+// rest. Stop, pause and resume of one of its motors are for the whole program. Result: as of Move;
+// the reason names the frame at which each has ended.
+struct RunPrograms {
+  std::vector<std::string> programs{};  // at least one, none twice
+
+  static constexpr std::string_view kName = "run programs";
+  static void fields(auto& self, auto& visit) {
+    visit.list("program_count", "programs", self.programs);
+  }
+};
+
+// Result: ProgramList of all MCUs that can have one.
+struct ListPrograms {
+  static constexpr std::string_view kName = "list programs";
+  static constexpr bool is_repeatable() { return true; }
+  static void fields(auto& /*self*/, auto& /*visit*/) {}
+};
+
+struct Request : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,
+                              UseTable, ReloadTables, Home, Arm, Disarm, PositionCompare,
+                              ListTables, GetTable, SetTable, Confirm, GetHistory, Configure, Jog,
+                              Pause, Resume, Hold, Release, MoveLine, Camac, MovePath, Follow,
+                              ArmLine, PutProgram, EraseProgram, RunPrograms, ListPrograms> {
   using variant::variant;
   Request();
   Request(const Request&);

@@ -90,7 +90,7 @@ struct TableAnswer {
   }
 };
 
-// Channels HISTORY_REPLY, CONFIGURATION_REPLY and CAMAC_REPLY.
+// Channels HISTORY_REPLY, CONFIGURATION_REPLY, CAMAC_REPLY and PROGRAM_REPLY.
 template <class Content>
 struct AnswerWith {
   ReplyHeader reply;

@@ -46,6 +46,9 @@ auto& list_of(api::Configuration& configuration) {
 auto& list_of(api::CamacResult& result) {
   return result.block.responses;
 }
+auto& list_of(api::ProgramList& list) {
+  return list.programs;
+}
 
 // A reply of 2048 motors has three; who says more is not to be believed.
 constexpr std::size_t kMaxParts = 64;
@@ -158,7 +161,8 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
           [&](const api::Configuration& configuration) {
             return in_parts("CONFIGURATION_REPLY", configuration, with);
           },
-          [&](const api::CamacResult& result) { return in_parts("CAMAC_REPLY", result, with); }},
+          [&](const api::CamacResult& result) { return in_parts("CAMAC_REPLY", result, with); },
+          [&](const api::ProgramList& list) { return in_parts("PROGRAM_REPLY", list, with); }},
       completed->detail);
 }
 
@@ -170,6 +174,7 @@ std::optional<DaemonMessage> decode_reply(std::string_view channel, Payload payl
     return decode_answer<AnswerWith<api::Configuration>>(payload);
   }
   if (channel == "CAMAC_REPLY") return decode_answer<AnswerWith<api::CamacResult>>(payload);
+  if (channel == "PROGRAM_REPLY") return decode_answer<AnswerWith<api::ProgramList>>(payload);
   return std::nullopt;
 }
 

@@ -116,7 +116,8 @@ ordered_json detail_json(const api::Detail& detail) {
           [](const api::Configuration& configuration) -> ordered_json {
             return {{"configuration", bushd::json_of(configuration)}};
           },
-          [](const api::CamacResult& /*of programs*/) -> ordered_json { return nullptr; }},
+          [](const api::CamacResult& /*of programs*/) -> ordered_json { return nullptr; },
+          [](const api::ProgramList& /*not shown yet*/) -> ordered_json { return nullptr; }},
       static_cast<const api::Detail::variant&>(detail));
 }
 
