@@ -57,6 +57,7 @@ void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
       [&](const link::PositionUncertain& event) {
         is_uncertain(mcu_of(event), Output{event.motor});
       },
+      [](const link::ProgramReported&) {},
       [&](const link::ReplacementFailed& event) { replans(now_us, mcu_of(event), event.motors); }};
   for (const link::Event& event : bus.master.take_events()) std::visit(handle, event);
 }

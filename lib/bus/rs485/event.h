@@ -50,7 +50,13 @@ struct PositionUncertain {
   std::uint8_t motor;
 };
 
+// ProgramView is new: an answer to PROGRAM_STATE, progress or the end of an upload. Also of an MCU
+// that is still connecting.
+struct ProgramReported {
+  McuIndex mcu;
+};
+
 using Event = std::variant<McuOnline, McuOffline, McuReported, ReplacementFailed, RequestRefused,
-                           StartMissed, StartUnconfirmed, PositionUncertain>;
+                           StartMissed, StartUnconfirmed, PositionUncertain, ProgramReported>;
 
 }  // namespace bushd::link

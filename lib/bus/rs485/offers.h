@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "bus/rs485/line_pace.h"
 #include "bus/rs485/mcu_index.h"
@@ -161,6 +162,49 @@ class PacedLines {
                              LinePace::Place place) = 0;
 };
 
+// What is known of the program of an MCU.
+struct ProgramView {
+  // PROGRAM_STATE has been answered since the MCU answered last after a silence or boot.
+  bool known = false;
+  bushd_program_state state{};  // the last answer
+  std::int64_t heard_us = 0;    // when it came
+  // The upload that is under way, or the last one.
+  std::size_t put = 0;    // bytes that the MCU has taken
+  std::size_t total = 0;  // 0: none has been asked for since the MCU was found
+  bool uploading = false;
+  std::uint8_t refused = BUSHD_OK;  // bushd_status with which the MCU ended it
+
+  // It has motors: from when RUN is taken until they rest.
+  bool under_way() const {
+    return state.stage >= BUSHD_PROGRAM_WAITS && state.stage <= BUSHD_PROGRAM_ENDS;
+  }
+};
+
+// BUSHD_CAN_PROGRAM: a program in the memory of an MCU (engine/program.h), which moves its motors
+// by itself. ProgramReported says that its view is new.
+class Programs {
+ public:
+  virtual ~Programs() = default;
+  virtual const ProgramView& program(McuIndex mcu) const = 0;
+  // In place of the one before: parts, then the commit; nothing runs before that. It is sent when
+  // nothing else is asked of the MCU, which is not busy() with it. Preconditions: the MCU is
+  // online, none of its programs is under way, the size is as bushd_program_check allows.
+  virtual void put_program(McuIndex mcu, std::vector<std::uint8_t> bytes) = 0;
+  virtual void erase_program(McuIndex mcu) = 0;  // also ends an upload
+  // The earliest tick at which programs of these MCUs can begin together.
+  virtual Tick earliest_program_start(std::int64_t now_us,
+                                      std::span<const McuIndex> mcus) const = 0;
+  // Its motors are the program's from `start` on. It is taken or refused (RequestRefused) before
+  // that tick. Preconditions: the MCU is online, nothing is being uploaded, the number is 1..255
+  // and not that of the state.
+  virtual void run_program(McuIndex mcu, std::uint8_t number, Tick start) = 0;
+  // What was asked of the program before and has not been sent is discarded, and not told of. Also
+  // for an MCU that is still connecting.
+  virtual void stop_program(McuIndex mcu, bushd_stop_mode mode) = 0;
+  virtual void pause_program(McuIndex mcu) = 0;
+  virtual void resume_program(McuIndex mcu) = 0;
+};
+
 struct Offers {
   // Every displacement of every tick reaches the motor in its tick: lines, paths and trajectories
   // need that. Where it is no, a motor makes runs of its table, at least as slow as the table says,
@@ -179,6 +223,7 @@ struct Offers {
   LocalInputs* local_inputs = nullptr;
   PositionCompare* position_compare = nullptr;
   PacedLines* paced_lines = nullptr;
+  Programs* programs = nullptr;
 };
 
 }  // namespace bushd::link
