@@ -36,6 +36,7 @@ typedef struct bushd_program_control {
   uint8_t number;  // of RUN: 1..255; else 0
   uint32_t value;  // of actions that have none: 0
 } bushd_program_control;
+#define BUSHD_PROGRAM_CONTROL_SIZE 6u
 
 typedef enum bushd_program_stage {
   BUSHD_PROGRAM_NONE = 0,
@@ -79,6 +80,7 @@ typedef struct bushd_program_state {
   uint32_t start_tick;  // of the last run
   uint32_t tick;        // the present one
 } bushd_program_state;
+#define BUSHD_PROGRAM_STATE_SIZE 30u
 
 size_t bushd_encode_program_put(const bushd_program_put* message, uint8_t* payload);
 bushd_status bushd_decode_program_put(const uint8_t* payload, size_t size,

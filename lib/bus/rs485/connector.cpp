@@ -58,7 +58,7 @@ bool Connector::reconfigure(McuIndex mcu, McuSetup setup) {
   record.view.phase = McuPhase::kConnecting;
   record.view.detail = "being configured";
   record.poll_wanted = true;
-  links_[mcu].setup_written = false;
+  links_[mcu].setup_written = links_[mcu].adopts = links_[mcu].left_alone = false;
   links_[mcu].queue.discard_setup();
   links_[mcu].scratch.clear();
   return true;
@@ -101,6 +101,7 @@ void Connector::bind_to_stop(McuIndex mcu, bushd_stop_mode mode) {
   link.stop_mode = mode;
   link.clearing = false;
   link.queue.discard_clearing();
+  link.program.discard_motion();
   link.stop_now = mcus_[mcu].view.phase == McuPhase::kConnecting;
 }
 
@@ -180,19 +181,28 @@ bool Connector::send_stop(std::int64_t now_us) {
   return false;
 }
 
-const SetupQueue::Request* Connector::next_request(McuIndex mcu) const {
-  const SetupQueue& queue = links_[mcu].queue;
-  return queue.empty() ? nullptr : &queue.front();
+const SetupQueue::Request* Connector::next_request(std::int64_t now_us, McuIndex mcu) {
+  Link& link = links_[mcu];
+  if (!link.queue.empty()) return &link.queue.front();
+  return link.program.has_request(now_us) ? &link.program.ask(now_us) : nullptr;
 }
 
 const SetupQueue::Request* Connector::next_part(McuIndex mcu) {
-  Scratch& scratch = links_[mcu].scratch;
-  return scratch.under_way() ? &scratch.ask() : nullptr;
+  Link& link = links_[mcu];
+  if (link.scratch.under_way()) return &link.scratch.ask();
+  return link.program.has_part() ? &link.program.ask_part() : nullptr;
 }
 
 bool Connector::send_request(std::int64_t now_us) {
-  return send_first(now_us, turn_, [this](McuIndex mcu) { return next_request(mcu); }) ||
+  return send_first(now_us, turn_, [&](McuIndex mcu) { return next_request(now_us, mcu); }) ||
          send_first(now_us, part_turn_, [this](McuIndex mcu) { return next_part(mcu); });
+}
+
+bool Connector::send_program_stop(std::int64_t now_us) {
+  return send_first(now_us, program_turn_, [&](McuIndex mcu) -> const SetupQueue::Request* {
+    ProgramLink& program = links_[mcu].program;
+    return program.is_urgent(now_us) ? &program.ask(now_us) : nullptr;
+  });
 }
 
 template <class Next>
@@ -260,12 +270,13 @@ void Connector::take(std::int64_t now_us, McuIndex mcu, const bushd_identity& id
   link.stop_now = record.view.bound_by_stop;
   link.queue.clear();
   link.scratch.clear();
+  link.adopts = link.left_alone = false;
   link.identify_attempts = 0;
+  ask_for_program(mcu);
   listener_.found(now_us, mcu);
 }
 
-// What comes after depends on the tables that the MCU has already.
-void Connector::write_setup(McuIndex mcu) {
+void Connector::write_configuration(McuIndex mcu) {
   const std::int64_t comm_timeout_ticks =
       (kCommTimeoutUs * 1000 + setup_.tick_ns - 1) / setup_.tick_ns;
   const McuRecord& record = mcus_[mcu];
@@ -283,6 +294,13 @@ void Connector::write_setup(McuIndex mcu) {
     queue.outputs(record.setup.outputs);
   }
   if (phases) queue.emission(record.setup.emission.settings);
+}
+
+// What comes after depends on the tables that the MCU has already.
+void Connector::write_setup(McuIndex mcu) {
+  write_configuration(mcu);
+  const McuRecord& record = mcus_[mcu];
+  SetupQueue& queue = links_[mcu].queue;
   queue.inputs(record.setup.inputs);
   for (const bushd_motor_inputs& one : record.setup.motor_inputs) queue.motor_inputs(one);
   // An MCU may have kept others.
@@ -314,6 +332,7 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
   const McuRecord& record = mcus_[mcu];
   SetupQueue& queue = links_[mcu].queue;
   if (!queue.done(BUSHD_MSG_TABLES)) return;
+  if (links_[mcu].adopts) return adopt_tables(mcu, held, may_clear);
   if (!holds_its_tables(mcu, held)) {
     queue.control({.actions = BUSHD_CONTROL_FORGET_TABLES, .faults = 0});
     for (std::uint8_t bank = 0; bank < record.setup.tables.size(); ++bank) {
@@ -343,6 +362,7 @@ std::uint8_t Connector::first_actions(McuIndex mcu, bool may_clear) const {
 void Connector::acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t type,
                              std::uint8_t status) {
   McuRecord& record = mcus_[mcu];
+  if (ProgramLink::is_about_programs(type)) return program_acknowledged(mcu, type, status);
   // Tables of motors are sent before it is online.
   if (record.view.phase == McuPhase::kOnline && is_part_of_table(type)) {
     return links_[mcu].scratch.acknowledged(type, status);
@@ -355,6 +375,7 @@ void Connector::acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t typ
     listener_.refused(mcu, type, status);
     return;
   }
+  if (links_[mcu].adopts) return leave_alone(mcu);
   give_up(mcu,
           "refused its configuration: " +
               refusal_text(setup_, record.setup, record.view.identity, type, status),
@@ -383,6 +404,8 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
     link.stop_now = mcus_[mcu].poll_wanted = true;
     return;
   }
+  if (!knows_program(mcu)) return;
+  if (goes_on_with_program(mcu)) return follow_program(mcu, in_step);
   // Tables are for motors at rest, and one may still be ramping down from before. But a table run
   // of an earlier master could go on for hours.
   if (!link.setup_written && report.moving == 0) {
@@ -393,16 +416,21 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
   } else if (!link.setup_written || !link.queue.empty() || !in_step) {
     return;
   } else if (report.state != BUSHD_STATE_BUSY || !*link.powered || !enables_) {
-    view.phase = McuPhase::kOnline;
-    view.detail.clear();
-    link.was_online = link.taken_over = false;
-    if (link.not_local != link.not_local_told) tell_local(mcu);
-    listener_.came_online(mcu);
+    go_online(mcu);
   } else if ((report.flags & BUSHD_FLAG_CONFIGURED) != 0 &&
              (report.flags & BUSHD_FLAG_ENABLED) == 0) {
     // It had a fault with which it must not be enabled, and has it no longer.
     give_up(mcu, "has not enabled its drivers", now_us + kRetryUs);
   }
+}
+
+void Connector::go_online(McuIndex mcu) {
+  Link& link = links_[mcu];
+  mcus_[mcu].view.phase = McuPhase::kOnline;
+  mcus_[mcu].view.detail.clear();
+  link.was_online = link.taken_over = false;
+  if (link.not_local != link.not_local_told) tell_local(mcu);
+  listener_.came_online(mcu);
 }
 
 void Connector::give_up(McuIndex mcu, const std::string& cause, std::int64_t retry_due_us) {
@@ -415,6 +443,7 @@ void Connector::give_up(McuIndex mcu, const std::string& cause, std::int64_t ret
   links_[mcu].identify_attempts = 0;
   links_[mcu].queue.clear();
   links_[mcu].scratch.clear();
+  links_[mcu].program.clear();
   listener_.went_offline(mcu, was_online);
 }
 

@@ -11,6 +11,7 @@
 
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/mcu_record.h"
+#include "bus/rs485/program_link.h"
 #include "bus/rs485/scratch.h"
 #include "bus/rs485/setup_queue.h"
 #include "bus/rs485/transactions.h"
@@ -31,6 +32,8 @@ class Connector {
     virtual void went_offline(McuIndex mcu, bool was_online) = 0;
     // The MCU, online, refused a request.
     virtual void refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) = 0;
+    // Its ProgramView is new.
+    virtual void program_reported(McuIndex mcu) = 0;
   };
 
   // All of them outlive it.
@@ -60,11 +63,16 @@ class Connector {
   // Its requests are sent when there are no others.
   Scratch& scratch(McuIndex mcu) { return links_[mcu].scratch; }
   const Scratch& scratch(McuIndex mcu) const { return links_[mcu].scratch; }
+  // Its orders are sent after the requests of the queue, its parts as those of `scratch`.
+  ProgramLink& program(McuIndex mcu) { return links_[mcu].program; }
+  const ProgramLink& program(McuIndex mcu) const { return links_[mcu].program; }
 
   bool send_due_identify(std::int64_t now_us);
   // One that is bound by an emergency stop has it latched, and table runs of an earlier master are
   // ramped down, before the setup.
   bool send_stop(std::int64_t now_us);
+  // An order that takes motion away from a program.
+  bool send_program_stop(std::int64_t now_us);
   // By turns: one that does not answer its request keeps nobody else waiting.
   bool send_request(std::int64_t now_us);
   // When the next MCU is to be looked for. Precondition: it is offline.
@@ -77,17 +85,32 @@ class Connector {
   // `may_clear`: no emergency stop is under way.
   void tables(McuIndex mcu, const bushd_tables& held, bool may_clear);
   void acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t type, std::uint8_t status);
+  void program_told(std::int64_t now_us, McuIndex mcu, const bushd_program_state& state);
+  void program_acknowledged(McuIndex mcu, std::uint8_t type, std::uint8_t status);
+  // Programs that are to begin within `margin` and that their MCUs have not taken do not begin.
+  void end_late_runs(Tick now, Tick margin);
   // The record of an MCU has a new report: whether a stop binds it.
   void follow_stop(McuIndex mcu);
   // Then, of one that connects. `in_step`: with bus time.
   void follow_report(std::int64_t now_us, McuIndex mcu, bool in_step);
+  // An MCU that is online was found with a program under way, which has ended: reconfigure() is to
+  // tell it all of its setup.
+  bool has_more_to_tell(McuIndex mcu) const;
+  // Its program has motors.
+  bool runs_program(McuIndex mcu) const;
   // The MCU has disabled its drivers, and people are to find out why.
   void drivers_off(McuIndex mcu) { links_[mcu].powered = false; }
 
  private:
   struct Link {
     SetupQueue queue;
-    Scratch scratch;             // of an MCU that is online
+    Scratch scratch;  // of an MCU that is online
+    ProgramLink program;
+    // It was found with a program under way: it is told only what it then takes, and all of its
+    // setup when that has ended.
+    bool adopts = false;
+    // While connecting: its program has another configuration, and has not ended.
+    bool left_alone = false;
     bool setup_written = false;  // while connecting: into the queue
     bool was_online = false;     // while it gets another setup: nobody was told otherwise
     // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
@@ -106,17 +129,29 @@ class Connector {
   };
 
   // The request that is to be sent next; null if there is none.
-  const SetupQueue::Request* next_request(McuIndex mcu) const;
+  const SetupQueue::Request* next_request(std::int64_t now_us, McuIndex mcu);
   const SetupQueue::Request* next_part(McuIndex mcu);
   template <class Next>
   bool send_first(std::int64_t now_us, std::size_t& turn, Next next);
   void take(std::int64_t now_us, McuIndex mcu, const bushd_identity& identity);
+  void write_configuration(McuIndex mcu);
   void write_setup(McuIndex mcu);
+  void go_online(McuIndex mcu);
   bool holds_its_tables(McuIndex mcu, const bushd_tables& held) const;
   std::uint8_t first_actions(McuIndex mcu, bool may_clear) const;
   void add_control(McuIndex mcu, std::uint8_t actions);
   void note_power(McuIndex mcu);
   void tell_local(McuIndex mcu);
+
+  // connector_program.cpp
+  void ask_for_program(McuIndex mcu);
+  bool knows_program(McuIndex mcu) const;
+  // While connecting. False: it runs none.
+  bool goes_on_with_program(McuIndex mcu);
+  void follow_program(McuIndex mcu, bool in_step);
+  void write_adoption(McuIndex mcu);
+  void adopt_tables(McuIndex mcu, const bushd_tables& held, bool may_clear);
+  void leave_alone(McuIndex mcu);
 
   const BusSetup& setup_;
   PerMcu<McuRecord>& mcus_;
@@ -130,7 +165,8 @@ class Connector {
   std::size_t turn_ = 0;                    // whose request is sent next
   std::size_t identify_turn_ = 0;           // who is looked for next
   std::int64_t unanswered_due_us_ = 0;      // not before, if it has not answered
-  std::size_t part_turn_ = 0;               // whose part of a table, if nothing else is asked
+  std::size_t part_turn_ = 0;     // whose part of a table or program, if nothing else is asked
+  std::size_t program_turn_ = 0;  // whose program is stopped next
 };
 
 }  // namespace bushd::link

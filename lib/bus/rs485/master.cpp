@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "bus/bus_times.h"
 #include "bus/rs485/mcu_fit.h"
 #include "engine/run_plan.h"
 
@@ -18,6 +19,9 @@ constexpr std::int64_t kQueueCriticalUs = 40'000;
 // So long after a replacement queues are filled for the case that the program is held up; then it
 // is asked whether it was taken.
 constexpr std::int64_t kFollowFirstUs = 20'000;
+// A program begins where it is known so long before that its MCU has taken the order: enough to say
+// it again, and to take it back.
+constexpr std::int64_t kRunConfirmedUs = 50'000;
 // Less than what replacements are planned ahead beyond the time that the bus takes for them: those
 // that have theirs do not keep the others waiting.
 constexpr std::int64_t kCriticalMarginUs = 5'000;
@@ -117,6 +121,9 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   streams_.fail_late_replacements(now_us);
   withdraw_late_starts(now_us);
   streams_.fail_late_starts(now_us);
+  if (clock().valid()) {
+    connector_.end_late_runs(clock().tick_at(now_us), clock().ticks_in(kRunConfirmedUs));
+  }
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
   if (transactions_.open() && now_us >= transactions_.quiet_us()) {
     emergency_.send_due(now_us);
@@ -141,8 +148,8 @@ std::int64_t Rs485Master::silence_us() const {
 }
 
 // By urgency: an emergency, also one that binds an MCU that has just come; queues that are all but
-// empty; replacements, what follows them, and the polls that confirm them; queues about to run
-// empty; reports; SYNCs; configuration; filling queues.
+// empty; replacements, stops of programs, what follows them, and the polls that confirm them;
+// queues about to run empty; reports; SYNCs; configuration; filling queues.
 bool Rs485Master::send_next(std::int64_t now_us) {
   const std::int64_t target_us = horizon_.queue_target_us();
   const auto below = [target_us](std::int64_t lead_us) {
@@ -156,11 +163,11 @@ bool Rs485Master::send_next(std::int64_t now_us) {
                                                             : urgent_us);
   return emergency_.send_due(now_us) || connector_.send_stop(now_us) ||
          streams_.send_critical(now_us, below(kQueueCriticalUs), kCriticalMarginUs) ||
-         streams_.send_due_replacement(now_us) || streams_.send_stream(now_us, follows) ||
-         poller_.send_wanted(now_us) || streams_.send_stream(now_us, urgent) ||
-         poller_.send_due(now_us) || synchroniser_.send_due(now_us) ||
-         connector_.send_due_identify(now_us) || connector_.send_request(now_us) ||
-         streams_.send_stream(now_us, below(target_us));
+         streams_.send_due_replacement(now_us) || connector_.send_program_stop(now_us) ||
+         streams_.send_stream(now_us, follows) || poller_.send_wanted(now_us) ||
+         streams_.send_stream(now_us, urgent) || poller_.send_due(now_us) ||
+         synchroniser_.send_due(now_us) || connector_.send_due_identify(now_us) ||
+         connector_.send_request(now_us) || streams_.send_stream(now_us, below(target_us));
 }
 
 std::int64_t Rs485Master::next_wake_us() const {
@@ -186,9 +193,13 @@ std::int64_t Rs485Master::withdrawal_due_us() const {
 std::int64_t Rs485Master::wake_us(McuIndex mcu) const {
   if (mcus_[mcu].view.phase == McuPhase::kOffline) return connector_.retry_due_us(mcu);
   if (streams_.has_replacement_to_send(mcu) || mcus_[mcu].poll_wanted) return stepped_us_;
+  const ProgramLink& program = connector_.program(mcu);
   const bool open = streams_.has_ticks_to_send(mcu) || !connector_.queue(mcu).empty() ||
-                    connector_.scratch(mcu).under_way();
-  return std::min(poller_.due_us(mcu), open ? stepped_us_ + kStreamWakeUs : INT64_MAX);
+                    connector_.scratch(mcu).under_way() || program.has_part() ||
+                    program.has_request(stepped_us_);
+  const std::int64_t program_us = std::min(program.due_us(), program.urgent_due_us());
+  return std::min({poller_.due_us(mcu), std::max(program_us, stepped_us_),
+                   open ? stepped_us_ + kStreamWakeUs : INT64_MAX});
 }
 
 std::vector<Event> Rs485Master::take_events() {
@@ -388,6 +399,27 @@ void Rs485Master::end_travel(McuIndex mcu, std::uint8_t motor) {
 
 void Rs485Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {
   connector_.queue(mcu).position_compare(message);
+}
+
+// Time for each order, one of them said again, and its motors' rest.
+Tick Rs485Master::earliest_program_start(std::int64_t now_us,
+                                         std::span<const McuIndex> mcus) const {
+  const std::int64_t order_us =
+      writer_.line_us(BUSHD_PROGRAM_CONTROL_SIZE + 1 + 2 * (BUSHD_FRAME_OVERHEAD + 1)) +
+      fieldbus::kFirstWindowUs;
+  const std::int64_t orders_us = static_cast<std::int64_t>(mcus.size()) * order_us;
+  Tick earliest = horizon_.earliest_start(now_us) + clock().ticks_in(kRunConfirmedUs + orders_us);
+  for (const McuIndex mcu : mcus) {
+    const std::uint16_t motors = connector_.program(mcu).view().state.motors;
+    for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      if ((motors >> m & 1) != 0) earliest = std::max(earliest, streams_.next_tick(mcu, m));
+    }
+  }
+  return earliest;
+}
+
+void Rs485Master::stop_program(McuIndex mcu, bushd_stop_mode mode) {
+  if (mcus_[mcu].view.phase != McuPhase::kOffline) connector_.program(mcu).stop(mode);
 }
 
 void Rs485Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) {

@@ -18,6 +18,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bus/rs485/bus_master.h"
@@ -52,6 +53,7 @@ class Rs485Master final : public BusMaster,
                           public Travel,
                           public LocalInputs,
                           public PositionCompare,
+                          public Programs,
                           private Transactions::Listener,
                           private Connector::Listener {
  public:
@@ -68,7 +70,8 @@ class Rs485Master final : public BusMaster,
             .trigger = this,
             .travel = this,
             .local_inputs = this,
-            .position_compare = this};
+            .position_compare = this,
+            .programs = this};
   }
 
   void port_opened(std::int64_t now_us) override;
@@ -85,7 +88,8 @@ class Rs485Master final : public BusMaster,
   const BusHealth& bus_health() const override { return transactions_.health(); }
   void reset_low_water() override;
   bool busy(McuIndex mcu) const override {
-    return !connector_.queue(mcu).empty() || mcus_[mcu].poll_wanted || mcus_[mcu].answered;
+    return !connector_.queue(mcu).empty() || connector_.program(mcu).has_orders() ||
+           mcus_[mcu].poll_wanted || mcus_[mcu].answered;
   }
   bool heard() const override { return heard_; }
   // By this master or by an MCU.
@@ -154,6 +158,19 @@ class Rs485Master final : public BusMaster,
   void position_compare(McuIndex mcu, const bushd_position_compare& message) override;
   BusSnapshot snapshot(std::int64_t now_us) const override;
 
+  const ProgramView& program(McuIndex mcu) const override { return connector_.program(mcu).view(); }
+  void put_program(McuIndex mcu, std::vector<std::uint8_t> bytes) override {
+    connector_.program(mcu).put(std::move(bytes));
+  }
+  void erase_program(McuIndex mcu) override { connector_.program(mcu).erase(); }
+  Tick earliest_program_start(std::int64_t now_us, std::span<const McuIndex> mcus) const override;
+  void run_program(McuIndex mcu, std::uint8_t number, Tick start) override {
+    connector_.program(mcu).run(number, start);
+  }
+  void stop_program(McuIndex mcu, bushd_stop_mode mode) override;
+  void pause_program(McuIndex mcu) override { connector_.program(mcu).pause(); }
+  void resume_program(McuIndex mcu) override { connector_.program(mcu).resume(); }
+
  private:
   bool answered(std::int64_t now_us, const Transactions::Answer& answer) override;
   bool unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) override;
@@ -164,6 +181,7 @@ class Rs485Master final : public BusMaster,
   void came_online(McuIndex mcu) override;
   void went_offline(McuIndex mcu, bool was_online) override;
   void refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) override;
+  void program_reported(McuIndex mcu) override;
 
   void notice_standing_still(std::int64_t now_us);
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,

@@ -57,13 +57,19 @@ bool Rs485Master::answered(std::int64_t now_us, const Transactions::Answer& answ
       connector_.tables(answer.mcu, held, !emergency_.active());
       return true;
     }
-    default: {
-      bushd_acknowledgement message;
-      if (!decoded(answer, bushd_decode_acknowledgement, &message)) return false;
-      connector_.acknowledged(now_us, answer.mcu, answer.type, message.status);
+    case BUSHD_MSG_PROGRAM_STATE: {
+      bushd_program_state state;
+      if (!decoded(answer, bushd_decode_program_state, &state)) break;  // a refusal
+      connector_.program_told(now_us, answer.mcu, state);
       return true;
     }
+    default:
+      break;
   }
+  bushd_acknowledgement message;
+  if (!decoded(answer, bushd_decode_acknowledgement, &message)) return false;
+  connector_.acknowledged(now_us, answer.mcu, answer.type, message.status);
+  return true;
 }
 
 bool Rs485Master::unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
@@ -120,7 +126,8 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   if (view.phase == McuPhase::kConnecting) {
     const bool listens =
         synchroniser_.perhaps_another(now_us) && !synchroniser_.two_masters(now_us);
-    connector_.follow_report(now_us, index, in_step && !listens);
+    const bool agrees = !connector_.runs_program(index) || synchroniser_.agrees(index);
+    connector_.follow_report(now_us, index, in_step && agrees && !listens);
     return;
   }
   if (!in_step && (report.flags & BUSHD_FLAG_CONFIGURED) == 0) {
@@ -131,6 +138,9 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   ask_again_for_start(now_us, index);
   ask_at_end(now_us, index);
   events_.push_back(McuReported{index});
+  if (connector_.has_more_to_tell(index) && streams_.active(index) == 0) {
+    reconfigure(index, mcu.setup);
+  }
 }
 
 // The master's clock lags behind the MCU's, or leads by what crystals drift at most. A motor that
@@ -166,6 +176,10 @@ void Rs485Master::went_offline(McuIndex mcu, bool was_online) {
 
 void Rs485Master::refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) {
   events_.push_back(RequestRefused{.mcu = mcu, .type = type, .status = status});
+}
+
+void Rs485Master::program_reported(McuIndex mcu) {
+  events_.push_back(ProgramReported{mcu});
 }
 
 }  // namespace bushd::link

@@ -18,7 +18,10 @@ class SetupQueue {
     std::uint8_t type;
     std::vector<std::uint8_t> payload;
 
-    std::size_t reply_payload() const { return type == BUSHD_MSG_TABLES ? BUSHD_TABLES_SIZE : 1; }
+    std::size_t reply_payload() const {
+      if (type == BUSHD_MSG_PROGRAM_STATE) return BUSHD_PROGRAM_STATE_SIZE;
+      return type == BUSHD_MSG_TABLES ? BUSHD_TABLES_SIZE : 1;
+    }
   };
 
   bool empty() const { return requests_.empty(); }

@@ -116,6 +116,14 @@ void Synchroniser::survey_mcu(McuIndex mcu, Survey& survey) const {
   }
 }
 
+// An MCU that is off by more adopts the time of the bus, once its motors rest.
+bool Synchroniser::agrees(McuIndex mcu) const {
+  const bushd_report* const reference = survey().reference;
+  const bushd_report& report = mcus_[mcu].view.report;
+  return reference != nullptr && sync_id_ == report.sync_id &&
+         std::abs(difference_ns(report, *reference)) <= setup_.tick_ns / 2;
+}
+
 void Synchroniser::note_offsets(const bushd_report* reference) {
   if (reference == nullptr) return;
   for (McuRecord& mcu : mcus_) {

@@ -59,6 +59,10 @@ class Synchroniser {
   // report tells of to its last byte, if only the line takes time.
   Agreement follow_report(std::int64_t now_us, McuIndex mcu, std::int64_t line_us, bool in_time);
 
+  // The MCU has heard the last SYNC when the others have, by its ticks: none is told another time
+  // by what follows it. Precondition: its record has a report.
+  bool agrees(McuIndex mcu) const;
+
   std::int64_t due_us() const { return due_us_; }
   bool send_due(std::int64_t now_us);
 

@@ -26,6 +26,7 @@ class Connecting : public testing::Test,
     story += was_online ? "offline " : "still-offline ";
   }
   void refused(McuIndex, std::uint8_t, std::uint8_t) override { story += "refused "; }
+  void program_reported(McuIndex) override { story += "program "; }
   bool answered(std::int64_t, const link::Transactions::Answer&) override { return true; }
   bool unanswered(std::int64_t, McuIndex, std::uint8_t) override { return false; }
   void ended(std::int64_t, McuIndex, std::uint8_t) override {}

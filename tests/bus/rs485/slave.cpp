@@ -237,8 +237,24 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
       payload.resize(bushd_encode_tables(&tables, payload.data()));
       return answer(slave, frame, sequence, payload);
     }
+    case BUSHD_MSG_PROGRAM_STATE: {
+      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+      slave.program_state.tick = tick_of(slave);
+      payload.resize(bushd_encode_program_state(&slave.program_state, payload.data()));
+      return answer(slave, frame, sequence, status == 0 ? payload : Bytes{status});
+    }
+    case BUSHD_MSG_PROGRAM_PUT:
+      return answer(slave, frame, sequence, {status != 0 ? status : put_program(slave, frame)});
+    case BUSHD_MSG_PROGRAM:
+      return answer(slave, frame, sequence, {status != 0 ? status : control_program(slave, frame)});
     default:
       break;
+  }
+  const bool at_rest_only =
+      frame.type == BUSHD_MSG_INPUTS ||
+      (frame.type == BUSHD_MSG_ASSIGN && (slave.program_state.motors >> p[0] & 1) != 0);
+  if (at_rest_only && slave.runs_program()) {
+    return answer(slave, frame, sequence, {BUSHD_E_STATE});
   }
   if (status == 0) {
     if (frame.type == BUSHD_MSG_CONFIGURE) slave.flags |= BUSHD_FLAG_CONFIGURED;
@@ -406,6 +422,59 @@ void FakeBus::take_table_run(Slave& slave, const Heard& frame) {
   }
 }
 
+std::uint8_t FakeBus::put_program(Slave& slave, const Heard& frame) {
+  bushd_program_put part{};
+  EXPECT_EQ(bushd_decode_program_put(frame.payload.data(), frame.payload.size(), &part), BUSHD_OK);
+  bushd_program_state& state = slave.program_state;
+  if (slave.runs_program()) return BUSHD_E_STATE;
+  if (part.total > state.memory) return BUSHD_E_CAPACITY;
+  if (part.offset > (part.offset == 0 ? 0 : slave.program.size())) return BUSHD_E_STATE;
+  slave.program.resize(part.offset);
+  slave.program.insert(slave.program.end(), part.bytes, part.bytes + part.count);
+  state.stage = BUSHD_PROGRAM_LOADING;
+  state.size = static_cast<std::uint16_t>(slave.program.size());
+  return BUSHD_OK;
+}
+
+std::uint8_t FakeBus::control_program(Slave& slave, const Heard& frame) {
+  bushd_program_control message{};
+  EXPECT_EQ(bushd_decode_program_control(frame.payload.data(), frame.payload.size(), &message),
+            BUSHD_OK);
+  bushd_program_state& state = slave.program_state;
+  const auto from_to = [&](std::uint8_t from, std::uint8_t to) -> std::uint8_t {
+    if (state.stage != from && state.stage != to) return BUSHD_E_STATE;
+    state.stage = to;
+    return BUSHD_OK;
+  };
+  switch (message.action) {
+    case BUSHD_PROGRAM_COMMIT:
+      state.crc = ~bushd_crc32(BUSHD_CRC32_START, slave.program.data(), slave.program.size());
+      if (state.crc != message.value) return BUSHD_E_CRC;
+      return from_to(BUSHD_PROGRAM_LOADING, BUSHD_PROGRAM_LOADED);
+    case BUSHD_PROGRAM_RUN:
+      if (state.number == message.number) return BUSHD_OK;
+      if (state.stage == BUSHD_PROGRAM_ENDED) state.stage = BUSHD_PROGRAM_LOADED;
+      if (state.stage != BUSHD_PROGRAM_LOADED) return BUSHD_E_STATE;
+      state.number = message.number;
+      state.start_tick = message.value;
+      state.stage = BUSHD_PROGRAM_RUNS;
+      return BUSHD_OK;
+    case BUSHD_PROGRAM_STOP:
+      if (slave.runs_program()) state.stage = BUSHD_PROGRAM_ENDED;
+      state.reason = BUSHD_PROGRAM_STOPPED;
+      return BUSHD_OK;
+    case BUSHD_PROGRAM_PAUSE:
+      return from_to(BUSHD_PROGRAM_RUNS, BUSHD_PROGRAM_PAUSED);
+    case BUSHD_PROGRAM_RESUME:
+      return from_to(BUSHD_PROGRAM_PAUSED, BUSHD_PROGRAM_RUNS);
+    default:
+      if (slave.runs_program()) return BUSHD_E_STATE;
+      state.stage = BUSHD_PROGRAM_NONE;
+      slave.program.clear();
+      return BUSHD_OK;
+  }
+}
+
 Bytes FakeBus::report(Slave& slave, const bushd_poll_entry& entry) {
   follow_time(slave);
   bushd_report r{};
@@ -425,6 +494,10 @@ Bytes FakeBus::report(Slave& slave, const bushd_poll_entry& entry) {
     r.out_of_order |= static_cast<std::uint16_t>(1u << m);
     r.out_of_order_from = from;
     r.out_of_order_until = until;
+  }
+  if (slave.runs_program()) {
+    r.moving |= slave.program_state.motors;
+    r.autonomous = r.running = slave.program_state.motors;
   }
   r.low_water_ticks = slave.low_water;
   r.state = slave.faults != 0                ? BUSHD_STATE_FAULT

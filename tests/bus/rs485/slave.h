@@ -72,6 +72,24 @@ struct Slave {
   std::array<std::int32_t, BUSHD_MOTORS_PER_MCU> position{};
   // Everything it took, by motor and tick.
   std::array<std::map<std::uint32_t, std::int16_t>, BUSHD_MOTORS_PER_MCU> taken;
+  // What has come of its program, and what it tells of it.
+  Bytes program;
+  bushd_program_state program_state{.stage = BUSHD_PROGRAM_NONE,
+                                    .reason = BUSHD_PROGRAM_NO_REASON,
+                                    .number = 0,
+                                    .flags = 0,
+                                    .motors = 0,
+                                    .memory = 8192,
+                                    .size = 0,
+                                    .crc = 0,
+                                    .frame = 0,
+                                    .point = 0,
+                                    .repeats = 0,
+                                    .start_tick = 0,
+                                    .tick = 0};
+  bool runs_program() const {
+    return program_state.stage >= BUSHD_PROGRAM_WAITS && program_state.stage <= BUSHD_PROGRAM_ENDS;
+  }
   std::uint16_t rejected = 0;
   // The last report. One that has it gets what is new.
   bushd_report told{};
@@ -175,6 +193,8 @@ class FakeBus {
   void take_ticks(Slave& slave, const Ticks& ticks);
   void take_motor_ticks(Slave& slave, unsigned motor, const Ticks& ticks) const;
   void take_table_run(Slave& slave, const Heard& frame);
+  static std::uint8_t put_program(Slave& slave, const Heard& frame);
+  static std::uint8_t control_program(Slave& slave, const Heard& frame);
   // `delay_us` after the request's end.
   void answer(const Slave& slave, const Heard& frame, std::uint8_t sequence, const Bytes& payload,
               std::int64_t delay_us = 0);
