@@ -18,6 +18,10 @@ typedef struct bushd_mcu bushd_mcu;
 // Frames, and points of a line, that begin in one tick at most: what a tick costs has a bound.
 #define BUSHD_MCU_PROGRAM_BEGINS 8u
 #define BUSHD_MCU_PROGRAM_FARTHEST_START 32767  // ticks ahead
+// These end any program; others are a matter between the MCU and its host.
+#define BUSHD_MCU_PROGRAM_ENDING_FAULTS                                          \
+  (BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT | \
+   BUSHD_FAULT_OVERCURRENT)
 
 typedef struct bushd_mcu_repeat {
   const uint8_t* at;    // the frame behind REPEAT

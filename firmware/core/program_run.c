@@ -20,10 +20,6 @@
 
 #if BUSHD_PROGRAMS
 
-// These end any program; others are a matter between the MCU and its host.
-static const uint8_t kEndsAny = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_EMERGENCY |
-                                BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT;
-
 int32_t bushd_mcu_position_at_rest(const bushd_mcu* mcu, uint8_t m) {
   return (int32_t)((uint32_t)mcu->motor[m].position_steps +
                    (uint32_t)mcu->slot_buffer[mcu->front].steps[m]);
@@ -309,7 +305,7 @@ static void go_on(bushd_mcu* mcu) {
 
 static bushd_program_reason hindrance(const bushd_mcu* mcu) {
   const bushd_mcu_program* p = mcu->config.program;
-  if ((mcu->faults & kEndsAny) != 0) return BUSHD_PROGRAM_FAULT;
+  if ((mcu->faults & BUSHD_MCU_PROGRAM_ENDING_FAULTS) != 0) return BUSHD_PROGRAM_FAULT;
   if ((mcu->flags & BUSHD_FLAG_ENABLED) == 0) return BUSHD_PROGRAM_DISABLED;
   if ((p->program.flags & BUSHD_PROGRAM_WITHOUT_HOST) != 0) return BUSHD_PROGRAM_NO_REASON;
   if ((mcu->faults & BUSHD_FAULT_LINK) != 0) return BUSHD_PROGRAM_SILENCE;

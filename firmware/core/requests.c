@@ -85,9 +85,24 @@ static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
   return BUSHD_OK;
 }
 
-static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
-  const uint8_t at_rest_only =
+static uint8_t actions_at_rest_only(const bushd_mcu* mcu, uint8_t faults) {
+  const uint8_t all =
       BUSHD_CONTROL_DISABLE | BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES;
+#if BUSHD_PROGRAMS
+  // A program without host may go on for days, and none of these ends it. One that does must be
+  // named by nobody before the program has seen it, and it looks once a tick.
+  const bool ends_none = faults != 0 && (faults & BUSHD_MCU_PROGRAM_ENDING_FAULTS) == 0;
+  const uint16_t others = bushd_mcu_engaged(mcu) & (uint16_t)~bushd_mcu_moved_without_host(mcu);
+  if (ends_none && others == 0) return all & (uint8_t)~BUSHD_CONTROL_CLEAR_FAULTS;
+#else
+  (void)mcu;
+  (void)faults;
+#endif
+  return all;
+}
+
+static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
+  const uint8_t at_rest_only = actions_at_rest_only(mcu, message->faults);
   if ((message->actions & at_rest_only) != 0 && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) bushd_mcu_clear_faults(mcu, message->faults);
   if (message->actions & BUSHD_CONTROL_FORGET_TABLES) bushd_mcu_forget_tables(mcu);

@@ -253,6 +253,53 @@ TEST_P(Program, AStreamThatStarvesDoesNotEndOneWithoutHost) {
   expect_ended(BUSHD_PROGRAM_STOPPED);
 }
 
+// Faults that end no program are not kept from other motors for as long as one goes on.
+TEST_P(Program, FaultsThatEndNoneAreClearedBesideOneWithoutHost) {
+  ProgramText text = endless(BUSHD_PROGRAM_WITHOUT_HOST);
+  text.motors = 3;
+  begin(text);
+  pass(5);
+  Ticks other{.flags = kStart, .first = rig.first_open(), .count = 2, .mask = 4};
+  other.displacements = {one(), one()};
+  other.delays = {64};
+  ASSERT_EQ(rig.take(other), BUSHD_OK);
+  while (rig.poll().faults == 0) pass();
+  EXPECT_EQ(rig.clear(BUSHD_FAULT_LINK), BUSHD_E_STATE) << "the other motor ramps down";
+  while ((rig.poll().moving & 4) != 0) pass();
+  EXPECT_EQ(rig.control(BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_E_STATE) << "it is not named";
+  for (const unsigned ends : {BUSHD_FAULT_SELF_TEST, BUSHD_FAULT_EMERGENCY,
+                              BUSHD_FAULT_EMERGENCY_INPUT, BUSHD_FAULT_OVERCURRENT}) {
+    EXPECT_EQ(rig.clear(static_cast<std::uint8_t>(BUSHD_FAULT_LINK | ends)), BUSHD_E_STATE);
+  }
+  EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
+  ASSERT_EQ(rig.clear(BUSHD_FAULT_LINK), BUSHD_OK);
+  EXPECT_EQ(rig.poll().faults, 0);
+  EXPECT_EQ(rig.poll().state, BUSHD_STATE_RUN);
+  other.first = rig.first_open();
+  EXPECT_EQ(rig.take(other), BUSHD_OK) << "the other motor is free again";
+  pass(300);
+  EXPECT_EQ(state().stage, BUSHD_PROGRAM_RUNS);
+  ASSERT_EQ(control(BUSHD_PROGRAM_STOP), BUSHD_OK);
+  expect_ended(BUSHD_PROGRAM_STOPPED);
+}
+
+TEST_P(Program, FaultsAreNotClearedBesideOneThatNeedsItsHost) {
+  begin({.frames = {wait_us(5'000'000), kProgramEnd}});
+  pass(3);
+  EXPECT_EQ(rig.clear(BUSHD_FAULT_LINK), BUSHD_E_STATE);
+  EXPECT_EQ(state().stage, BUSHD_PROGRAM_RUNS);
+}
+
+// An emergency and its clearing within one tick: the program has not looked at its faults yet.
+TEST_P(Program, AnEmergencyIsNotClearedBeforeAProgramThatWaitsHasSeenIt) {
+  begin({.flags = BUSHD_PROGRAM_WITHOUT_HOST, .frames = {wait_us(5'000'000), kProgramEnd}});
+  pass(3);
+  rig.emergency(BUSHD_STOP_RAMP);
+  EXPECT_EQ(rig.clear(BUSHD_FAULT_EMERGENCY), BUSHD_E_STATE);
+  EXPECT_EQ(rig.clear(BUSHD_FAULT_LINK), BUSHD_OK) << "which is none of the others";
+  expect_ended(BUSHD_PROGRAM_FAULT);
+}
+
 // While it went on alone its clock drifted: who comes back says other times.
 TEST_P(Program, OneWithoutHostComesIntoStepWithAHostThatComesBack) {
   begin({.flags = BUSHD_PROGRAM_WITHOUT_HOST,
