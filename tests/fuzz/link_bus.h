@@ -320,6 +320,12 @@ class Bus {
         return decodes(bushd_trigger{}, bushd_decode_trigger);
       case BUSHD_MSG_EMERGENCY:
         return decodes(bushd_emergency{}, bushd_decode_emergency);
+      case BUSHD_MSG_PROGRAM_PUT:
+        return decodes(bushd_program_put{}, bushd_decode_program_put);
+      case BUSHD_MSG_PROGRAM:
+        return decodes(bushd_program_control{}, bushd_decode_program_control);
+      case BUSHD_MSG_PROGRAM_STATE:
+        return frame.payload_size == 0;
       default:
         return false;
     }
@@ -350,15 +356,16 @@ class Bus {
 
   std::size_t fit(std::uint8_t* payload) const {
     if (awaited_->type == BUSHD_MSG_IDENTIFY) {
-      const bushd_identity identity = {.protocol_version = BUSHD_PROTOCOL_VERSION,
-                                       .motors = kMotors,
-                                       .firmware_version = 1,
-                                       .boot_number = kBootNumber,
-                                       .slots = 128,
-                                       .queue_ticks = 64,
-                                       .table_codes = 100,
-                                       .capabilities = UINT16_MAX | BUSHD_CAN_CLEAR_NAMED,
-                                       .unique_id = {awaited_->addresses.front()}};
+      const bushd_identity identity = {
+          .protocol_version = BUSHD_PROTOCOL_VERSION,
+          .motors = kMotors,
+          .firmware_version = 1,
+          .boot_number = kBootNumber,
+          .slots = 128,
+          .queue_ticks = 64,
+          .table_codes = 100,
+          .capabilities = UINT16_MAX | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_PROGRAM,
+          .unique_id = {awaited_->addresses.front()}};
       return bushd_encode_identity(&identity, payload);
     }
     if (awaited_->type == BUSHD_MSG_POLL) {
@@ -368,6 +375,11 @@ class Bus {
     if (awaited_->type == BUSHD_MSG_TABLES) {
       const bushd_tables none{};
       return bushd_encode_tables(&none, payload);
+    }
+    if (awaited_->type == BUSHD_MSG_PROGRAM_STATE) {
+      bushd_program_state none{};
+      none.memory = 8192;
+      return bushd_encode_program_state(&none, payload);
     }
     const bushd_acknowledgement done = {BUSHD_OK};
     return bushd_encode_acknowledgement(&done, payload);

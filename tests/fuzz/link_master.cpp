@@ -36,6 +36,7 @@ enum class Op : std::uint8_t {
   kDisarm,           // mcu
   kStarted,          // mcu, motor, ticks later: the trigger has come
   kPositionCompare,  // mcu, motor, arrivals
+  kProgram,          // mcu, what, u16
   kCount
 };
 
@@ -126,6 +127,31 @@ void home(Bus& bus, Input& input) {
                           .position_steps = 7});
 }
 
+void program(Bus& bus, Input& input) {
+  link::Rs485Master& master = bus.master();
+  const link::McuIndex mcu{input.u8() % kMcus};
+  const std::uint8_t what = input.u8() % 6u;
+  const std::uint16_t value = input.u16();
+  if (what == 0) {
+    return master.stop_program(mcu, value % 2 == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE);
+  }
+  if (!bus.online(mcu) || !master.can(mcu, BUSHD_CAN_PROGRAM)) return;
+  const link::ProgramView& view = master.program(mcu);
+  BUSHD_REQUIRE(view.put <= view.total);
+  if (what == 1) {
+    master.put_program(mcu, std::vector<std::uint8_t>(1 + value % 9000u, std::uint8_t{7}));
+  } else if (what == 2) {
+    master.erase_program(mcu);
+  } else if (what == 3) {
+    master.pause_program(mcu);
+  } else if (what == 4) {
+    master.resume_program(mcu);
+  } else if (master.time_known()) {
+    const link::Tick start = master.earliest_program_start(bus.now_us(), {&mcu, 1});
+    master.run_program(mcu, static_cast<std::uint8_t>(1 + value % 255u), start + value / 255);
+  }
+}
+
 void run_op(Op op, Bus& bus, Input& input) {
   link::Rs485Master& master = bus.master();
   switch (op) {
@@ -178,6 +204,8 @@ void run_op(Op op, Bus& bus, Input& input) {
       return started(bus, input);
     case Op::kPositionCompare:
       return position_compare(bus, input);
+    case Op::kProgram:
+      return program(bus, input);
     case Op::kCount:
       return;
   }
