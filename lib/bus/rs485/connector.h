@@ -96,8 +96,10 @@ class Connector {
   // An MCU that is online was found with a program under way, which has ended: reconfigure() is to
   // tell it all of its setup.
   bool has_more_to_tell(McuIndex mcu) const;
-  // Its program has motors.
-  bool runs_program(McuIndex mcu) const;
+  // It connects, and its program has, or may have, gone on alone: its ticks need not be the bus's.
+  bool may_have_own_time(McuIndex mcu) const;
+  // A program that ends in silence is under way: it is to hear of the time as lines are.
+  bool runs_with_host() const;
   // The MCU has disabled its drivers, and people are to find out why.
   void drivers_off(McuIndex mcu) { links_[mcu].powered = false; }
 
@@ -146,6 +148,8 @@ class Connector {
   // connector_program.cpp
   void ask_for_program(McuIndex mcu);
   bool knows_program(McuIndex mcu) const;
+  // Its program has motors.
+  bool runs_program(McuIndex mcu) const;
   // While connecting. False: it runs none.
   bool goes_on_with_program(McuIndex mcu);
   void follow_program(McuIndex mcu, bool in_step);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "bus/rs485/connector.h"
+#include "engine/program.h"
 
 namespace bushd::link {
 namespace {
@@ -43,6 +44,19 @@ bool Connector::knows_program(McuIndex mcu) const {
 bool Connector::runs_program(McuIndex mcu) const {
   const ProgramView& program = links_[mcu].program.view();
   return program.known && program.under_way();
+}
+
+bool Connector::may_have_own_time(McuIndex mcu) const {
+  return mcus_[mcu].view.phase == McuPhase::kConnecting &&
+         (!knows_program(mcu) || runs_program(mcu));
+}
+
+bool Connector::runs_with_host() const {
+  for (const McuIndex i : mcus_.indices()) {
+    const std::uint8_t flags = links_[i].program.view().state.flags;
+    if (runs_program(i) && (flags & BUSHD_PROGRAM_WITHOUT_HOST) == 0) return true;
+  }
+  return false;
 }
 
 void Connector::write_adoption(McuIndex mcu) {

@@ -116,7 +116,7 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   stepped_us_ = now_us;
   begun_ = false;
   if (!port_open_) return {};
-  synchroniser_.lines_run(streams_.runs_line());
+  synchroniser_.lines_run(streams_.runs_line() || connector_.runs_with_host());
   transactions_.expire(now_us);
   streams_.fail_late_replacements(now_us);
   withdraw_late_starts(now_us);

@@ -114,6 +114,7 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   poller_.follow_report(now_us, index);
   connector_.follow_stop(index);
   if (report.faults & BUSHD_FAULT_OVERCURRENT) connector_.drivers_off(index);
+  synchroniser_.expect_own_time(index, connector_.may_have_own_time(index));
   const auto agreement = synchroniser_.follow_report(now_us, index, answer.line_us, answer.in_time);
   if (agreement == Synchroniser::Agreement::kOtherTime && view.phase == McuPhase::kOnline) {
     // Moves are planned in the bus's time: who counts otherwise has to be told it before it gets
@@ -126,8 +127,7 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   if (view.phase == McuPhase::kConnecting) {
     const bool listens =
         synchroniser_.perhaps_another(now_us) && !synchroniser_.two_masters(now_us);
-    const bool agrees = !connector_.runs_program(index) || synchroniser_.agrees(index);
-    connector_.follow_report(now_us, index, in_step && agrees && !listens);
+    connector_.follow_report(now_us, index, in_step && !listens);
     return;
   }
   if (!in_step && (report.flags & BUSHD_FLAG_CONFIGURED) == 0) {

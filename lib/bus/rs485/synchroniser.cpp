@@ -69,6 +69,7 @@ Synchroniser::Agreement Synchroniser::follow_report(std::int64_t now_us, McuInde
   view.tick = clock_.unwrap(report.tick, now_us);
   constexpr std::uint8_t kKnowsTime = BUSHD_FLAG_SYNCED | BUSHD_FLAG_SYNC_HEARD;
   if (!in_time || (report.flags & kKnowsTime) != kKnowsTime) return Agreement::kUnsynced;
+  if (since_sync_[mcu].own_time && !agrees(mcu)) return Agreement::kUnsynced;
   if (clock_.valid() &&
       std::abs(view.tick - clock_.tick_at(now_us)) > clock_.ticks_in(kClockJumpUs)) {
     if (anybody_online()) return Agreement::kOtherTime;
@@ -116,12 +117,14 @@ void Synchroniser::survey_mcu(McuIndex mcu, Survey& survey) const {
   }
 }
 
-// An MCU that is off by more adopts the time of the bus, once its motors rest.
+// One that is off by more adopts the time of the bus, once its motors rest. All are waited for:
+// who reports first is not therefore the one whose time counts.
 bool Synchroniser::agrees(McuIndex mcu) const {
-  const bushd_report* const reference = survey().reference;
+  const Survey found = survey();
   const bushd_report& report = mcus_[mcu].view.report;
-  return reference != nullptr && sync_id_ == report.sync_id &&
-         std::abs(difference_ns(report, *reference)) <= setup_.tick_ns / 2;
+  return found.all_heard && found.all_asked && found.reference != nullptr &&
+         sync_id_ == report.sync_id &&
+         std::abs(difference_ns(report, *found.reference)) <= setup_.tick_ns / 2;
 }
 
 void Synchroniser::note_offsets(const bushd_report* reference) {

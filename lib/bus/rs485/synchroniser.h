@@ -55,13 +55,12 @@ class Synchroniser {
     kUnsynced,  // the MCU does not know bus time, or its report is too old
     kOtherTime  // it counts other ticks than the others
   };
+  // Until told otherwise the MCU may count ticks of its own, though it says that it is in step:
+  // only when it has heard the last SYNC at the time at which others have is it taken for that.
+  void expect_own_time(McuIndex mcu, bool may) { since_sync_[mcu].own_time = may; }
   // The MCU's record has a new report; its `tick` is set here. `line_us`: from the instant that the
   // report tells of to its last byte, if only the line takes time.
   Agreement follow_report(std::int64_t now_us, McuIndex mcu, std::int64_t line_us, bool in_time);
-
-  // The MCU has heard the last SYNC when the others have, by its ticks: none is told another time
-  // by what follows it. Precondition: its record has a report.
-  bool agrees(McuIndex mcu) const;
 
   std::int64_t due_us() const { return due_us_; }
   bool send_due(std::int64_t now_us);
@@ -84,6 +83,7 @@ class Synchroniser {
   void note_other_master(std::int64_t now_us, const bushd_report& report);
   void note_offsets(const bushd_report* reference);
   bool anybody_online() const;
+  bool agrees(McuIndex mcu) const;
 
   const BusSetup& setup_;
   PerMcu<McuRecord>& mcus_;
@@ -96,6 +96,7 @@ class Synchroniser {
   bool disagreed_ = false;                // MCUs, about the SYNC before
   struct Mcu {
     bool reported = false;  // since the last SYNC
+    bool own_time = false;  // expect_own_time
   };
   PerMcu<Mcu> since_sync_;
   std::optional<std::int64_t> other_master_until_us_;  // since it was heard

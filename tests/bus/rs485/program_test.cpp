@@ -1,5 +1,7 @@
 // Programs of MCUs: how they are brought there and begun, and what becomes of one that goes on
 // while its master was away.
+#include "engine/program.h"
+
 #include <gmock/gmock.h>
 
 #include <numeric>
@@ -179,6 +181,22 @@ TEST(Program, IsAskedForFiveTimesASecondWhileOneIsUnderWay) {
   bus.heard.clear();
   bus.run_for(2'000'000);
   EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_PROGRAM_STATE).size()), 10, 1);
+}
+
+// Its lines end when they are not told the time for a second.
+TEST(Program, OneThatNeedsItsHostIsToldTheTimeMoreOften) {
+  for (const std::uint8_t flags : {std::uint8_t{BUSHD_PROGRAM_WITHOUT_HOST}, std::uint8_t{0}}) {
+    ProgramBus bus;
+    ASSERT_NO_FATAL_FAILURE(leave_running(bus));
+    bus.slaves[0].program_state.flags = flags;
+    bus.come_back();
+    ASSERT_NO_FATAL_FAILURE(bus.connect());
+    bus.run_for(1'000'000);
+    bus.heard.clear();
+    bus.run_for(4'000'000);
+    const std::size_t syncs = bus.heard_of(BUSHD_MSG_SYNC).size();
+    EXPECT_NEAR(static_cast<double>(syncs), flags == 0 ? 20 : 8, 1);
+  }
 }
 
 TEST(Program, AStopComesBeforeAllElseThatWaits) {
