@@ -121,6 +121,10 @@ ASKED = [
      {"kind": messages.configure_t.CHANGE, "changes": [{"motor": "m", "key": "local", "value": "true"}, {"motor": "m", "key": "max_speed", "value": "none"}]}),
     (lambda c: c.history("m", 7), "GET_HISTORY", {"motor": "m", "most": 7}),
     (lambda c: c.camac([(5, 1, 16, 7)], crate=2), "CAMAC", CAMAC),
+    (lambda c: c.put_program("scan", "motors = []", {"way.csv": "m\n1\n"}, dry_run=True), "PUT_PROGRAM",
+     {"program": "scan", "text": "motors = []", "points": [{"file": "way.csv", "text": "m\n1\n"}], "dry_run": True}),
+    (lambda c: c.list_programs(), "LIST_PROGRAMS", {}),
+    (lambda c: c.erase_program("scan"), "ERASE_PROGRAM", {"program": "scan"}),
     (lambda c: c.tables.list(), "LIST_TABLES", {}),
     (lambda c: c.tables.get("own"), "GET_TABLE", {"table": "own"}),
     (lambda c: c.tables.set("own", TABLE), "SET_TABLE",
@@ -148,6 +152,10 @@ class Requests(unittest.TestCase):
         self.assertEqual(asked(lambda c: c.check_follow(["m"], [0, 1], [[0], [4]], cubic=True, stretch=2)), [
             ("FOLLOW", {**motors, "part": kind.LAST_ROWS, "time_s": [0, 1], "positions": [0, 4]})])
 
+    def test_whom_programs_move_is_asked_before_they_run(self):
+        self.assertEqual(asked(lambda c: c.run_programs("scan", "other")), [
+            ("LIST_PROGRAMS", {}), ("RUN_PROGRAMS", {"programs": ["scan", "other"]})])
+
     def test_a_jog_begins_changes_and_ends(self):
         async def jog(client):
             async with client.jog("m", 2.0, keepalive_ms=300) as jog:
@@ -156,7 +164,7 @@ class Requests(unittest.TestCase):
         self.assertEqual(asked(jog), [("JOG", {"motor": "m", "speed": 2.0, "keepalive_ms": 300, "steps_after": -1})])
 
     def test_every_request_of_the_daemon_can_be_made(self):
-        made = {type_of(channel).__name__ for _, channel, _ in ASKED} | {"jog_t", "follow_t"}
+        made = {type_of(channel).__name__ for _, channel, _ in ASKED} | {"jog_t", "follow_t", "run_programs_t"}
         asks = {path.stem for path in messages.TYPES.glob("*.lcm") if "request" in getattr(messages, path.stem).__slots__}
         self.assertEqual(asks - made, {"get_status_t"})  # of `status()`
 
@@ -165,7 +173,8 @@ class Requests(unittest.TestCase):
                      lambda c: c.move_line({"m": 1.0}, duration_s=0), lambda c: c.move("m", by=0.5, unit="steps")):
             with self.assertRaises(ValueError):
                 asked(call)
-        for call in (lambda c: c.home(), lambda c: c.home("m", all=True), lambda c: c.config(local=True), lambda c: c.stop(5)):
+        for call in (lambda c: c.home(), lambda c: c.home("m", all=True), lambda c: c.config(local=True), lambda c: c.stop(5),
+                     lambda c: c.run_programs()):
             with self.assertRaises(TypeError):
                 asked(call)
 

@@ -6,7 +6,7 @@ from unittest import mock
 
 from bushd import Outcome, messages
 from bushd.errors import NoDaemon, Refused, ResultUnknown, TwoDaemons
-from bushd import codec, requests
+from bushd import codec, model, requests
 from bushd.session import Session, Timing
 from bushd.status import StatusCollector
 
@@ -418,13 +418,15 @@ class HostileBytes(unittest.TestCase):
         camac = messages.camac_reply_t()
         camac.reply = reply(request, RESULT, "done")
         camac.responses, camac.response_count = [messages.camac_response_t(x=True, data=7)], 1
+        program = messages.program_t(stage="runs", motors=[messages.program_motor_t(motor="m1")])
+        programs = messages.program_reply_t(reply=reply(request, RESULT, "done"), programs=[program])
         health = messages.health_t()
         health.mcus, health.mcu_count, health.parts = [messages.mcu_health_t()], 1, 1
         described = messages.mcu_description_t()
         described.motors, described.motor_count, described.parts = [messages.motor_description_t()], 1, 1
         return {"REPLY": answer(request, RESULT, "reached", "there", motors=["m1", "m2"]), "STATE": state(),
                 "WELCOME": welcome.encode(), "TABLE_REPLY": table.encode(), "HISTORY_REPLY": history.encode(),
-                "CAMAC_REPLY": camac.encode(),
+                "CAMAC_REPLY": camac.encode(), "PROGRAM_REPLY": programs.encode(),
                 "HEALTH": health.encode(), "DESCRIPTION": described.encode()}
 
     def test_valid_ones_are_taken(self):
@@ -456,6 +458,24 @@ class HostileBytes(unittest.TestCase):
             session.receive(channel, b"", 1.0)
         if query.collector.has_motors():
             query.collector.status()
+
+    def test_programs_are_as_the_daemon_tells_them(self):
+        request = messages.request_t()
+        way = messages.program_motor_t(motor="x", least_steps=-3, most_steps=4, end_steps=1, edges=9)
+        numbers = {"bytes": 212, "memory": 8192, "frame": 3, "point": 4, "repeats": 5, "pulses": 6}
+        flags = {"without_host": True, "endless": False, "waits_for_inputs": True, "cut": False}
+        words = {"mcu": "hall:1", "program": "scan", "checksum": "0a1b2c3d", "reason": "why"}
+        told = messages.program_t(stage="paused", duration_us=1_500_000, motors=[way], **numbers, **flags, **words)
+        heard = codec.decode("PROGRAM_REPLY", messages.program_reply_t(reply=reply(request, RESULT, "done"), programs=[told]).encode())
+        (program,) = heard.detail.programs
+        self.assertEqual(program, model.Program(
+            stage=model.ProgramStage.PAUSED, duration_s=1.5, motors=(model.ProgramMotor("x", -3, 4, 1, 9),), **numbers, **flags, **words))
+        self.assertEqual(program["x"].edges, 9)
+        with self.assertRaises(KeyError):
+            program["y"]
+        self.assertEqual(len((heard.detail + heard.detail).programs), 2)
+        unknown = messages.program_reply_t(reply=reply(request, RESULT, "done"), programs=[messages.program_t(stage="dances")])
+        self.assertIsNone(codec.decode("PROGRAM_REPLY", unknown.encode()))
 
     def test_words_that_no_daemon_says_are_dropped(self):
         request = messages.request_t()

@@ -249,6 +249,33 @@ class Client(Moving):
         """What has moved this motor, the newest first; `most` 1 to 1000. Refused without a state store."""
         return list((await self._ask(ask("GET_HISTORY", motor=name, most=most, repeatable=True))).detail.motions)
 
+    async def put_program(
+        self, name: str, program: str, points: Mapping[str, str] = {}, *, dry_run: bool = False
+    ) -> model.Program:
+        """Puts a program into the memory of the MCU of its motors, in place of the one there; nothing moves.
+
+            client.put_program("scan", pathlib.Path("scan.toml").read_text())
+
+        name: 1 to 64 of a-z A-Z 0-9 . _ -
+        program: TOML (docs/programs.md of bushd).
+        points: the text of each file of points that the program names, by that name: {"way.csv": "x,y\\n1,2\\n"}.
+        dry_run: only check it.
+
+        Returns once it has arrived, with what it will do from where its motors stand. All texts together are a message:
+        at most 57344 bytes. Refused while a program of that MCU is under way.
+        """
+        exchange = await self._ask(requests.put_program(name, program, points, dry_run=dry_run))
+        return there(exchange.detail.programs[0] if exchange.detail.programs else None)
+
+    async def list_programs(self) -> dict[str, model.Program]:
+        """What each MCU that can have a program has, and how far it has come, by MCU ("<bus>:<address>")."""
+        exchange = await self._ask(ask("LIST_PROGRAMS", repeatable=True))
+        return {program.mcu: program for program in exchange.detail.programs}
+
+    async def erase_program(self, name: str, *, check: bool = True) -> model.Result:
+        """Erases a program from the memory of its MCU. Refused while it is under way."""
+        return await self._result(ask("ERASE_PROGRAM", program=name), check)
+
     async def camac(
         self,
         cycles: Iterable[requests.Cycle],

@@ -46,6 +46,7 @@ class Detail:
     motions: tuple[model.PastMotion, ...] = ()
     configuration: model.Configuration | None = None
     camac: model.CamacResult | None = None
+    programs: tuple[model.Program, ...] = ()
 
     def __add__(self, more: Detail) -> Detail:
         """With the piece of the list that the next part has."""
@@ -255,6 +256,20 @@ def _camac_answer(message: Any) -> Reply:
     return _reply(message, Detail(camac=made(model.CamacResult, message, responses=responses)))
 
 
+def _program_answer(message: Any) -> Reply:
+    return _reply(message, Detail(programs=tuple(_program(program) for program in message.programs)))
+
+
+def _program(message: Any) -> model.Program:
+    return made(
+        model.Program,
+        message,
+        stage=model.ProgramStage(message.stage),
+        duration_s=message.duration_us / 1e6,
+        motors=tuple(made(model.ProgramMotor, motor) for motor in message.motors),
+    )
+
+
 def _welcome(message: Any) -> Welcome:
     if message.session == 0:
         raise ValueError("no session")
@@ -314,6 +329,7 @@ _DECODERS: dict[str, tuple[Any, Callable[[Any], Message]]] = {
     "TABLE_REPLY": (messages.table_answer_t, _table_answer),
     "HISTORY_REPLY": (messages.history_answer_t, _history_answer),
     "CAMAC_REPLY": (messages.camac_reply_t, _camac_answer),
+    "PROGRAM_REPLY": (messages.program_reply_t, _program_answer),
     "CONFIGURATION_REPLY": (messages.configuration_answer_t, _configuration_answer),
     "STATE": (messages.mcu_state_t, _state),
     "DESCRIPTION": (messages.mcu_description_t, _description),

@@ -67,6 +67,21 @@ class Inhibited(enum.Enum):
     BOTH = "both"
 
 
+class ProgramStage(enum.Enum):
+    """What the program of an MCU does."""
+
+    NONE = "none"  # the MCU has none
+    LOADING = "loading"
+    LOADED = "loaded"
+    WAITS = "waits"  # for the tick with which it begins
+    RUNS = "runs"
+    PAUSES = "pauses"  # its motors ramp down
+    PAUSED = "paused"
+    ENDS = "ends"  # its motors ramp down
+    ENDED = "ended"
+    UNKNOWN = "unknown"  # the MCU is not heard
+
+
 @dataclasses.dataclass(frozen=True)
 class TableRef:
     """Which table it is, in short."""
@@ -315,6 +330,46 @@ class CamacResult:
     responses: tuple[CamacResponse, ...]  # of the cycles that moved a word, and of the one that ended a block at one address
     tally: int  # words that were moved; of "single" cycles that were made
     requests: int  # stations that raise L afterwards: bit n - 1 is station n
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgramMotor:
+    """What a program does to a motor, from where the motor stands; of a repeat without end one pass."""
+
+    motor: str
+    least_steps: int  # where it comes to, its beginning included
+    most_steps: int
+    end_steps: int
+    edges: int  # steps that it makes
+
+
+@dataclasses.dataclass(frozen=True)
+class Program:
+    """The program of an MCU: what it is, how far it has come, and what it does."""
+
+    mcu: str  # "<bus>:<address>"
+    program: str  # its name; "": none, or one that was put before the daemon started
+    checksum: str  # CRC-32 of its bytes, 8 hexadecimal digits; "": the MCU has none
+    stage: ProgramStage
+    reason: str  # why its last run has ended; "": it has not
+    without_host: bool  # it goes on when no host is heard
+    bytes: int  # of it, or of what has arrived of it
+    memory: int  # bytes that a program may have there
+    frame: int  # that is carried out, or was last, from 1; 0: none yet
+    point: int  # of this frame, if it is a line, from 1
+    repeats: int
+    duration_s: float  # without the time in which it waits for inputs; this and what follows: of one that this daemon has checked
+    pulses: int
+    endless: bool  # it repeats without end: what is told is of one pass
+    waits_for_inputs: bool
+    cut: bool  # there are more frames to carry out than were looked at
+    motors: tuple[ProgramMotor, ...]
+
+    def __getitem__(self, motor: str) -> ProgramMotor:
+        for one in self.motors:
+            if one.motor == motor:
+                return one
+        raise KeyError(motor)
 
 
 @dataclasses.dataclass(frozen=True)

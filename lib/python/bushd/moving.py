@@ -280,6 +280,22 @@ class Moving(Asking):
         """Ends the wait for the trigger of these motors, and of all armed with them; none named: of all."""
         return await self._result(ask("DISARM", motors=names), check)
 
+    @overload
+    async def run_programs(self, *names: str, wait: Literal[True] = True, check: bool = True) -> model.MoveResult: ...
+    @overload
+    async def run_programs(self, *names: str, wait: Literal[False], check: bool = True) -> Motion: ...
+    async def run_programs(self, *names: str, wait: bool = True, check: bool = True) -> model.MoveResult | Motion:
+        """Runs programs that were put (at least one), of MCUs of one bus: they begin with the same tick, or none does.
+
+        `stop()`, `pause()` and `resume()` of one of its motors are for the whole program. The reason of the result says at
+        which frame each has ended, and why. Waiting and results as of `move()`.
+        """
+        if not names:
+            raise TypeError("name the programs to run")
+        listed = (await self._ask(ask("LIST_PROGRAMS", repeatable=True))).detail.programs
+        motors = [motor.motor for program in listed if program.program in names for motor in program.motors]
+        return await self._moved([ask("RUN_PROGRAMS", programs=names)], motors, wait, check)
+
     def jog(
         self, name: str, speed: float, *, unit: str | None = None, keepalive_ms: int = 500, check: bool = True
     ) -> Jog:

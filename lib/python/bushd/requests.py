@@ -112,6 +112,11 @@ def change_configuration(motor: str, changes: Mapping[str, object]) -> Request:
     return ask("CONFIGURE", kind="CHANGE", changes=listed)
 
 
+def put_program(name: str, program: str, points: Mapping[str, str], *, dry_run: bool = False) -> Request:
+    files = [messages.program_points_t(file=file, text=text) for file, text in points.items()]
+    return ask("PUT_PROGRAM", program=name, text=program, points=files, dry_run=dry_run)
+
+
 _CAMAC_MODES = {"single": "SINGLE", "repeat": "REPEAT", "q-stop": "Q_STOP", "scan": "SCAN"}
 _LAST_STATION, _LAST_SUBADDRESS = 23, 15
 
