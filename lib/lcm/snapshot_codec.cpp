@@ -44,9 +44,10 @@ bushd::Result<Packet> encode(std::int64_t utime_us, const Welcome& welcome) {
 }
 
 std::span<const std::string_view> daemon_channels() {
-  static constexpr std::array<std::string_view, 10> kChannels = {
-      "WELCOME",     "REPLY", "TABLE_REPLY", "HISTORY_REPLY", "CONFIGURATION_REPLY",
-      "CAMAC_REPLY", "STATE", "DESCRIPTION", "HEALTH",        "CAMAC_LAM"};
+  static constexpr std::array<std::string_view, 11> kChannels = {
+      "WELCOME",      "REPLY", "TABLE_REPLY", "HISTORY_REPLY", "CONFIGURATION_REPLY",
+      "CAMAC_REPLY",  "STATE", "DESCRIPTION", "HEALTH",        "CAMAC_LAM",
+      "PROGRAM_REPLY"};
   return kChannels;
 }
 

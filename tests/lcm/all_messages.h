@@ -19,6 +19,7 @@
 #include "bushd/disarm_t.hpp"
 #include "bushd/emergency_stop_t.hpp"
 #include "bushd/enable_t.hpp"
+#include "bushd/erase_program_t.hpp"
 #include "bushd/follow_t.hpp"
 #include "bushd/get_history_t.hpp"
 #include "bushd/get_status_t.hpp"
@@ -29,6 +30,7 @@
 #include "bushd/hold_t.hpp"
 #include "bushd/home_t.hpp"
 #include "bushd/jog_t.hpp"
+#include "bushd/list_programs_t.hpp"
 #include "bushd/list_tables_t.hpp"
 #include "bushd/mcu_description_t.hpp"
 #include "bushd/mcu_state_t.hpp"
@@ -37,9 +39,12 @@
 #include "bushd/move_t.hpp"
 #include "bushd/pause_t.hpp"
 #include "bushd/position_compare_t.hpp"
+#include "bushd/program_reply_t.hpp"
+#include "bushd/put_program_t.hpp"
 #include "bushd/release_t.hpp"
 #include "bushd/reload_tables_t.hpp"
 #include "bushd/resume_t.hpp"
+#include "bushd/run_programs_t.hpp"
 #include "bushd/set_position_t.hpp"
 #include "bushd/set_table_t.hpp"
 #include "bushd/stop_t.hpp"
@@ -84,7 +89,10 @@ using AllMessages = std::tuple<
     RequestPair<api::Pause, pause_t>, RequestPair<api::Resume, resume_t>,
     RequestPair<api::Hold, hold_t>, RequestPair<api::Release, release_t>,
     RequestPair<lcm::GetStatus, get_status_t>,
-    Pair<lcm::AnswerWith<api::Configuration>, configuration_answer_t>>;
+    Pair<lcm::AnswerWith<api::Configuration>, configuration_answer_t>,
+    RequestPair<api::PutProgram, put_program_t>, RequestPair<api::EraseProgram, erase_program_t>,
+    RequestPair<api::RunPrograms, run_programs_t>, RequestPair<api::ListPrograms, list_programs_t>,
+    Pair<lcm::AnswerWith<api::ProgramList>, program_reply_t>>;
 
 // Every request is among them.
 template <class Request, class All>

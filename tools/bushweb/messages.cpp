@@ -117,7 +117,9 @@ ordered_json detail_json(const api::Detail& detail) {
             return {{"configuration", bushd::json_of(configuration)}};
           },
           [](const api::CamacResult& /*of programs*/) -> ordered_json { return nullptr; },
-          [](const api::ProgramList& /*not shown yet*/) -> ordered_json { return nullptr; }},
+          [](const api::ProgramList& list) -> ordered_json {
+            return {{"programs", list_of(list.programs)}};
+          }},
       static_cast<const api::Detail::variant&>(detail));
 }
 

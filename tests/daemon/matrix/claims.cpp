@@ -87,6 +87,11 @@ Claims claims_of(const api::Request& request) {
           [](const api::Confirm& r) { return Claims{.places = named(r.motors)}; },
           [](const api::GetHistory&) { return Claims{}; },
           [](const api::Configure&) { return Claims{}; },
+          [](const api::PutProgram&) { return Claims{}; },
+          [](const api::EraseProgram&) { return Claims{}; },
+          // The rows of requests.cpp name a program as its motor.
+          [](const api::RunPrograms& r) { return Claims{.moves = named(r.programs)}; },
+          [](const api::ListPrograms&) { return Claims{}; },
       },
       static_cast<const api::Request::variant&>(request));
 }

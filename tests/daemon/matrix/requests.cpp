@@ -39,6 +39,14 @@ api::Follow trajectory(const Name& motor, const Name& other, api::Follow::Part p
   return asked;
 }
 
+// It has the name of its motor: so claims_of() knows whom it moves.
+api::PutProgram program(const Name& motor, Random& random) {
+  return {.program = motor,
+          .text = "motors = [\"" + motor + "\"]\nunit = \"steps\"\n[[frame]]\nrepeat = 2\n" +
+                  "[[frame]]\nmove_by = [" + std::to_string(some_steps(random)) +
+                  "]\n[[frame]]\nwait_s = 0.05\n[[frame]]\nnext = true\n"};
+}
+
 }  // namespace
 
 const std::vector<Row>& requests() {
@@ -191,6 +199,14 @@ const std::vector<Row>& requests() {
        [](const Name&, const Name&, Random&) -> api::Request {
          return api::Camac{.crate = 1, .block = {.cycles = {{7, 0, 24, 0}}}};
        }},
+      {"put program",
+       [](const Name& m, const Name&, Random& r) -> api::Request { return program(m, r); }},
+      {"run programs",
+       [](const Name& m, const Name&, Random&) -> api::Request { return api::RunPrograms{{m}}; }},
+      {"list programs",
+       [](const Name&, const Name&, Random&) -> api::Request { return api::ListPrograms{}; }},
+      {"erase program",
+       [](const Name& m, const Name&, Random&) -> api::Request { return api::EraseProgram{m}; }},
   };
   return kRows;
 }

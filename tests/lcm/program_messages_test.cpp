@@ -1,0 +1,170 @@
+// Messages about programs of MCUs arrive as they were meant, each field under the name that the
+// .lcm file gives it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lcm/all_messages.h"
+#include "lcm/codec.h"
+#include "lcm/oracle.h"
+
+namespace bushd::lcm {
+namespace {
+
+const RequestId kAsker{.session = 2, .client_id = "me", .number = 3};
+
+template <class Oracle>
+Oracle told(const api::Request& request) {
+  return test::as<Oracle>(encode(1, kAsker, request).value().payload);
+}
+
+program_t told(const api::ProgramEntry& entry) {
+  const api::Completed reply{.reason = "r", .detail = api::ProgramList{{entry}}};
+  const auto packets = encode(1, kAsker, reply).value();
+  return test::as<program_reply_t>(packets.front().payload).programs.at(0);
+}
+
+template <class Request>
+Request carried(const Request& request) {
+  const auto packet = encode(1, kAsker, api::Request(request));
+  EXPECT_TRUE(packet) << packet.error().text();
+  const auto message = decode_client_message(packet->channel, packet->payload);
+  EXPECT_TRUE(message);
+  return std::get<Request>(std::get<api::Request>(message->content));
+}
+
+TEST(ProgramMessages, RequestsArriveAsTheyWereMeant) {
+  const std::vector<api::PutProgram::Points> points{{"p.csv", "x\n1\n"}, {"q.csv", ""}};
+  const auto put =
+      carried(api::PutProgram{.program = "scan", .text = "t\n", .points = points, .dry_run = true});
+  EXPECT_EQ(put.program, "scan");
+  EXPECT_EQ(put.text, "t\n");
+  EXPECT_EQ(put.points, points);
+  EXPECT_TRUE(put.dry_run);
+  EXPECT_EQ(carried(api::EraseProgram{"scan"}).program, "scan");
+  EXPECT_EQ(carried(api::RunPrograms{{"p", "q"}}).programs, (std::vector<std::string>{"p", "q"}));
+}
+
+// All that a program may be, in one message.
+TEST(ProgramMessages, TheGreatestProgramArrives) {
+  const std::string half(api::PutProgram::kMostBytes / 2, '#');
+  const auto put =
+      carried(api::PutProgram{.program = "scan", .text = half, .points = {{"p.csv", half}}});
+  EXPECT_EQ(put.text, half);
+  EXPECT_EQ(put.points.at(0).text, half);
+}
+
+TEST(ProgramMessages, EachFieldHasItsName) {
+  const auto put = told<put_program_t>(
+      api::PutProgram{.program = "p", .text = "t", .points = {{"f", "x"}}, .dry_run = true});
+  EXPECT_EQ(put.program, "p");
+  EXPECT_EQ(put.text, "t");
+  EXPECT_EQ(put.points.at(0).file, "f");
+  EXPECT_EQ(put.points.at(0).text, "x");
+  EXPECT_EQ(put.dry_run, 1);
+  EXPECT_EQ(told<put_program_t>(api::PutProgram{}).dry_run, 0);
+  EXPECT_EQ(told<erase_program_t>(api::EraseProgram{"p"}).program, "p");
+  EXPECT_EQ(told<run_programs_t>(api::RunPrograms{{"p", "q"}}).programs,
+            (std::vector<std::string>{"p", "q"}));
+  const program_t program = told(api::ProgramEntry{
+      .mcu = "m",
+      .program = "p",
+      .checksum = "c",
+      .stage = "runs",
+      .reason = "r",
+      .bytes = 1,
+      .memory = 2,
+      .frame = 3,
+      .point = 4,
+      .repeats = 5,
+      .duration_us = 6,
+      .pulses = 7,
+      .motors = {{.motor = "a", .least_steps = 8, .most_steps = 9, .end_steps = 10, .edges = 11}}});
+  EXPECT_EQ(program.mcu, "m");
+  EXPECT_EQ(program.program, "p");
+  EXPECT_EQ(program.checksum, "c");
+  EXPECT_EQ(program.stage, "runs");
+  EXPECT_EQ(program.reason, "r");
+  EXPECT_EQ(program.bytes, 1);
+  EXPECT_EQ(program.memory, 2);
+  EXPECT_EQ(program.frame, 3);
+  EXPECT_EQ(program.point, 4);
+  EXPECT_EQ(program.repeats, 5);
+  EXPECT_EQ(program.duration_us, 6);
+  EXPECT_EQ(program.pulses, 7);
+  EXPECT_EQ(program.motors.at(0).motor, "a");
+  EXPECT_EQ(program.motors.at(0).least_steps, 8);
+  EXPECT_EQ(program.motors.at(0).most_steps, 9);
+  EXPECT_EQ(program.motors.at(0).end_steps, 10);
+  EXPECT_EQ(program.motors.at(0).edges, 11);
+  // Each that is true or false, alone.
+  using Entry = api::ProgramEntry;
+  const std::vector<std::pair<bool Entry::*, std::int8_t program_t::*>> flags{
+      {&Entry::without_host, &program_t::without_host},
+      {&Entry::endless, &program_t::endless},
+      {&Entry::waits_for_inputs, &program_t::waits_for_inputs},
+      {&Entry::cut, &program_t::cut}};
+  for (const auto& [sent, unused] : flags) {
+    Entry one;
+    one.*sent = true;
+    const program_t heard = told(one);
+    for (const auto& [member, name] : flags) EXPECT_EQ(heard.*name, member == sent ? 1 : 0);
+  }
+}
+
+// On LCM a client hears the channels of this list, and no other.
+TEST(ProgramMessages, ClientsListenToTheChannelOfTheAnswer) {
+  const api::Completed reply{.reason = "r", .detail = api::ProgramList{}};
+  const std::string channel = encode(1, kAsker, reply).value().front().channel;
+  EXPECT_EQ(channel, "PROGRAM_REPLY");
+  EXPECT_EQ(std::ranges::count(daemon_channels(), channel), 1);
+}
+
+TEST(ProgramMessages, ProgramsOfManyMcusComeInParts) {
+  api::ProgramList list;
+  for (int mcu = 0; mcu < 128; ++mcu) {
+    api::ProgramEntry entry{.mcu = "hall:" + std::to_string(mcu),
+                            .program = "scan",
+                            .checksum = "0a1b2c3d",
+                            .stage = "paused",
+                            .reason = "r",
+                            .without_host = mcu % 2 == 0,
+                            .bytes = mcu,
+                            .memory = 8192,
+                            .frame = 3,
+                            .point = 4,
+                            .repeats = 5,
+                            .duration_us = 6,
+                            .pulses = 7,
+                            .endless = mcu % 3 == 0,
+                            .waits_for_inputs = mcu % 5 == 0,
+                            .cut = mcu % 7 == 0};
+    for (int motor = 0; motor < 16; ++motor) {
+      entry.motors.push_back({.motor = std::string(60, 'm'),
+                              .least_steps = -motor,
+                              .most_steps = std::int64_t{1} << 40,
+                              .end_steps = motor,
+                              .edges = 8});
+    }
+    list.programs.push_back(std::move(entry));
+  }
+  const api::Completed reply{.reason = "r", .detail = list};
+  const auto packets = encode(1, kAsker, reply).value();
+  EXPECT_GT(packets.size(), 1u);
+  ReplyParts parts;
+  std::optional<api::Reply> whole;
+  for (auto packet = packets.rbegin(); packet != packets.rend(); ++packet) {
+    EXPECT_FALSE(whole);
+    const auto part = decode_daemon_message(packet->channel, packet->payload);
+    whole = parts.add(std::get<ReplyMessage>(*part));
+  }
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(std::get<api::ProgramList>(std::get<api::Completed>(*whole).detail), list);
+}
+
+}  // namespace
+}  // namespace bushd::lcm
