@@ -370,7 +370,7 @@ struct Camac {
 // is checked as things are, then sent; nothing of it runs before it has arrived whole. Refused
 // while a program of that MCU is under way. Result: ProgramList with this one.
 struct PutProgram {
-  static constexpr std::size_t kMostBytes = 256 * 1024;  // of all its texts
+  static constexpr std::size_t kMostBytes = 56 * 1024;  // of all its texts: they are one message
 
   struct Points {
     std::string file{};  // as the text names it
