@@ -145,9 +145,11 @@ int bring(Client& client, const std::vector<api::MovePath>& parts, const Wording
   return kDone;
 }
 
-int send(Client& client, const api::Request& request, Client::Until until, Hope hope,
-         const Wording& wording) {
-  const api::MotorNames motors = motors_of(request);
+}  // namespace
+
+int send(Client& client, const Sending& sending) {
+  const auto& [request, until, hope, wording, given] = sending;
+  const api::MotorNames motors = given.empty() ? motors_of(request) : given;
   const auto* home = std::get_if<api::Home>(&request);
   const bool moves = !motors.empty() || (home != nullptr && home->all);
   bool accepted = false;
@@ -159,11 +161,12 @@ int send(Client& client, const api::Request& request, Client::Until until, Hope 
     progress.clear();
     for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
     for (const std::string& line : rounding_lines(request, heard)) fmt::print("{}\n", line);
-    // What limits a line, and how near to it the motors are.
+    // What limits a line, and how near to it the motors are; at which frame a program has ended.
     const auto* completed = std::get_if<api::Completed>(&heard);
-    const bool is_line = std::holds_alternative<api::MoveLine>(request) ||
-                         std::holds_alternative<api::ArmLine>(request);
-    if (completed != nullptr && is_line && as_hoped(heard, hope)) {
+    const bool tells_more = std::holds_alternative<api::MoveLine>(request) ||
+                            std::holds_alternative<api::ArmLine>(request) ||
+                            std::holds_alternative<api::RunPrograms>(request);
+    if (completed != nullptr && tells_more && as_hoped(heard, hope)) {
       fmt::print("{}\n", bushd::printable(completed->reason));
     }
     std::fflush(stdout);
@@ -183,17 +186,18 @@ int send(Client& client, const api::Request& request, Client::Until until, Hope 
   if (!reply && client.interrupted() && stopped) {
     fmt::print(stderr, "bushctl: the stop was sent; 'bushctl where' shows where motors stand\n");
   } else if (!reply && client.interrupted() && accepted && moves) {
+    const bool runs = std::holds_alternative<api::RunPrograms>(request);
     fmt::print(stderr, "bushctl: the {} goes on; 'bushctl stop' ends it\n",
-               home != nullptr ? "homing" : "move");
+               home != nullptr ? "homing"
+               : runs          ? "program"
+                               : "move");
   }
   const int code = reply ? refused(worded(*reply, wording)) : failure(client, reply.error());
   return stopped ? static_cast<int>(kInterrupted) : code;
 }
 
-}  // namespace
-
 int send(Client& client, const api::Request& request, Client::Until until, Hope hope) {
-  return send(client, request, until, hope, {});
+  return send(client, Sending{.request = request, .until = until, .hope = hope});
 }
 
 int send(const Connection& connection, const api::Request& request, Client::Until until,
@@ -206,7 +210,10 @@ int send_parts(const Connection& connection, const std::vector<api::MovePath>& p
                Client::Until until, const Wording& wording) {
   return with_client(connection, [&](Client& client) {
     if (const int code = bring(client, parts, wording); code != kDone) return code;
-    return send(client, parts.back(), until, Hope::kReached, wording);
+    return send(
+        client,
+        Sending{
+            .request = parts.back(), .until = until, .hope = Hope::kReached, .wording = wording});
   });
 }
 

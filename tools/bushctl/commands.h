@@ -38,6 +38,8 @@ void add_pause_commands(CommandLine& commands);
 void add_config_commands(CommandLine& commands);
 // table list, show, use, reload
 void add_table_commands(CommandLine& commands);
+// program put, list, run, erase
+void add_program_commands(CommandLine& commands);
 // camac
 void add_camac_commands(CommandLine& commands);
 // latency-test, scan, address: on a line that no daemon has
@@ -89,6 +91,15 @@ int send(bushd::client::Client& client, const bushd::api::Request& request,
 
 // How a reason reads here.
 using Wording = std::function<std::string(const std::string&)>;
+struct Sending {
+  bushd::api::Request request;
+  bushd::client::Client::Until until{};
+  Hope hope{};
+  Wording wording{};  // of refusals
+  // Those that it moves, if it does not name them itself: Ctrl-C stops them.
+  bushd::api::MotorNames motors{};
+};
+int send(bushd::client::Client& client, const Sending& sending);
 // A path whose points come in several requests: all but the last are taken, then that is sent.
 int send_parts(const Connection& connection, const std::vector<bushd::api::MovePath>& parts,
                bushd::client::Client::Until until, const Wording& wording);

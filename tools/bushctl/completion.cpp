@@ -26,15 +26,29 @@ std::set<std::string> tables(Client& client) {
   return names;
 }
 
+std::set<std::string> programs(Client& client) {
+  std::set<std::string> names;
+  const auto reply = client.run(api::ListPrograms{}, Client::Until::kResult);
+  const auto* completed = reply ? std::get_if<api::Completed>(&*reply) : nullptr;
+  const auto* list =
+      completed == nullptr ? nullptr : std::get_if<api::ProgramList>(&completed->detail);
+  if (list == nullptr) return names;
+  for (const api::ProgramEntry& entry : list->programs) names.insert(entry.program);
+  names.erase("");  // of an MCU without one
+  return names;
+}
+
 // Nothing where no daemon answers.
 std::set<std::string> known_names(const Connection& connection, const std::string& value) {
   std::set<std::string> names;
-  if (value != "NAME" && value != "GROUP" && value != "TABLE") return names;
+  static const std::set<std::string> kOfDaemon{"NAME", "GROUP", "TABLE", "PROGRAM"};
+  if (!kOfDaemon.contains(value)) return names;
   auto options = connection.options();
   options.answer_within = kPatience;
   const auto client = Client::open(std::move(options));
   if (!client) return names;
   if (value == "TABLE") return tables(**client);
+  if (value == "PROGRAM") return programs(**client);
   const auto status = (*client)->status(kPatience);
   if (!status) return names;
   for (const auto& mcu : status->descriptions) {

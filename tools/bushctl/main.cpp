@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
     bushctl::add_history_commands(commands);
     bushctl::add_config_commands(commands);
     bushctl::add_table_commands(commands);
+    bushctl::add_program_commands(commands);
     bushctl::add_camac_commands(commands);
     bushctl::add_raw_bus_commands(commands);
     bushctl::add_setup_command(commands);

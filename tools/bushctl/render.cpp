@@ -29,7 +29,7 @@ std::string user_position_text(const api::MotorResult& motor) {
                        {.unit = motor.unit, .steps_per_unit = {}, .decimals = motor.precision});
 }
 
-std::string position_text(const api::MotorResult& motor) {
+std::string result_position_text(const api::MotorResult& motor) {
   const std::string user = user_position_text(motor);
   if (motor.unit == units::Coordinates::kSteps) return user;
   return fmt::format("{} ({} steps)", user, motor.position_steps);
@@ -179,8 +179,8 @@ std::vector<std::string> lines(const api::Reply& reply) {
                                                     bushd::printable(motor.table.hash));
       out.push_back(fmt::format("{}: {}, stands at {}{}{}", bushd::printable(motor.motor),
                                 word(motor.outcome),
-                                computed ? user_position_text(motor) : position_text(motor), by,
-                                motor.legs > 1 ? fmt::format(", in {} legs", motor.legs) : ""));
+                                computed ? user_position_text(motor) : result_position_text(motor),
+                                by, motor.legs > 1 ? fmt::format(", in {} legs", motor.legs) : ""));
     }
     return out;
   }
