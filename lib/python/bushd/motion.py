@@ -40,7 +40,7 @@ async def end(driver: Driver, exchange: Exchange, ending: Request) -> None:
 
 
 class Motion:
-    """A motion under way, of `move(..., wait=False)`, `home()` and `run_programs()` likewise, `arm()` and `arm_line()`."""
+    """A motion under way, of `move(..., wait=False)`, of `home()` and `run_programs()` with it, of `arm()` and `arm_line()`."""
 
     def __init__(self, driver: Driver, exchange: Exchange, names: list[str]) -> None:
         self._driver = driver

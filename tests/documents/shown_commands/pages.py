@@ -41,7 +41,7 @@ class Shown:
         """Names a command, and is none itself: `bushctl jog`."""
         words = self.text.removeprefix("sudo ").split()
         named = words[0] in OURS and all(re.fullmatch("[a-z-]+", word) for word in words[1:])
-        return self.kind == "inline" and named and len(words) <= (3 if words[1] in ("path", "table") else 2)
+        return self.kind == "inline" and named and len(words) <= (3 if words[1] in ("path", "program", "table") else 2)
 
     def __str__(self):
         return f"{self.page}:{self.line}: {self.text.splitlines()[0]}"
