@@ -23,10 +23,11 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                     [this](MotorId motor) { return waiting_requests_.holds(motor); }),
       homing_(installation_, interlocks_, open_moves_, moves_, kept_, idle_drivers_, outputs),
       travels_(installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs),
+      programs_(installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs),
       local_inputs_(installation_),
-      stops_(installation_, moves_, homing_, travels_, local_inputs_, open_moves_),
+      stops_(installation_, moves_, homing_, travels_, programs_, local_inputs_, open_moves_),
       jogs_(installation_, interlocks_, moves_, open_moves_),
-      pauses_(installation_, interlocks_, moves_, open_moves_),
+      pauses_(installation_, interlocks_, moves_, programs_, open_moves_),
       holds_(installation_, interlocks_, moves_, local_inputs_, open_moves_, kept_, outputs),
       lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
       trajectories_(installation_, interlocks_, journal_, moves_, open_moves_),
@@ -54,30 +55,12 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                this->request(now_us, logged(asker, request, outputs_), request);
              }),
       // What an MCU's positions are worth comes before whoever goes by that.
-      services_{&kept_,
-                &idle_drivers_,
-                &journal_,
-                &moves_,
-                &homing_,
-                &link_faults_,
-                &local_inputs_,
-                &stops_,
-                &emergency_stop_,
-                &drivers_,
-                &positions_,
-                &trigger_,
-                &while_connected_,
-                &position_compare_,
-                &tables_,
-                &waiting_requests_,
-                &jogs_,
-                &pauses_,
-                &holds_,
-                &lines_,
-                &settings_,
-                &travels_,
-                &camac_,
-                &trajectories_},
+      services_{
+          &kept_,        &idle_drivers_,     &journal_,  &moves_,           &homing_,
+          &link_faults_, &local_inputs_,     &programs_, &stops_,           &emergency_stop_,
+          &drivers_,     &positions_,        &trigger_,  &while_connected_, &position_compare_,
+          &tables_,      &waiting_requests_, &jogs_,     &pauses_,          &holds_,
+          &lines_,       &settings_,         &travels_,  &camac_,           &trajectories_},
       supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
                   outputs) {
   positions_.set_offset_listener(
@@ -256,8 +239,9 @@ bool Core::has_work() const {
 
 std::int64_t Core::next_wake_us() const {
   if (has_work()) return 0;
-  std::int64_t wake = std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
-                                idle_drivers_.next_wake_us(), jogs_.next_wake_us()});
+  std::int64_t wake =
+      std::min({state_.next_wake_us(), health_.next_wake_us(), kept_.next_wake_us(),
+                idle_drivers_.next_wake_us(), jogs_.next_wake_us(), programs_.next_wake_us()});
   for (const BusId id : installation_.buses()) {
     wake = std::min(wake, installation_[id].master.next_wake_us());
   }
@@ -271,6 +255,7 @@ void Core::shut_down(std::int64_t now_us) {
   open_moves_.precedence().note_all(by);
   end_overtaken(now_us);
   open_moves_.stopped_by(all, by);
+  programs_.leave();
   stops_.stop(now_us, all);
   for (const BusId bus : installation_.buses()) {
     link::SharedLine* line = installation_[bus].offers.shared_line;

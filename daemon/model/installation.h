@@ -112,11 +112,14 @@ class Mcu {
   bool can_compare_positions() const { return can(BUSHD_CAN_POSITION_COMPARE); }
   bool can_travel() const { return can(BUSHD_CAN_TRAVEL); }
   bool can_home() const { return can(BUSHD_CAN_HOME); }
+  bool can_have_program() const { return offers.programs != nullptr && can(BUSHD_CAN_PROGRAM); }
 
   // As link::LineRuns and link::Uploads say; of a bus without them the answer is no.
-  bool has_table(const bushd_table& table) const {
-    return offers.line_runs != nullptr && offers.line_runs->bank_of(on_bus_, table).has_value();
+  std::optional<std::uint8_t> bank_of(const bushd_table& table) const {
+    if (offers.line_runs == nullptr) return std::nullopt;
+    return offers.line_runs->bank_of(on_bus_, table);
   }
+  bool has_table(const bushd_table& table) const { return bank_of(table).has_value(); }
   bool makes_lines() const {
     return offers.line_runs != nullptr && offers.line_runs->makes_lines(on_bus_);
   }

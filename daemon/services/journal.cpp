@@ -15,6 +15,7 @@ namespace {
 constexpr std::string_view kHoming = "homing";
 std::string_view what_moves(const motion::Motor& motor) {
   if (motor.is<motion::Homing>()) return kHoming;
+  if (motor.is<motion::InProgram>()) return "program";
   return motor.is<motion::Travelling>() ? "travel" : "local";
 }
 

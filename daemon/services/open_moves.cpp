@@ -22,6 +22,8 @@ std::string_view word(OpenMoves::Purpose purpose) {
       return "travel";
     case OpenMoves::Purpose::kFollow:
       return "follow";
+    case OpenMoves::Purpose::kProgram:
+      return "program";
   }
   return "";
 }

@@ -23,7 +23,7 @@ class OpenMoves {
   explicit OpenMoves(Installation& installation)
       : installation_(installation), precedence_(installation) {}
 
-  enum class Purpose { kMove, kHome, kArm, kJog, kLine, kTravel, kFollow };
+  enum class Purpose { kMove, kHome, kArm, kJog, kLine, kTravel, kFollow, kProgram };
 
   // A motor's part that has ended.
   struct Ended {

@@ -8,8 +8,12 @@
 namespace bushd::daemon {
 
 Pauses::Pauses(Installation& installation, const Interlocks& interlocks, Moves& moves,
-               OpenMoves& open_moves)
-    : installation_(installation), interlocks_(interlocks), moves_(moves), open_(open_moves) {}
+               Programs& programs, OpenMoves& open_moves)
+    : installation_(installation),
+      interlocks_(interlocks),
+      moves_(moves),
+      programs_(programs),
+      open_(open_moves) {}
 
 // What it does, which a pause leaves alone; "": nothing, or a motion that it pauses or ends.
 std::string Pauses::left_alone(MotorId id) const {
@@ -64,6 +68,11 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
       if (installation_[motor].follows()) pausing.outcome = api::Outcome::kFault;
       continue;
     }
+    if (installation_[motor].is<motion::InProgram>()) {
+      programs_.pause(motor);
+      pausing.motors.emplace(motor, installation_[motor].position_steps());
+      continue;
+    }
     if (!moves(motor)) continue;
     if (installation_[motor].jogs()) {
       open_.say(motor, api::Outcome::kStopped,
@@ -96,8 +105,20 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Re
     return asker.answer(api::Refused{may.error().text()});
   }
   std::vector<MotorId> paused;
+  std::vector<MotorId> in_programs;
   for (const MotorId motor : installation_.with_lines(*motors)) {
-    if (!installation_[motor].is_paused()) continue;
+    const bool in_program = programs_.is_paused(motor);
+    if (!installation_[motor].is_paused() && !in_program) continue;
+    if (in_program) {
+      auto may = interlocks_.may_begin(motor);
+      const motion::MotorHold& hold = installation_[motor].hold();
+      if (may && hold.is_set()) may = fail(hold.text());
+      if (!may) {
+        return asker.answer(api::Refused{installation_[motor].name() + ": " + may.error().text()});
+      }
+      in_programs.push_back(motor);
+      continue;
+    }
     if (const auto may = interlocks_.may_move(motor); !may) {
       return asker.answer(api::Refused{installation_[motor].name() + ": " + may.error().text()});
     }
@@ -105,8 +126,9 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Re
   }
   asker.answer(api::Accepted{});
   moves_.resume(now_us, paused);
+  for (const MotorId motor : in_programs) programs_.resume(motor);
   installation_.changed = true;
-  asker.answer(api::done("resumed: " + count_text(paused.size())));
+  asker.answer(api::done("resumed: " + count_text(paused.size() + in_programs.size())));
 }
 
 void Pauses::Pausing::not_done(api::Outcome how, const std::string& what) {
@@ -117,7 +139,10 @@ void Pauses::Pausing::not_done(api::Outcome how, const std::string& what) {
 // Whether a motor's part of it is over, and how.
 bool Pauses::has_ended(Pausing& pausing, MotorId id, std::int64_t target) const {
   const motion::Motor& motor = installation_[id];
-  if (motor.stands_paused()) {
+  if (motor.is<motion::InProgram>() && !programs_.is_paused(id)) {
+    return !installation_.mcu_of(id).online();
+  }
+  if (motor.stands_paused() || motor.is<motion::InProgram>()) {
     ++pausing.paused;
     return true;
   }

@@ -13,6 +13,7 @@
 #include "daemon/model/service.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
+#include "daemon/services/programs.h"
 
 namespace bushd::daemon {
 
@@ -21,7 +22,7 @@ class Pauses final : public Service {
   // Whose standstill is waited for at a time; beyond, motors are paused all the same.
   static constexpr std::size_t kMaxOpen = 256;
 
-  Pauses(Installation& installation, const Interlocks& interlocks, Moves& moves,
+  Pauses(Installation& installation, const Interlocks& interlocks, Moves& moves, Programs& programs,
          OpenMoves& open_moves);
 
   void request(std::int64_t now_us, const api::Asker& asker, const api::Pause& request);
@@ -49,6 +50,7 @@ class Pauses final : public Service {
   Installation& installation_;
   const Interlocks& interlocks_;
   Moves& moves_;
+  Programs& programs_;
   OpenMoves& open_;
   std::list<Pausing> open_pauses_;
 };

@@ -1,8 +1,15 @@
 // Programs of MCUs (docs/programs.md): who may have which, and the one result of each run.
+//
+// An MCU has one program. What it is the daemon knows only of those that it has put itself, by
+// their checksum: another one is shown, and can be stopped. A program goes by what held when it was
+// put; a run checks all of it again, from where the motors stand.
 #pragma once
 
 #include <cstdint>
+#include <list>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/model/interlocks.h"
 #include "daemon/model/outputs.h"
@@ -10,15 +17,98 @@
 #include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/open_moves.h"
+#include "daemon/services/program_check.h"
 
 namespace bushd::daemon {
 
 class Programs final : public Service {
  public:
+  Programs(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,
+           KeptPositions& kept, IdleDrivers& idle_drivers, Outputs& outputs);
+
   void request(const api::Asker& asker, const api::PutProgram& request);
   void request(const api::Asker& asker, const api::EraseProgram& request);
   void request(const api::Asker& asker, const api::RunPrograms& request);
   void request(const api::Asker& asker, const api::ListPrograms& request);
+
+  // Of the program that has this motor; if none has, nothing happens. A stop ends it, also where
+  // its MCU is out of reach: then when it comes back.
+  void stop(MotorId motor);
+  void pause(MotorId motor);
+  void resume(MotorId motor);
+  bool is_paused(MotorId motor) const;  // all its motors stand
+  // The daemon ends: those that go on without a host are left to themselves.
+  void leave();
+
+  void goes_offline(Mcu& mcu, const std::string& cause) override;
+  void refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) override;
+  void end_overtaken(std::int64_t now_us) override;
+  void step(std::int64_t now_us) override;
+  std::int64_t next_wake_us() const;
+
+ private:
+  // Of the time to a common start, in which all have to take it.
+  static constexpr std::int64_t kConfirmedIn = 1;
+  static constexpr std::int64_t kConfirmedOf = 2;
+
+  struct Upload {
+    CheckedProgram program;
+    api::Asker asker;
+    bool began = false;  // its bytes are being sent; else its line table
+  };
+  // Its motors are in the program until it ends.
+  struct Run {
+    std::vector<MotorId> motors{};
+    std::uint8_t number = 0;  // as the MCU has it; 0: not asked yet
+    bool known = true;        // it was begun here
+    bool without_host = false;
+    bool taken = false;        // the MCU has it
+    bool stop_wanted = false;  // somebody has stopped it
+    bool stop_asked = false;   // and its MCU has been told
+    bool pause_asked = false;
+    std::optional<std::string> ended_by{};  // why, if nobody has stopped it
+  };
+  struct OfMcu {
+    std::optional<CheckedProgram> program{};  // that was put; it may be another one by now
+    std::optional<Upload> upload{};
+    std::optional<Run> run{};
+    std::uint8_t last_number = 0;
+  };
+  // Runs that begin together, until all have been taken.
+  struct Start {
+    api::Asker asker;
+    std::vector<McuId> mcus{};
+    // Once their MCUs have been asked: until then all must be known to have taken it. What is left
+    // to the start is time enough to take it back.
+    std::optional<std::int64_t> confirmed_by_us{};
+  };
+
+  const link::ProgramView& view(McuId mcu) const;
+  bool is_loaded(McuId mcu) const;  // with what was put
+  std::optional<McuId> find(const std::string& name) const;
+  Result<void> may_be_put(const CheckedProgram& program) const;
+  Result<void> may_run(McuId mcu) const;
+  Result<std::vector<McuId>> mcus_of(const api::RunPrograms& request) const;
+  api::ProgramEntry entry(McuId mcu) const;
+  void follow_upload(McuId mcu);
+  void end_upload(McuId mcu, const Result<void>& how);
+  Result<bool> make_ready(std::int64_t now_us, const Start& start);
+  void begin(std::int64_t now_us, Start& start);
+  bool follow(std::int64_t now_us, Start& start);
+  void adopt(McuId mcu);
+  void follow(McuId mcu);
+  void give_up(const Start& start, api::Outcome outcome, const std::string& reason);
+  void end(McuId mcu, api::Outcome outcome, const std::string& reason);
+  std::string where(McuId mcu) const;
+
+  Installation& installation_;
+  const Interlocks& interlocks_;
+  OpenMoves& open_;
+  KeptPositions& kept_;
+  IdleDrivers& idle_drivers_;
+  Outputs& outputs_;
+  ById<McuId, OfMcu> mcus_;
+  std::list<Start> starts_;
 };
 
 }  // namespace bushd::daemon

@@ -42,7 +42,9 @@ std::string detail_of(const Mcu& mcu, bool two_masters) {
 }
 
 api::Activity activity_of(const motion::Motor& motor) {
-  if (motor.moves() || motor.is<motion::Travelling>()) return api::Activity::kMoving;
+  if (motor.moves() || motor.is<motion::Travelling>() || motor.is<motion::InProgram>()) {
+    return api::Activity::kMoving;
+  }
   if (const auto* armed = motor.as<motion::Armed>()) {
     return armed->confirmed ? api::Activity::kArmed : api::Activity::kArming;
   }

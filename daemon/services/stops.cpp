@@ -103,13 +103,15 @@ void Stops::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
   for (const MotorId motor : motors) {
     homing_.stop(motor);
     travels_.stop(motor);
+    programs_.stop(motor);
   }
   moves_.stop(now_us, motors);
 }
 
 bool Stops::can_be_stopped(MotorId motor) const {
   const motion::Motor& its = installation_[motor];
-  return its.has_plan() || its.is<motion::Homing>() || its.is<motion::Travelling>();
+  return its.has_plan() || its.is<motion::Homing>() || its.is<motion::Travelling>() ||
+         its.is<motion::InProgram>();
 }
 
 // However long a motor's ramp is, it ends: there is no deadline.
@@ -118,7 +120,9 @@ void Stops::follow() {
     std::erase_if(stopping.motors, [&](MotorId id) {
       const motion::Motor& motor = installation_[id];
       const Mcu& mcu = installation_.mcu_of(id);
-      if (!can_be_stopped(id)) {
+      // A program that goes on without a host is stopped when its MCU is back.
+      const bool away = motor.is<motion::InProgram>() && mcu.offline();
+      if (away || !can_be_stopped(id)) {
         if (mcu.online()) return true;
         stopping.outcome = api::Outcome::kLink;
         stopping.done =

@@ -10,6 +10,7 @@
 #include "daemon/services/homing_queue.h"
 #include "daemon/services/local_inputs.h"
 #include "daemon/services/moves.h"
+#include "daemon/services/programs.h"
 #include "daemon/services/travels.h"
 
 namespace bushd::daemon {
@@ -21,11 +22,12 @@ class Stops final : public Service {
   static constexpr std::size_t kMaxOpen = 256;
 
   Stops(Installation& installation, Moves& moves, HomingQueue& homing, Travels& travels,
-        LocalInputs& local_inputs, OpenMoves& open_moves)
+        Programs& programs, LocalInputs& local_inputs, OpenMoves& open_moves)
       : installation_(installation),
         moves_(moves),
         homing_(homing),
         travels_(travels),
+        programs_(programs),
         local_inputs_(local_inputs),
         open_moves_(open_moves) {}
 
@@ -57,6 +59,7 @@ class Stops final : public Service {
   Moves& moves_;
   HomingQueue& homing_;
   Travels& travels_;
+  Programs& programs_;
   LocalInputs& local_inputs_;
   OpenMoves& open_moves_;
   std::list<Stopping> open_;

@@ -381,7 +381,7 @@ struct PutProgram {
     }
     friend bool operator==(const Points&, const Points&) = default;
   };
-  std::string program{};  // its name: 1 to 64 of a-z A-Z 0-9 . _ -
+  std::string program{};  // its name: 1 to 63 of A-Z a-z 0-9 _ . -, the first one no -
   std::string text{};     // TOML
   std::vector<Points> points{};
   bool dry_run = false;  // it is checked, and what it would do is told

@@ -116,6 +116,7 @@ struct Mcu {
       {};                              // drivers are disabled after so long a rest; 0: at once
   std::uint32_t enable_settle_ms = 0;  // from enabling them to the first step
   std::uint32_t keypad_ms = 500;       // that a key of its keypad counts; 0: until the next one
+  bool programs_without_host = false;  // its programs may go on when no host is heard
   bool stand_in = false;               // for a bus that has no MCUs
   KeyPlaces places{};                  // of `address`
 };

@@ -212,6 +212,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
                                   "idle_disable_s",
                                   "enable_settle_ms",
                                   "keypad_ms",
+                                  "programs_without_host",
                                   "enable_active",
                                   "step_active",
                                   "direction_active"});
@@ -246,6 +247,11 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
       const auto ms = reader.integer("keypad_ms", 0, kMostKeypadMs, "ms");
       if (!ms) return fail(ms.error());
       mcu.keypad_ms = static_cast<std::uint32_t>(*ms);
+    }
+    if (reader.has("programs_without_host")) {
+      const auto may = reader.boolean("programs_without_host");
+      if (!may) return fail(may.error());
+      mcu.programs_without_host = *may;
     }
     config->mcus.push_back(std::move(mcu));
   }

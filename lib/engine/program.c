@@ -69,7 +69,7 @@ static bool in_range(const bushd_program_frame* frame, const uint8_t* at, uint16
     case BUSHD_PROGRAM_LINE_TO:
     case BUSHD_PROGRAM_LINE_BY:
       return frame->motors != 0 && (frame->motors & ~motors) == 0 &&
-             frame->bank < BUSHD_TABLE_BANKS && frame->points != 0;
+             frame->bank <= BUSHD_SCRATCH_BANK && frame->points != 0;
     case BUSHD_PROGRAM_WAIT:
       return frame->us >= 1 && frame->us <= BUSHD_PROGRAM_MOST_WAIT_US;
     case BUSHD_PROGRAM_WAIT_INPUT:

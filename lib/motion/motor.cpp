@@ -139,6 +139,15 @@ void Motor::end_travel() {
   if (is<Travelling>()) rest();
 }
 
+void Motor::enter_program() {
+  activity_ = InProgram{};
+  asked_for_.reset();
+}
+
+void Motor::leave_program() {
+  if (is<InProgram>()) rest();
+}
+
 void Motor::rest() {
   if (autonomous_ || moved_by_other_) {
     activity_ = Local{};

@@ -76,7 +76,8 @@ struct Armed {
 };
 struct Local {};       // the inputs at its MCU move it, or another master does
 struct Travelling {};  // by its MCU, between its limits or for one step, or it is about to
-using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine, Travelling>;
+struct InProgram {};   // a program of its MCU has it, also while it rests, or is about to
+using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine, Travelling, InProgram>;
 
 // What an MCU reports, and what is known beside.
 struct Report {
@@ -237,6 +238,8 @@ class Motor {
   void end_homing(bool found);
   void travel();
   void end_travel();
+  void enter_program();
+  void leave_program();
   void set_local(bool local) { setup_.local = local; }
   // Another table. Precondition: !has_plan().
   void set_axis(Axis axis) { axis_ = axis; }

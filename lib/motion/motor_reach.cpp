@@ -23,6 +23,10 @@ Result<void> MotorReach::may_be_used() const {
     return fail("it travels by itself, for a CAMAC module; run " +
                 words::remedy("stop", motor_.name()) + " first");
   }
+  if (motor_.is<InProgram>()) {
+    return fail("a program of its MCU has it; run " + words::remedy("stop", motor_.name()) +
+                " first");
+  }
   if (motor_.is<Local>() && !motor_.autonomous_) {
     return fail("MCU " + motor_.setup_.mcu +
                 " moves it for another master; end that, and wait until it rests");

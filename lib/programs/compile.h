@@ -44,7 +44,7 @@ Result<std::vector<std::uint8_t>> compile(const Program& program, const McuPlace
 
 // What it does. Of a repeat without end the first pass counts.
 struct Rehearsal {
-  static constexpr std::size_t kMostFrames = 1'000'000;  // carried out
+  static constexpr std::size_t kMostFrames = 1'000'000;
   struct Way {
     std::int64_t least_steps = 0;  // where it comes to, its beginning included
     std::int64_t most_steps = 0;
@@ -55,14 +55,17 @@ struct Rehearsal {
   std::uint64_t ticks = 0;  // without the time in which it waits for inputs
   std::uint64_t pulses = 0;
   bool endless = false;
-  bool cut = false;  // after kMostFrames: there is more
+  bool cut = false;  // there is more
   bool waits_for_inputs = false;
   std::size_t bytes = 0;
 };
 
 // Walks through the compiled bytes as the MCU does. Error: a frame that leads a motor beyond where
-// it may go, with the frame, the pass and the figures. O(frames carried out).
+// it may go, with the frame, the pass and the figures. It is cut
+// at the frame with which more than `most_frames` are carried out, points of lines counted.
+// O(frames carried out).
 Result<Rehearsal> rehearse(const Program& program, const McuPlace& mcu,
-                           std::span<const MotorPlace> motors, std::span<const std::uint8_t> bytes);
+                           std::span<const MotorPlace> motors, std::span<const std::uint8_t> bytes,
+                           std::size_t most_frames = Rehearsal::kMostFrames);
 
 }  // namespace bushd::programs

@@ -14,8 +14,13 @@ constexpr std::uint32_t kBeginsInATick = 8;  // docs/protocol.md, Programs
 class Walk {
  public:
   Walk(const Program& text, const McuPlace& mcu, std::span<const MotorPlace> motors,
-       const bushd_program& program)
-      : text_(text), mcu_(mcu), motors_(motors), program_(program), at_(program.frames) {
+       const bushd_program& program, std::size_t most_frames)
+      : text_(text),
+        mcu_(mcu),
+        motors_(motors),
+        program_(program),
+        most_frames_(most_frames),
+        at_(program.frames) {
     for (const MotorPlace& motor : motors_) {
       out_.motors.push_back({motor.at_steps, motor.at_steps, motor.at_steps, 0});
     }
@@ -23,14 +28,15 @@ class Walk {
   }
 
   Result<Rehearsal> walk() {
-    for (std::size_t carried_out = 0; !ended_; ++carried_out) {
-      if (carried_out == Rehearsal::kMostFrames) {
-        out_.cut = true;
-        return out_;
-      }
+    for (std::size_t carried_out = 0; !ended_;) {
       begin();
       const bushd_program_frame frame = bushd_next_program_frame(&program_, &at_);
       ++frame_;
+      carried_out += std::max<std::size_t>(frame.points, 1);
+      if (carried_out > most_frames_) {
+        out_.cut = true;
+        return out_;
+      }
       auto made = carry_out(frame);
       if (!made) return fail(made.error());
     }
@@ -173,6 +179,7 @@ class Walk {
   const McuPlace& mcu_;
   std::span<const MotorPlace> motors_;
   const bushd_program& program_;
+  const std::size_t most_frames_;
   const std::uint8_t* at_;
   std::array<std::size_t, BUSHD_MOTORS_PER_MCU> of_output_{};
   std::size_t frame_ = 0;    // frames begun, of the text
@@ -185,13 +192,13 @@ class Walk {
 }  // namespace
 
 Result<Rehearsal> rehearse(const Program& text, const McuPlace& mcu,
-                           std::span<const MotorPlace> motors,
-                           std::span<const std::uint8_t> bytes) {
+                           std::span<const MotorPlace> motors, std::span<const std::uint8_t> bytes,
+                           std::size_t most_frames) {
   bushd_program program;
   if (bushd_program_check(bytes.data(), bytes.size(), UINT16_MAX, &program) != BUSHD_OK) {
     return fail("this is no program; compile it anew");
   }
-  auto rehearsal = Walk(text, mcu, motors, program).walk();
+  auto rehearsal = Walk(text, mcu, motors, program, most_frames).walk();
   if (rehearsal) rehearsal->bytes = bytes.size();
   return rehearsal;
 }

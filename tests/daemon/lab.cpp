@@ -34,6 +34,9 @@ Answer answer_of(const api::Reply& reply) {
   }
   if (const auto* plan = std::get_if<api::MovePlan>(&completed->detail)) answer.plan = *plan;
   if (const auto* crate = std::get_if<api::CamacResult>(&completed->detail)) answer.camac = *crate;
+  if (const auto* list = std::get_if<api::ProgramList>(&completed->detail)) {
+    answer.programs = list->programs;
+  }
   return answer;
 }
 

@@ -72,6 +72,7 @@ struct Answer {
   std::vector<api::TableRef> tables{};
   std::optional<api::MovePlan> plan{};
   std::optional<api::CamacResult> camac{};
+  std::vector<api::ProgramEntry> programs{};
 };
 
 class Lab : public daemon::Outputs, private state::Backend {

@@ -24,6 +24,7 @@
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
 #include "daemon/services/positions.h"
+#include "daemon/services/programs.h"
 #include "daemon/services/travels.h"
 #include "sim/bus.h"
 
@@ -76,6 +77,7 @@ class LiveBench : public Bench {
   daemon::HomingQueue homing{installation, interlocks,   open_moves, moves,
                              kept,         idle_drivers, *this};
   daemon::Travels travels{installation, interlocks, open_moves, kept, idle_drivers, *this};
+  daemon::Programs programs{installation, interlocks, open_moves, kept, idle_drivers, *this};
   daemon::LocalInputs local_inputs{installation};
   daemon::EmergencyStop emergency_stop{installation, interlocks, homing, open_moves, kept, *this};
 

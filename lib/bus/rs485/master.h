@@ -89,7 +89,7 @@ class Rs485Master final : public BusMaster,
   void reset_low_water() override;
   bool busy(McuIndex mcu) const override {
     return !connector_.queue(mcu).empty() || connector_.program(mcu).has_orders() ||
-           mcus_[mcu].poll_wanted || mcus_[mcu].answered;
+           connector_.program(mcu).wants_state() || mcus_[mcu].poll_wanted || mcus_[mcu].answered;
   }
   bool heard() const override { return heard_; }
   // By this master or by an MCU.

@@ -32,6 +32,7 @@ class ProgramLink {
   void clear() { *this = {}; }
   // It is to be asked how its program does.
   void want_state() { wanted_ = true; }
+  bool wants_state() const { return wanted_ && !denied_; }
 
   void put(std::vector<std::uint8_t> bytes);
   void erase();

@@ -14,8 +14,8 @@ using test::LiveBench;
 
 TEST(DryRunService, IsTheMoveOnCopies) {
   LiveBench bench;
-  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.local_inputs,
-              bench.open_moves);
+  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.programs,
+              bench.local_inputs, bench.open_moves);
   bench.connect(stops);
   DryRun dry_run(bench.installation, bench.now_us(),
                  {{bench.motor("m01"), 1000, 0}, {bench.motor("m04"), 0, 0}});

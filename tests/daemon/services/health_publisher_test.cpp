@@ -30,8 +30,8 @@ TEST(HealthPublisher, TellsOfEveryBusOnceASecond) {
 
 TEST(HealthPublisher, CountsLossesAndRestarts) {
   LiveBench bench;
-  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.local_inputs,
-              bench.open_moves);
+  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.programs,
+              bench.local_inputs, bench.open_moves);
   bench.connect(stops);
   HealthPublisher publisher(bench.installation, bench);
   bench.silent = true;

@@ -41,7 +41,7 @@ struct HomingBench : LiveBench {
     }
     LiveBench::send(bus, bytes);
   }
-  Stops stops{installation, moves, homing, travels, local_inputs, open_moves};
+  Stops stops{installation, moves, homing, travels, programs, local_inputs, open_moves};
   int homes_asked = 0;
 
  private:
@@ -94,8 +94,8 @@ TEST(HomingQueue, OneThatWaitsForTheTriggerIsToldAsSuch) {
 
 TEST(HomingQueue, AMotorWithoutAHomeIsRefusedWithTheRemedy) {
   LiveBench bench;
-  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.local_inputs,
-              bench.open_moves);
+  Stops stops(bench.installation, bench.moves, bench.homing, bench.travels, bench.programs,
+              bench.local_inputs, bench.open_moves);
   bench.connect(stops);
   bench.homing.request(bench.asker(1), api::Home{{"m02"}});
   EXPECT_THAT(bench.refusal(1), HasSubstr("no home switch configured: add 'home = {...}' to motor "

@@ -19,7 +19,7 @@ struct MovesBench : LiveBench {
     moves.request(now_us(), asker(number),
                   api::Move{.kind = api::Move::Kind::kAbsolute, .motors = std::move(motors)});
   }
-  Stops stops{installation, moves, homing, travels, local_inputs, open_moves};
+  Stops stops{installation, moves, homing, travels, programs, local_inputs, open_moves};
 };
 
 TEST(MovesService, MotorsOfABusStartInTheSameTick) {

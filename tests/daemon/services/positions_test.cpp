@@ -25,7 +25,7 @@ struct PositionsBench : LiveBench {
   void set(std::int64_t number, std::vector<api::MotorAmount> motors) {
     positions.request(now_us(), asker(number), api::SetPosition{std::move(motors)});
   }
-  Stops stops{installation, moves, homing, travels, local_inputs, open_moves};
+  Stops stops{installation, moves, homing, travels, programs, local_inputs, open_moves};
 };
 
 TEST(Positions, AreSetInTheMcusAndLogged) {

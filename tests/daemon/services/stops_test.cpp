@@ -14,7 +14,7 @@ using testing::HasSubstr;
 
 struct StopsBench : LiveBench {
   StopsBench() { connect(stops); }
-  Stops stops{installation, moves, homing, travels, local_inputs, open_moves};
+  Stops stops{installation, moves, homing, travels, programs, local_inputs, open_moves};
 };
 
 TEST(Stops, RampDownTheMotorsThatAreNamed) {

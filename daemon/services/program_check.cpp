@@ -1,0 +1,168 @@
+#include "daemon/services/program_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "config/words.h"
+#include "engine/frame.h"
+#include "tables/any_line.h"
+
+namespace bushd::daemon {
+namespace {
+
+bool has_lines(const programs::Program& text) {
+  return std::ranges::any_of(text.frames, [](const programs::Frame& frame) {
+    return std::holds_alternative<programs::Line>(frame.what);
+  });
+}
+
+Result<McuId> mcu_of(const Installation& installation, const std::vector<MotorId>& motors) {
+  const std::vector<McuId> mcus = installation.mcus_of(motors);
+  if (mcus.size() > 1) {
+    return fail("its motors are at " + installation[mcus[0]].name() + " and at " +
+                installation[mcus[1]].name() +
+                "; a program is for one MCU: write one for each, and run them together");
+  }
+  const Mcu& mcu = installation[mcus.front()];
+  if (!mcu.can_have_program()) {
+    return fail("MCU " + mcu.name() + " cannot have programs; docs/programs.md says which can");
+  }
+  return mcu.id;
+}
+
+Result<programs::MotorPlace> place_of(const Installation& installation, MotorId id) {
+  const motion::Motor& motor = installation[id];
+  const Mcu& mcu = installation.mcu_of(id);
+  const bushd_table& table = installation.table_of(id)->view();
+  const auto bank = mcu.bank_of(table);
+  const auto shortest = motor.scale().shortest_delay_at({}, table.time_unit_ns);
+  if (!shortest) return fail(motor.name() + ": " + shortest.error().text());
+  if (!bank) {
+    return fail("MCU " + mcu.name() + " does not have the table of " + motor.name() +
+                " yet; try again when it is ready");
+  }
+  return programs::MotorPlace{.name = motor.name(),
+                              .output = motor.output().value,
+                              .bank = *bank,
+                              .table = &table,
+                              .coordinates = motor.scale().coordinates(),
+                              .least_steps = motor.scale().lowest(),
+                              .most_steps = motor.scale().highest(),
+                              .shortest_delay_ns = *shortest * table.time_unit_ns,
+                              .at_steps = motor.position_steps()};
+}
+
+// The table of its lines: one that the MCU has, or one that it will get.
+Result<void> find_line_table(const Installation& installation, const Mcu& mcu,
+                             CheckedProgram& program, programs::McuPlace& place) {
+  std::vector<const bushd_table*> tables;
+  for (const MotorId motor : program.motors) {
+    const bushd_table* table = &installation.table_of(motor)->view();
+    if (std::ranges::find(tables, table) == tables.end()) tables.push_back(table);
+  }
+  auto made = tables::any_line_table(tables, "lines of " + program.name);
+  if (!made) return fail(made.error());
+  const bushd_table& table = (*made)->view();
+  const auto bank = mcu.bank_of(table);
+  if (!bank && !mcu.can_upload(table)) return {};  // compile() says so
+  if (!mcu.keeps_up_with(table, 0, false)) {
+    return fail("MCU " + mcu.name() + " is too slow for lines of these motors' tables");
+  }
+  program.line_table = std::move(*made);
+  program.line_table_is_there = bank.has_value();
+  place.line_table = &program.line_table->view();
+  place.line_bank = bank.value_or(BUSHD_SCRATCH_BANK);
+  return {};
+}
+
+}  // namespace
+
+Result<programs::Program> parse_program(const api::PutProgram& request) {
+  if (!config::is_name(request.program, config::kLongestName)) {
+    return fail(fmt::format("\"{}\" is no name of a program; allowed: {}", request.program,
+                            config::kNameRule));
+  }
+  std::size_t bytes = request.text.size();
+  for (const auto& points : request.points) bytes += points.text.size() + points.file.size();
+  if (bytes > api::PutProgram::kMostBytes) {
+    return fail(fmt::format("program {} has {} bytes of text; allowed: {}", request.program, bytes,
+                            api::PutProgram::kMostBytes));
+  }
+  return programs::parse(
+      request.text, request.program, [&](const std::string& file) -> Result<std::string> {
+        const auto found = std::ranges::find(request.points, file, &api::PutProgram::Points::file);
+        if (found != request.points.end()) return found->text;
+        return fail("the file \"" + file + "\" has not been sent with it");
+      });
+}
+
+Result<CheckedProgram> check_program(const Installation& installation, const std::string& name,
+                                     programs::Program text) {
+  CheckedProgram program{.name = name, .text = std::move(text)};
+  auto motors = installation.find(program.text.motors);
+  if (!motors) return fail(motors.error());
+  program.motors = std::move(*motors);
+  const auto mcu_id = mcu_of(installation, program.motors);
+  if (!mcu_id) return fail(mcu_id.error());
+  const Mcu& mcu = installation[*mcu_id];
+  program.mcu = mcu.id;
+  if (auto online = mcu.must_be_online(); !online) return fail(online.error());
+  if (program.text.without_host && !mcu.config.programs_without_host) {
+    return fail("it says without_host = true, and MCU " + mcu.name() +
+                " may not go on without a host; set programs_without_host = true in its [[mcu]], "
+                "or leave without_host out");
+  }
+  programs::McuPlace place{.name = "MCU " + mcu.name(),
+                           .memory = mcu.offers.programs->program(mcu.on_bus()).state.memory,
+                           .tick_ns = installation.bus_of(mcu).config.tick_ns(),
+                           .lines = mcu.makes_lines()};
+  std::vector<programs::MotorPlace> places;
+  for (const MotorId motor : program.motors) {
+    auto its = place_of(installation, motor);
+    if (!its) return fail(its.error());
+    places.push_back(std::move(*its));
+  }
+  if (has_lines(program.text) && place.lines) {
+    if (auto found = find_line_table(installation, mcu, program, place); !found) {
+      return fail(found.error());
+    }
+  }
+  auto bytes = programs::compile(program.text, place, places);
+  if (!bytes) return fail(bytes.error());
+  program.bytes = std::move(*bytes);
+  program.crc = ~bushd_crc32(BUSHD_CRC32_START, program.bytes.data(), program.bytes.size());
+  auto walk = programs::rehearse(program.text, place, places, program.bytes, kMostWalkedFrames);
+  if (!walk) return fail(walk.error());
+  program.walk = std::move(*walk);
+  return program;
+}
+
+api::ProgramEntry entry_of(const Installation& installation, const CheckedProgram& program) {
+  const Mcu& mcu = installation[program.mcu];
+  const programs::Rehearsal& walk = program.walk;
+  const std::int64_t tick_us = installation.bus_of(mcu).config.tick_us;
+  api::ProgramEntry entry{.mcu = mcu.name(),
+                          .program = program.name,
+                          .checksum = fmt::format("{:08x}", program.crc),
+                          .without_host = program.text.without_host,
+                          .bytes = static_cast<std::int32_t>(program.bytes.size()),
+                          .duration_us = static_cast<std::int64_t>(walk.ticks) * tick_us,
+                          .pulses = static_cast<std::int64_t>(walk.pulses),
+                          .endless = walk.endless,
+                          .waits_for_inputs = walk.waits_for_inputs,
+                          .cut = walk.cut};
+  for (std::size_t i = 0; i < program.motors.size(); ++i) {
+    const programs::Rehearsal::Way& way = walk.motors[i];
+    entry.motors.push_back({.motor = installation[program.motors[i]].name(),
+                            .least_steps = way.least_steps,
+                            .most_steps = way.most_steps,
+                            .end_steps = way.end_steps,
+                            .edges = static_cast<std::int64_t>(way.edges)});
+  }
+  return entry;
+}
+
+}  // namespace bushd::daemon

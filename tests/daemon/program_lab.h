@@ -1,0 +1,75 @@
+// A lab with programs in its MCUs.
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/lab.h"
+#include "sim/edge.h"
+
+namespace bushd::test {
+
+// When each motor made its steps, by MCU and output.
+class StepTimes final : public sim::EdgeSink {
+ public:
+  void edge(const sim::Edge& edge) override {
+    if (edge.signal != sim::Signal::kStep || !edge.level) return;
+    at_ns_[{edge.mcu, edge.index}].push_back(edge.time_ns);
+  }
+  void settled(sim::TimeNs) override {}
+
+  const std::vector<sim::TimeNs>& of(std::size_t mcu, unsigned output) {
+    return at_ns_[{mcu, output}];
+  }
+  bool none() const { return at_ns_.empty(); }
+
+ private:
+  std::map<std::pair<std::size_t, unsigned>, std::vector<sim::TimeNs>> at_ns_;
+};
+
+// Programs of its MCUs may go on without a host, if `without_host`.
+inline std::string hall_of_programs(int mcus, int motors, bool without_host = false) {
+  std::string toml = hall(mcus, motors);
+  const std::string mcu = "[[mcu]]\n";
+  for (std::size_t at = toml.find(mcu); without_host && at != std::string::npos;
+       at = toml.find(mcu, at + 1)) {
+    toml.insert(at + mcu.size(), "programs_without_host = true\n");
+  }
+  return toml;
+}
+
+struct ProgramLab : Lab {
+  explicit ProgramLab(const std::string& toml) : Lab(toml, {}, &steps) { connect(); }
+  ProgramLab() : ProgramLab(hall_of_programs(2, 2)) {}
+
+  static api::PutProgram put_of(const std::string& name, const std::string& motors,
+                                const std::string& frames, const std::string& head = {}) {
+    return {.program = name,
+            .text = "motors = [" + motors + "]\nunit = \"steps\"\n" + head + frames};
+  }
+  Answer put(const std::string& name, const std::string& motors, const std::string& frames,
+             const std::string& head = {}) {
+    return wait(send(put_of(name, motors, frames, head)));
+  }
+  std::int64_t run(const std::vector<std::string>& programs) {
+    return send(api::RunPrograms{programs});
+  }
+  api::ProgramEntry entry(std::size_t index = 0) {
+    const std::vector<api::ProgramEntry> all = wait(send(api::ListPrograms{})).programs;
+    return index < all.size() ? all[index] : api::ProgramEntry{};
+  }
+  bool comes_to(const std::string& stage) {
+    return run_until([&] { return entry().stage == stage; });
+  }
+
+  StepTimes steps;
+};
+
+// One step forth and back, for ever.
+inline constexpr const char* kToAndFro =
+    "[[frame]]\nrepeat = 0\n[[frame]]\nmove_by = [40]\n[[frame]]\nmove_by = [-40]\n"
+    "[[frame]]\nnext = true\n";
+
+}  // namespace bushd::test

@@ -1,0 +1,246 @@
+// Programs in MCUs, asked for by clients: put, run, and what ends them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/program_lab.h"
+#include "engine/frame.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr const char* kSquare = R"(
+[[frame]]
+move_by = [30, 0]
+[[frame]]
+repeat = 3
+[[frame]]
+line_by = [[20, 10], [-20, -10]]
+[[frame]]
+pulse_us = 50
+[[frame]]
+next = true
+[[frame]]
+move_to = [0, 5]
+)";
+
+TEST(Programs, DoWhatTheirTextSays) {
+  ProgramLab lab;
+  const Answer put = lab.put("square", "\"m01\", \"m02\"", kSquare);
+  ASSERT_EQ(put.result, "done") << put.reason;
+  ASSERT_THAT(put.programs, SizeIs(1));
+  const api::ProgramEntry& entry = put.programs.front();
+  EXPECT_EQ(entry.mcu, "hall:1");
+  EXPECT_EQ(entry.program, "square");
+  EXPECT_EQ(entry.stage, "loaded");
+  EXPECT_EQ(entry.memory, 8192);
+  EXPECT_EQ(entry.pulses, 3);
+  EXPECT_FALSE(entry.endless || entry.cut || entry.waits_for_inputs);
+  const api::ProgramEntry::Motor m01{"m01", 0, 50, 0, 30 + 3 * 40 + 30};
+  const api::ProgramEntry::Motor m02{"m02", 0, 10, 5, 3 * 20 + 5};
+  EXPECT_THAT(entry.motors, ElementsAre(m01, m02));
+  EXPECT_TRUE(lab.steps.none()) << "nothing moves until it is run";
+
+  const std::int64_t run = lab.run({"square"});
+  const Answer result = lab.wait(run);
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_THAT(result.reason, HasSubstr("done"));
+  EXPECT_THAT(result.position_steps, ElementsAre(0, 5));
+  EXPECT_THAT(lab.replies(run), SizeIs(2)) << "accepted, and one result";
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(lab.shaft_steps("m02"), 5);
+  EXPECT_THAT(lab.steps.of(0, 0), SizeIs(m01.edges));
+  EXPECT_THAT(lab.steps.of(0, 1), SizeIs(m02.edges));
+  // The walk tells its duration to the end of its last tick; the first edge comes in its first one.
+  const sim::TimeNs took = lab.steps.of(0, 1).back() - lab.steps.of(0, 0).front();
+  EXPECT_LE(took, entry.duration_us * 1000);
+  EXPECT_EQ(lab.entry().stage, "ended");
+  EXPECT_EQ(lab.entry().reason, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).result, "reached") << "it is free";
+}
+
+TEST(Programs, ADryRunLeavesTheMcuAlone) {
+  ProgramLab lab;
+  api::PutProgram put = ProgramLab::put_of("square", "\"m01\", \"m02\"", kSquare);
+  put.dry_run = true;
+  const Answer answer = lab.wait(lab.send(put));
+  ASSERT_THAT(answer.programs, SizeIs(1));
+  EXPECT_EQ(answer.programs[0].motors[0].edges, 180);
+  EXPECT_EQ(lab.entry().stage, "none");
+}
+
+TEST(Programs, RefusalsSayWhy) {
+  ProgramLab lab;
+  const auto refusal = [&](const Answer& answer) {
+    EXPECT_EQ(answer.phase, Answer::kRefused);
+    return answer.reason;
+  };
+  const std::string frame = "[[frame]]\nmove_by = [1]\n";
+  EXPECT_THAT(refusal(lab.put("a b", "\"m01\"", frame)), HasSubstr("no name of a program"));
+  EXPECT_THAT(refusal(lab.put("a", "\"m09\"", frame)), HasSubstr("m09"));
+  EXPECT_THAT(refusal(lab.put("a", "\"m01\", \"m03\"", "[[frame]]\nmove_by = [1, 1]\n")),
+              HasSubstr("at hall:1 and at hall:2; a program is for one MCU"));
+  EXPECT_THAT(refusal(lab.put("a", "\"m01\"", frame, "without_host = true\n")),
+              HasSubstr("programs_without_host = true in its [[mcu]]"));
+  EXPECT_THAT(refusal(lab.put("a", "\"m01\"", "[[frame]]\nline_by = \"no.csv\"\n")),
+              HasSubstr("\"no.csv\" has not been sent"));
+  EXPECT_THAT(refusal(lab.put("a", "\"m01\"", "[[frame]]\njump = 3\n")), HasSubstr("a:3"));
+  EXPECT_THAT(refusal(lab.wait(lab.run({"a"}))), HasSubstr("no MCU has a program \"a\""));
+  EXPECT_THAT(refusal(lab.wait(lab.run({}))), HasSubstr("no program is named"));
+  EXPECT_THAT(refusal(lab.wait(lab.send(api::EraseProgram{"a"}))),
+              HasSubstr("no MCU has a program \"a\""));
+  ASSERT_EQ(lab.put("a", "\"m01\"", frame).result, "done");
+  EXPECT_THAT(refusal(lab.put("a", "\"m03\"", frame)), HasSubstr("hall:1 has a program of that"));
+  EXPECT_THAT(refusal(lab.wait(lab.run({"a", "a"}))), HasSubstr("named twice"));
+  lab.send(Ask::kMoveBy, {"m01"}, {3000});
+  EXPECT_THAT(refusal(lab.wait(lab.run({"a"}))), HasSubstr("m01 moves"));
+  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  lab.wait(lab.send(api::Hold{{"m01"}}));
+  EXPECT_THAT(refusal(lab.wait(lab.run({"a"}))), HasSubstr("'bushctl release m01'"));
+}
+
+TEST(Programs, ARunChecksAllOfItAgain) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\"", "[[frame]]\nmove_by = [100]\n").result, "done");
+  lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kChange,
+                                   .changes = {{"m01", "soft_limits", "[-10, 50]"}}}));
+  const Answer answer = lab.wait(lab.run({"a"}));
+  EXPECT_EQ(answer.phase, Answer::kRefused);
+  EXPECT_THAT(answer.reason, HasSubstr("may go from -10 steps to 50 steps"));
+  lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kChange,
+                                   .changes = {{"m01", "soft_limits", "[-10, 500]"}}}));
+  EXPECT_THAT(lab.wait(lab.run({"a"})).reason, HasSubstr("put it again"));
+  EXPECT_TRUE(lab.steps.none());
+}
+
+TEST(Programs, ErasedOnesAreGone) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\"", "[[frame]]\nmove_by = [100]\n").result, "done");
+  ASSERT_EQ(lab.wait(lab.send(api::EraseProgram{"a"})).result, "done");
+  EXPECT_TRUE(lab.comes_to("none"));
+  EXPECT_EQ(lab.wait(lab.run({"a"})).phase, Answer::kRefused);
+}
+
+TEST(Programs, AStopOfOneMotorEndsThem) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\", \"m02\"",
+                    "[[frame]]\nrepeat = 0\n[[frame]]\nmove_by = { m01 = 900 }\n"
+                    "[[frame]]\nmove_by = { m01 = -900 }\n[[frame]]\nnext = true\n")
+                .result,
+            "done");
+  const std::int64_t run = lab.run({"a"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 200; }));
+  EXPECT_EQ(lab.motor("m02").activity, api::Activity::kMoving) << "it is the program's";
+  EXPECT_THAT(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).reason, HasSubstr("a program of its"));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m02"})).result, "done");
+  const Answer result = lab.wait(run);
+  EXPECT_EQ(result.result, "stopped");
+  EXPECT_THAT(result.reason, HasSubstr("stopped on request, at frame 2 (a:5)"));
+  EXPECT_EQ(result.position_steps.at(0), lab.shaft_steps("m01"));
+  EXPECT_LT(lab.shaft_steps("m01"), 900) << "by its ramp, not at the end of the frame";
+  const std::int64_t stood = lab.shaft_steps("m01");
+  lab.run_for(3);
+  EXPECT_EQ(lab.shaft_steps("m01"), stood);
+}
+
+TEST(Programs, AStopRightBehindTheRequestLetsNothingBegin) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\"", kToAndFro).result, "done");
+  const std::int64_t run = lab.run({"a"});
+  lab.send(Ask::kStop, {"m01"});
+  EXPECT_EQ(lab.wait(run).result, "stopped");
+  lab.run_for(2);
+  EXPECT_TRUE(lab.steps.none());
+  const std::int64_t again = lab.run({"a"});
+  lab.run_for(0.004);
+  lab.send(api::Pause{{"m01"}});
+  EXPECT_EQ(lab.wait(again).result, "stopped") << "a pause before it has begun is a stop";
+  EXPECT_TRUE(lab.steps.none());
+}
+
+TEST(Programs, PauseAndGoOn) {
+  ProgramLab lab;
+  ASSERT_EQ(
+      lab.put("a", "\"m01\"", "[[frame]]\nmove_to = [2000]\n[[frame]]\nmove_to = [7]\n").result,
+      "done");
+  const std::int64_t run = lab.run({"a"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 300; }));
+  const Answer pause = lab.wait(lab.send(api::Pause{{"m01"}}));
+  EXPECT_EQ(pause.result, "done") << pause.reason;
+  EXPECT_EQ(pause.reason, "paused: 1 motor");
+  EXPECT_EQ(lab.entry().stage, "paused");
+  const std::int64_t stood = lab.shaft_steps("m01");
+  lab.run_for(2);
+  EXPECT_EQ(lab.shaft_steps("m01"), stood);
+  EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m01"}})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(api::Resume{{"m01"}})).phase, Answer::kRefused);
+  lab.wait(lab.send(api::Release{{"m01"}}));
+  EXPECT_EQ(lab.wait(lab.send(api::Resume{{"m01"}})).reason, "resumed: 1 motor");
+  EXPECT_EQ(lab.wait(run).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 7);
+  EXPECT_THAT(lab.steps.of(0, 0), SizeIs(2000 + 1993));
+}
+
+TEST(Programs, AnEmergencyStopEndsThem) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\"", kToAndFro).result, "done");
+  const std::int64_t run = lab.run({"a"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.steps.of(0, 0).size() > 100; }));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  const Answer result = lab.wait(run);
+  EXPECT_EQ(result.result, "stopped");
+  EXPECT_THAT(result.reason, HasSubstr("emergency"));
+  EXPECT_EQ(lab.wait(lab.run({"a"})).phase, Answer::kRefused);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  const std::size_t before = lab.steps.of(0, 0).size();
+  lab.run_for(2);
+  EXPECT_EQ(lab.steps.of(0, 0).size(), before) << "clearing starts nothing";
+}
+
+TEST(Programs, OfSeveralMcusBeginWithTheSameTick) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\"", "[[frame]]\nmove_by = [50]\n").result, "done");
+  ASSERT_EQ(lab.put("b", "\"m03\"", "[[frame]]\nmove_by = [50]\n").result, "done");
+  const Answer result = lab.wait(lab.run({"a", "b"}));
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_THAT(result.motors, ElementsAre("m01", "m03"));
+  ASSERT_THAT(lab.steps.of(0, 0), SizeIs(50));
+  ASSERT_THAT(lab.steps.of(1, 0), SizeIs(50));
+  // Ticks are 2.56 ms, and an MCU that is out by half of one is no more in step.
+  EXPECT_LT(std::abs(lab.steps.of(0, 0).front() - lab.steps.of(1, 0).front()), 1'280'000);
+}
+
+// Whatever becomes of the requests on the line, either both begin in the same tick, or neither.
+TEST(Programs, OfSeveralMcusBeginTogetherOrNotAtAll) {
+  for (int frame = 0; frame < 12; ++frame) {
+    ProgramLab lab;
+    ASSERT_EQ(lab.put("a", "\"m01\"", "[[frame]]\nmove_by = [50]\n").result, "done");
+    ASSERT_EQ(lab.put("b", "\"m03\"", "[[frame]]\nmove_by = [50]\n").result, "done");
+    lab.run_for(0.3);
+    const std::int64_t run = lab.run({"a", "b"});
+    int frames = 0;
+    // From one frame on nothing reaches the MCUs for a while.
+    const std::int64_t lost_from = frame;
+    std::int64_t until_us = INT64_MAX;
+    lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) {
+      if (frames++ == lost_from) until_us = lab.now_us() + 60'000;
+      return frames <= lost_from || lab.now_us() >= until_us;
+    };
+    const Answer result = lab.wait(run);
+    EXPECT_EQ(lab.steps.of(0, 0).empty(), lab.steps.of(1, 0).empty())
+        << "frame " << frame << ": " << result.reason;
+    if (result.result == "reached") {
+      EXPECT_EQ(lab.steps.of(1, 0).size(), 50u);
+    }
+    if (!lab.steps.of(0, 0).empty() && !lab.steps.of(1, 0).empty()) {
+      EXPECT_LT(std::abs(lab.steps.of(0, 0).front() - lab.steps.of(1, 0).front()), 1'280'000);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bushd::test
