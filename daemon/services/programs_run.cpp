@@ -1,0 +1,332 @@
+// Runs of programs: from the request to the one result.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "daemon/services/program_words.h"
+#include "daemon/services/programs.h"
+#include "engine/program.h"
+#include "words/remedy.h"
+
+namespace bushd::daemon {
+namespace {
+
+using api::Outcome;
+
+constexpr const char* kStoppedBefore = "it was stopped before it began";
+
+}  // namespace
+
+Result<void> Programs::may_run(McuId id) const {
+  const CheckedProgram& program = *mcus_[id].program;
+  const Mcu& mcu = installation_[id];
+  for (const MotorId motor : program.motors) {
+    const std::string& name = installation_[motor].name();
+    if (auto may = interlocks_.may_move(motor); !may) return fail(name + ": " + may.error().text());
+    if (installation_[motor].has_plan()) {
+      return fail(name + " moves; run " + words::remedy("stop", name) + " first");
+    }
+    if (installation_[motor].hold().is_set()) {
+      return fail(name + ": " + installation_[motor].hold().text() + "; run " +
+                  words::remedy("release", name) + " first");
+    }
+  }
+  if (mcus_[id].run || view(id).under_way()) {
+    return fail("the program of MCU " + mcu.name() + " is under way already");
+  }
+  if (mcus_[id].upload || !is_loaded(id)) {
+    return fail("MCU " + mcu.name() + " does not have it any more; put it again");
+  }
+  const auto now = check_program(installation_, program.name, program.text);
+  if (!now) return fail(now.error());
+  if (now->bytes != program.bytes || (now->line_table && !now->line_table_is_there)) {
+    return fail(
+        "tables, speeds or limits of its motors are not those with which it was put; put it again");
+  }
+  for (std::size_t i = 0; i < now->motors.size(); ++i) {
+    const motion::Motor& motor = installation_[now->motors[i]];
+    for (const std::int64_t end :
+         {now->walk.motors[i].least_steps, now->walk.motors[i].most_steps}) {
+      if (auto may = motor.reach().may_move_to(end); !may) {
+        return fail(motor.name() + ": " + may.error().text());
+      }
+    }
+  }
+  return {};
+}
+
+Result<std::vector<McuId>> Programs::mcus_of(const api::RunPrograms& request) const {
+  if (request.programs.empty()) return fail("no program is named");
+  if (auto may = interlocks_.may_move(); !may) return fail(may.error());
+  std::vector<McuId> mcus;
+  for (const std::string& name : request.programs) {
+    const auto id = find(name);
+    if (!id) {
+      return fail("no MCU has a program \"" + name + "\"; 'bushctl program put' puts it there");
+    }
+    if (std::ranges::find(mcus, *id) != mcus.end()) return fail(name + " is named twice");
+    if (!mcus.empty() && installation_[*id].config.bus != installation_[mcus.front()].config.bus) {
+      return fail(request.programs.front() + " and " + name +
+                  " are on two buses, whose ticks have nothing in common; run them one by one");
+    }
+    if (auto may = may_run(*id); !may) return fail(name + ": " + may.error().text());
+    mcus.push_back(*id);
+  }
+  return mcus;
+}
+
+void Programs::request(const api::Asker& asker, const api::RunPrograms& request) {
+  auto mcus = mcus_of(request);
+  if (!mcus) return asker.answer(api::Refused{mcus.error().text()});
+  std::vector<MotorId> all;
+  for (const McuId id : *mcus) {
+    const std::vector<MotorId>& motors = mcus_[id].program->motors;
+    all.insert(all.end(), motors.begin(), motors.end());
+    mcus_[id].run = Run{.motors = motors, .without_host = mcus_[id].program->text.without_host};
+  }
+  const auto by = open_.precedence().overtaken(asker.after_stops, all);
+  if (by) {
+    for (const McuId id : *mcus) mcus_[id].run.reset();
+    return open_.not_begun(asker, *by);
+  }
+  asker.answer(api::Accepted{});
+  open_.open(asker, all, OpenMoves::Purpose::kProgram);
+  for (const MotorId motor : all) installation_[motor].enter_program();
+  starts_.push_back({.asker = asker, .mcus = std::move(*mcus)});
+  installation_.changed = true;
+}
+
+// As soon as the disk knows of the motion and drivers are enabled.
+Result<bool> Programs::make_ready(std::int64_t now_us, const Start& start) {
+  bool ready = true;
+  for (const McuId id : start.mcus) {
+    if (auto may = interlocks_.may_begin(mcus_[id].run->motors.front()); !may) {
+      return fail(may.error());
+    }
+    for (const MotorId motor : mcus_[id].run->motors) {
+      const auto its = kept_.make_ready(now_us, motor);
+      if (!its) return fail(its.error());
+      ready = *its && ready;
+    }
+    ready = idle_drivers_.make_ready(now_us, id) && ready;
+    ready = !installation_[id].busy() && ready;
+  }
+  return ready;
+}
+
+void Programs::begin(std::int64_t now_us, Start& start) {
+  const Mcu& first = installation_[start.mcus.front()];
+  link::Programs& programs = *first.offers.programs;
+  std::vector<link::McuIndex> on_bus;
+  for (const McuId id : start.mcus) on_bus.push_back(installation_[id].on_bus());
+  const link::Tick at = programs.earliest_program_start(now_us, on_bus);
+  for (const McuId id : start.mcus) {
+    OfMcu& its = mcus_[id];
+    for (const MotorId motor : its.run->motors) kept_.not_wanted(motor);
+    its.last_number = its.last_number == UINT8_MAX ? 1 : its.last_number + 1;
+    if (its.last_number == view(id).state.number) {
+      its.last_number = its.last_number == UINT8_MAX ? 1 : its.last_number + 1;
+    }
+    its.run->number = its.last_number;
+    programs.run_program(installation_[id].on_bus(), its.run->number, at);
+  }
+  const std::int64_t ticks = at - first.bus().tick_at(now_us);
+  start.confirmed_by_us =
+      now_us + ticks * installation_.bus_of(first).config.tick_us * kConfirmedIn / kConfirmedOf;
+}
+
+// Whether it is over: all have begun, or none does.
+bool Programs::follow(std::int64_t now_us, Start& start) {
+  if (!start.confirmed_by_us) {
+    const auto ready = make_ready(now_us, start);
+    if (!ready) {
+      give_up(start, Outcome::kStopped, "it did not begin: " + ready.error().text());
+      return true;
+    }
+    if (*ready) begin(now_us, start);
+    return false;
+  }
+  const auto of = [this](McuId id) -> const auto& { return mcus_[id].run; };
+  if (std::ranges::all_of(start.mcus, [&](McuId id) { return of(id) && of(id)->taken; })) {
+    return true;
+  }
+  const bool one_ended =
+      std::ranges::any_of(start.mcus, [&](McuId id) { return !of(id) || of(id)->stop_wanted; });
+  if (!one_ended && now_us < *start.confirmed_by_us) return false;
+  for (const McuId id : start.mcus) {
+    if (!of(id) || of(id)->stop_wanted) continue;
+    mcus_[id].run->ended_by =
+        one_ended ? "another program that was to begin with it did not"
+                  : "not every MCU was known to have got its start in time; run it again";
+    mcus_[id].run->stop_wanted = true;
+  }
+  return true;
+}
+
+void Programs::give_up(const Start& start, Outcome outcome, const std::string& reason) {
+  for (const McuId id : start.mcus) end(id, outcome, reason);
+}
+
+void Programs::end_overtaken(std::int64_t) {
+  std::erase_if(starts_, [this](const Start& start) {
+    if (start.confirmed_by_us) return false;
+    std::vector<MotorId> all;
+    for (const McuId id : start.mcus) {
+      all.insert(all.end(), mcus_[id].run->motors.begin(), mcus_[id].run->motors.end());
+    }
+    const auto by = open_.precedence().overtaken(start.asker.after_stops, all);
+    if (!by) return false;
+    open_.stopped_by(all, by->by);
+    give_up(start, Outcome::kStopped, kStoppedBefore);
+    return true;
+  });
+}
+
+// -- what runs
+
+void Programs::step(std::int64_t now_us) {
+  std::erase_if(starts_, [&](Start& start) { return follow(now_us, start); });
+  for (const McuId id : installation_.mcus()) {
+    if (mcus_[id].upload) follow_upload(id);
+    follow(id);
+  }
+}
+
+std::int64_t Programs::next_wake_us() const {
+  std::int64_t wake = INT64_MAX;
+  for (const Start& start : starts_) wake = std::min(wake, start.confirmed_by_us.value_or(wake));
+  return wake;
+}
+
+// A program of before this daemon, or of before its MCU was lost.
+void Programs::adopt(McuId id) {
+  const Mcu& mcu = installation_[id];
+  const bushd_program_state& state = view(id).state;
+  const bool without_host = (state.flags & BUSHD_PROGRAM_WITHOUT_HOST) != 0;
+  Run run{.number = state.number, .known = false, .without_host = without_host, .taken = true};
+  for (const MotorId motor : mcu.motors()) {
+    if ((state.motors >> installation_[motor].output().value & 1) == 0) continue;
+    if (installation_[motor].has_plan()) continue;
+    installation_[motor].enter_program();
+    run.motors.push_back(motor);
+  }
+  const bool goes_on = without_host && mcu.config.programs_without_host;
+  run.stop_wanted = !goes_on;
+  outputs_.log(LogLevel::kWarning, id,
+               fmt::format("MCU {}: a program of before, with the checksum {:08x}, {}", mcu.name(),
+                           state.crc, goes_on ? "goes on" : "is stopped"));
+  mcus_[id].run = std::move(run);
+  installation_.changed = true;
+}
+
+void Programs::follow(McuId id) {
+  const Mcu& mcu = installation_[id];
+  if (!mcu.online() || !mcu.can_have_program() || !view(id).known) return;
+  auto& run = mcus_[id].run;
+  const bushd_program_state& state = view(id).state;
+  if (!run && view(id).under_way() && !installation_.shutting_down) adopt(id);
+  if (!run || run->number == 0) return;
+  if (state.number == run->number && state.stage >= BUSHD_PROGRAM_WAITS) run->taken = true;
+  if (run->stop_wanted && !std::exchange(run->stop_asked, true)) {
+    return mcu.offers.programs->stop_program(mcu.on_bus(), BUSHD_STOP_RAMP);
+  }
+  if (mcu.busy()) return;
+  if (run->taken && state.number != run->number) {
+    return end(id, Outcome::kLink, "MCU " + mcu.name() + " restarted while it was under way");
+  }
+  if (run->taken ? state.stage != BUSHD_PROGRAM_ENDED : !run->stop_asked) return;
+  if (!run->taken) return end(id, Outcome::kStopped, kStoppedBefore);
+  // Positions of the end, not of before.
+  const bushd_report& report = mcu.report();
+  if (static_cast<std::int32_t>(report.tick - state.tick) < 0) return;
+  if (((report.moving | report.autonomous) & state.motors) != 0) return;
+  ProgramEnd ending = end_of_program(state, mcu);
+  if (run->ended_by) ending = {Outcome::kFault, *run->ended_by};
+  end(id, ending.outcome, ending.reason + where(id));
+}
+
+void Programs::end(McuId id, Outcome outcome, const std::string& reason) {
+  const Run run = *std::exchange(mcus_[id].run, std::nullopt);
+  if (outcome != Outcome::kReached && outcome != Outcome::kStopped) {
+    outputs_.log(LogLevel::kWarning, id,
+                 "MCU " + installation_[id].name() + ": its program has ended: " + reason);
+  }
+  for (const MotorId motor : run.motors) {
+    kept_.not_wanted(motor);
+    installation_[motor].leave_program();
+    if (run.known) open_.end(motor, outcome, reason);
+  }
+  installation_.changed = true;
+}
+
+void Programs::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
+  auto& run = mcus_[mcu.id].run;
+  if (type != BUSHD_MSG_PROGRAM || !run || run->number == 0) return;
+  run->pause_asked = false;
+  if (run->taken) return;
+  end(mcu.id, Outcome::kFault,
+      "MCU " + mcu.name() + " refused to run it: " + bushd_status_text(status));
+}
+
+void Programs::goes_offline(Mcu& mcu, const std::string& cause) {
+  OfMcu& its = mcus_[mcu.id];
+  if (its.upload) end_upload(mcu.id, fail(cause));
+  if (!its.run) return;
+  its.run->stop_asked = false;
+  if (its.run->taken && its.run->without_host) {
+    outputs_.log(LogLevel::kWarning, mcu.id,
+                 "MCU " + mcu.name() + ": its program goes on without a host");
+    return;
+  }
+  end(mcu.id, Outcome::kLink, cause + "; its program ends as soon as it hears no host");
+}
+
+// -- stop, pause, resume
+
+void Programs::stop(MotorId motor) {
+  const McuId id = installation_.mcu_of(motor).id;
+  auto& run = mcus_[id].run;
+  if (!run || !installation_[motor].is<motion::InProgram>()) return;
+  if (run->number != 0) {
+    run->stop_wanted = true;
+    return follow(id);
+  }
+  std::erase_if(starts_, [&](const Start& start) {
+    if (std::ranges::find(start.mcus, id) == start.mcus.end()) return false;
+    give_up(start, Outcome::kStopped, kStoppedBefore);
+    return true;
+  });
+}
+
+bool Programs::is_paused(MotorId motor) const {
+  const Mcu& mcu = installation_.mcu_of(motor);
+  return installation_[motor].is<motion::InProgram>() && mcu.can_have_program() && !mcu.busy() &&
+         view(mcu.id).state.stage == BUSHD_PROGRAM_PAUSED;
+}
+
+void Programs::pause(MotorId motor) {
+  const Mcu& mcu = installation_.mcu_of(motor);
+  auto& run = mcus_[mcu.id].run;
+  if (!run || !mcu.online()) return;
+  const bool waits = !run->taken || view(mcu.id).state.stage == BUSHD_PROGRAM_WAITS;
+  if (waits) return stop(motor);  // nothing has moved
+  if (!std::exchange(run->pause_asked, true)) mcu.offers.programs->pause_program(mcu.on_bus());
+}
+
+void Programs::resume(MotorId motor) {
+  if (!is_paused(motor)) return;
+  const Mcu& mcu = installation_.mcu_of(motor);
+  mcus_[mcu.id].run->pause_asked = false;
+  mcu.offers.programs->resume_program(mcu.on_bus());
+}
+
+void Programs::leave() {
+  for (const McuId id : installation_.mcus()) {
+    const auto& run = mcus_[id].run;
+    if (!run || !run->taken || run->stop_wanted || !run->without_host) continue;
+    end(id, Outcome::kLink, "the daemon ends, and its program goes on by itself");
+  }
+}
+
+}  // namespace bushd::daemon
