@@ -5,6 +5,7 @@ An MCU's clock is an offset and a rate like a crystal's; the one that most of it
 
 import math
 import random
+from bisect import bisect_left, bisect_right
 
 MAX_RATE = 100e-6  # crystals are better
 
@@ -86,9 +87,10 @@ def pairs_by_move(motor, slot_ns):
         span_ns = due[-1] - due[0]
         slack_ns = 2 * slot_ns + MAX_RATE * span_ns + max(step.early_ns for step in own)
         middle, last = len(due) // 2, len(due) - 1
+        to_middle_ns, to_last_ns = due[middle] - due[0], span_ns
         for first in range(len(seen) - last):
-            away_ns = seen[first] - due[0]
-            if all(abs(seen[first + i] - due[i] - away_ns) <= slack_ns for i in (middle, last)):
+            begin_ns = seen[first]
+            if abs(seen[first + last] - begin_ns - to_last_ns) <= slack_ns and abs(seen[first + middle] - begin_ns - to_middle_ns) <= slack_ns:
                 pairs += pairs_of(own, seen[first : first + len(own)])
     return pairs
 
@@ -96,17 +98,34 @@ def pairs_by_move(motor, slot_ns):
 def agreed_clock(pairs, slot_ns):
     """The line through two of the points that has the most others near it."""
     sample = pairs[:: len(pairs) // 2000 + 1]
+    parts = [sample[i : i + 200] for i in range(0, len(sample), 200)]
+    offsets = sorted(d for _, d in sample)
     chance = random.Random(len(pairs))  # the same trace gives the same answer
-    best = None
+    best = 0, None
     for _ in range(400):
         (t0, d0), (t1, d1) = chance.choice(sample), chance.choice(sample)
         rate = (d1 - d0) / (t1 - t0) if t1 != t0 else 0.0
-        if abs(rate) > MAX_RATE:
+        if rate == 0 or abs(rate) > MAX_RATE:
             rate = 0.0
-        agree = sum(1 for t, d in sample if abs(d - d0 - rate * (t - t0)) <= slot_ns)
-        if best is None or (agree, -abs(rate)) > (best[0], -abs(best[1].rate)):
+            agree = bisect_right(offsets, d0 + slot_ns) - bisect_left(offsets, d0 - slot_ns)
+        else:
+            agree = near(parts, Clock(t0, d0, rate), slot_ns, best[0])
+        if best[1] is None or (agree, -abs(rate)) > (best[0], -abs(best[1].rate)):
             best = agree, Clock(t0, d0, rate)
     return best[1]
+
+
+def near(parts, clock, slot_ns, least):
+    """How many points are near the line; 0 as soon as the rest cannot make it as many as `least`."""
+    t0, d0, rate = clock.origin_ns, clock.offset_ns, clock.rate
+    left = sum(map(len, parts))
+    agree = 0
+    for part in parts:
+        if agree + left < least:
+            return 0
+        agree += sum(1 for t, d in part if abs(d - d0 - rate * (t - t0)) <= slot_ns)
+        left -= len(part)
+    return agree
 
 
 def straight_line(points):

@@ -93,6 +93,8 @@ class Trace:
         now = 0
         went_back = False
         initial = False  # what follows is how wires are when the trace begins
+        # Asked for at each change.
+        wires = {code: (*wire, (wire[0], wire[2]), not self._is_low(*wire)) for code, wire in wires.items()}
         high_since = {}
         direction = defaultdict(lambda: (False, -math.inf))  # level, since when
         enabled = defaultdict(bool)
@@ -116,9 +118,8 @@ class Trace:
             wire = wires.get(token[1:])
             if wire is None:
                 continue
-            address, kind, output = wire
-            place = address, output
-            level = (token[0] == "1") != self._is_low(address, kind, output)
+            address, kind, _, place, active_high = wire
+            level = (token[0] == "1") == active_high
             if went_back:
                 self.disorder.append((place, now))
                 went_back = False
