@@ -1,10 +1,28 @@
+function(bushd_warnings target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+    $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>
+    $<$<BOOL:${BUSHD_WERROR}>:-Werror>)
+endfunction()
+
+# bushd_warnings_of_the_front_end(engine_test): all but those that follow from what the optimiser finds out, as with a sanitizer it
+# finds much that is not so.
+function(bushd_warnings_of_the_front_end target)
+  bushd_warnings(${target})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    foreach(warning aggressive-loop-optimizations array-bounds dangling-pointer format-overflow format-truncation free-nonheap-object
+        infinite-recursion maybe-uninitialized nonnull restrict return-local-addr stringop-overflow stringop-overread
+        stringop-truncation uninitialized use-after-free)
+      target_compile_options(${target} PRIVATE -Wno-${warning})
+    endforeach()
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-Wno-mismatched-new-delete>)
+  endif()
+endfunction()
+
 # One place for warnings and sanitizers: bushd_target(<target>) is called for every target of ours.
 function(bushd_target target)
   if(NOT BUSHD_SANITIZE)
     # With a sanitizer GCC warns of much that is not so; and warnings are a seventh of the time that the build takes.
-    target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-      $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>
-      $<$<BOOL:${BUSHD_WERROR}>:-Werror>)
+    bushd_warnings(${target})
   endif()
   if(CMAKE_SYSTEM_PROCESSOR STREQUAL avr)
     # Registers of interrupts: firmware/ports/atmega2560/emission_slots.h.
