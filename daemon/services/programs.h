@@ -31,8 +31,8 @@ class Programs final : public Service {
   void request(const api::Asker& asker, const api::RunPrograms& request);
   void request(const api::Asker& asker, const api::ListPrograms& request);
 
-  // Of the program that has this motor; if none has, nothing happens. A stop ends it, also where
-  // its MCU is out of reach: then when it comes back.
+  // What is done to the program that has this motor; if none has, nothing happens. A stop ends it,
+  // also where its MCU is out of reach: then when it comes back.
   void stop(MotorId motor);
   void pause(MotorId motor);
   void resume(MotorId motor);
@@ -47,7 +47,7 @@ class Programs final : public Service {
   std::int64_t next_wake_us() const;
 
  private:
-  // Of the time to a common start, in which all have to take it.
+  // The share of the time to a common start in which all have to take it.
   static constexpr std::int64_t kConfirmedIn = 1;
   static constexpr std::int64_t kConfirmedOf = 2;
 
