@@ -84,6 +84,7 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
     settings_.take_kept();
     holds_.take_kept();
     camac_.take_kept();
+    programs_.take_kept();
   });
   open_moves_.set_listener([this](const OpenMoves::Ended& ended) {
     const motion::Motor& motor = installation_[ended.motor];

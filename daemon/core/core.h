@@ -99,7 +99,7 @@ class Core {
   // Ramps down all motors and takes no more moves.
   void shut_down(std::int64_t now_us);
   // No motor moves by this core's doing.
-  bool at_rest() const { return open_moves_.empty() && homing_.empty(); }
+  bool at_rest() const { return open_moves_.empty() && homing_.empty() && programs_.at_rest(); }
   // What there is to keep of positions is on the disk.
   bool settled() const { return kept_.settled(); }
   // When all that moves now will have come to rest, as planned.

@@ -70,7 +70,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
     }
     if (installation_[motor].is<motion::InProgram>()) {
       programs_.pause(motor);
-      pausing.motors.emplace(motor, installation_[motor].position_steps());
+      pausing.motors.emplace(motor, INT64_MAX);  // nobody knows where it leads
       continue;
     }
     if (!moves(motor)) continue;
@@ -110,10 +110,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Re
     const bool in_program = programs_.is_paused(motor);
     if (!installation_[motor].is_paused() && !in_program) continue;
     if (in_program) {
-      auto may = interlocks_.may_begin(motor);
-      const motion::MotorHold& hold = installation_[motor].hold();
-      if (may && hold.is_set()) may = fail(hold.text());
-      if (!may) {
+      if (const auto may = programs_.may_resume(motor); !may) {
         return asker.answer(api::Refused{installation_[motor].name() + ": " + may.error().text()});
       }
       in_programs.push_back(motor);
@@ -140,7 +137,12 @@ void Pauses::Pausing::not_done(api::Outcome how, const std::string& what) {
 bool Pauses::has_ended(Pausing& pausing, MotorId id, std::int64_t target) const {
   const motion::Motor& motor = installation_[id];
   if (motor.is<motion::InProgram>() && !programs_.is_paused(id)) {
-    return !installation_.mcu_of(id).online();
+    const Mcu& mcu = installation_.mcu_of(id);
+    if (mcu.offline()) {
+      pausing.not_done(api::Outcome::kLink, "MCU " + mcu.name() + " was lost, and the program of " +
+                                                motor.name() + " may go on without a host");
+    }
+    return mcu.offline();
   }
   if (motor.stands_paused() || motor.is<motion::InProgram>()) {
     ++pausing.paused;

@@ -78,29 +78,8 @@ Result<void> find_line_table(const Installation& installation, const Mcu& mcu,
   return {};
 }
 
-}  // namespace
-
-Result<programs::Program> parse_program(const api::PutProgram& request) {
-  if (!config::is_name(request.program, config::kLongestName)) {
-    return fail(fmt::format("\"{}\" is no name of a program; allowed: {}", request.program,
-                            config::kNameRule));
-  }
-  std::size_t bytes = request.text.size();
-  for (const auto& points : request.points) bytes += points.text.size() + points.file.size();
-  if (bytes > api::PutProgram::kMostBytes) {
-    return fail(fmt::format("program {} has {} bytes of text; allowed: {}", request.program, bytes,
-                            api::PutProgram::kMostBytes));
-  }
-  return programs::parse(
-      request.text, request.program, [&](const std::string& file) -> Result<std::string> {
-        const auto found = std::ranges::find(request.points, file, &api::PutProgram::Points::file);
-        if (found != request.points.end()) return found->text;
-        return fail("the file \"" + file + "\" has not been sent with it");
-      });
-}
-
-Result<CheckedProgram> check_program(const Installation& installation, const std::string& name,
-                                     programs::Program text) {
+Result<CheckedProgram> compile_and_walk(const Installation& installation, const std::string& name,
+                                        programs::Program text, bool walks) {
   CheckedProgram program{.name = name, .text = std::move(text)};
   auto motors = installation.find(program.text.motors);
   if (!motors) return fail(motors.error());
@@ -134,10 +113,42 @@ Result<CheckedProgram> check_program(const Installation& installation, const std
   if (!bytes) return fail(bytes.error());
   program.bytes = std::move(*bytes);
   program.crc = ~bushd_crc32(BUSHD_CRC32_START, program.bytes.data(), program.bytes.size());
+  if (!walks) return program;
   auto walk = programs::rehearse(program.text, place, places, program.bytes, kMostWalkedFrames);
   if (!walk) return fail(walk.error());
   program.walk = std::move(*walk);
   return program;
+}
+
+}  // namespace
+
+Result<programs::Program> parse_program(const api::PutProgram& request) {
+  if (!config::is_name(request.program, config::kLongestName)) {
+    return fail(fmt::format("\"{}\" is no name of a program; allowed: {}", request.program,
+                            config::kNameRule));
+  }
+  std::size_t bytes = request.text.size();
+  for (const auto& points : request.points) bytes += points.text.size() + points.file.size();
+  if (bytes > api::PutProgram::kMostBytes) {
+    return fail(fmt::format("program {} has {} bytes of text; allowed: {}", request.program, bytes,
+                            api::PutProgram::kMostBytes));
+  }
+  return programs::parse(
+      request.text, request.program, [&](const std::string& file) -> Result<std::string> {
+        const auto found = std::ranges::find(request.points, file, &api::PutProgram::Points::file);
+        if (found != request.points.end()) return found->text;
+        return fail("the file \"" + file + "\" has not been sent with it");
+      });
+}
+
+Result<CheckedProgram> compile_program(const Installation& installation, const std::string& name,
+                                       programs::Program text) {
+  return compile_and_walk(installation, name, std::move(text), false);
+}
+
+Result<CheckedProgram> check_program(const Installation& installation, const std::string& name,
+                                     programs::Program text) {
+  return compile_and_walk(installation, name, std::move(text), true);
 }
 
 api::ProgramEntry entry_of(const Installation& installation, const CheckedProgram& program) {
@@ -155,8 +166,11 @@ api::ProgramEntry entry_of(const Installation& installation, const CheckedProgra
                           .waits_for_inputs = walk.waits_for_inputs,
                           .cut = walk.cut};
   for (std::size_t i = 0; i < program.motors.size(); ++i) {
-    const programs::Rehearsal::Way& way = walk.motors[i];
-    entry.motors.push_back({.motor = installation[program.motors[i]].name(),
+    const motion::Motor& motor = installation[program.motors[i]];
+    const std::int64_t stands = motor.position_steps();
+    const programs::Rehearsal::Way way =
+        walk.motors.empty() ? programs::Rehearsal::Way{stands, stands, stands, 0} : walk.motors[i];
+    entry.motors.push_back({.motor = motor.name(),
                             .least_steps = way.least_steps,
                             .most_steps = way.most_steps,
                             .end_steps = way.end_steps,

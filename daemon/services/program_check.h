@@ -34,6 +34,9 @@ struct CheckedProgram {
 
 // Errors name file, line, motor, cause and remedy.
 Result<programs::Program> parse_program(const api::PutProgram& request);
+// Its bytes, without a walk.
+Result<CheckedProgram> compile_program(const Installation& installation, const std::string& name,
+                                       programs::Program text);
 Result<CheckedProgram> check_program(const Installation& installation, const std::string& name,
                                      programs::Program text);
 

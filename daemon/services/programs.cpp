@@ -11,9 +11,18 @@
 
 namespace bushd::daemon {
 
+namespace {
+
 using api::Outcome;
 
-Programs::Programs(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,
+// How its texts are kept.
+constexpr const char* kName = "name";
+constexpr const char* kText = "text";
+constexpr const char* kPoints = "points/";  // and the name of the file
+
+}  // namespace
+
+Programs::Programs(Installation& installation, Interlocks& interlocks, OpenMoves& open_moves,
                    KeptPositions& kept, IdleDrivers& idle_drivers, Outputs& outputs)
     : installation_(installation),
       interlocks_(interlocks),
@@ -22,6 +31,16 @@ Programs::Programs(Installation& installation, const Interlocks& interlocks, Ope
       idle_drivers_(idle_drivers),
       outputs_(outputs) {
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) mcus_.add();
+  // An MCU takes no limit inputs while a program runs, and may have those of another configuration.
+  interlocks.add([this](MotorId motor) -> Result<void> {
+    const Mcu& mcu = installation_.mcu_of(motor);
+    const auto& run = mcus_[mcu.id].run;
+    if (!run || run->known || installation_[motor].is<motion::InProgram>()) return {};
+    return fail(
+        "MCU " + mcu.name() +
+        " is told its inputs when the program of before, which runs there, has ended; run " +
+        words::remedy("stop", installation_[run->motors.front()].name()) + " first");
+  });
 }
 
 // -- what is known
@@ -44,6 +63,13 @@ std::optional<McuId> Programs::find(const std::string& name) const {
     if (mcus_[id].program && mcus_[id].program->name == name) return id;
   }
   return std::nullopt;
+}
+
+// It has one of that name, or is getting it.
+bool Programs::has_or_gets(McuId id, const std::string& name) const {
+  const OfMcu& its = mcus_[id];
+  return (its.program && its.program->name == name) ||
+         (its.upload && its.upload->program.name == name);
 }
 
 // ", at frame 3 (scan:14), point 2, after 5 repeats"
@@ -102,13 +128,14 @@ Result<void> Programs::may_be_put(const CheckedProgram& program) const {
                 words::remedy("stop", installation_[program.motors.front()].name()) + " first");
   }
   if (its.upload || view(mcu.id).uploading) {
-    return fail("MCU " + mcu.name() + " is getting program " +
-                (its.upload ? its.upload->program.name : "") + "; wait for its end");
+    return fail("MCU " + mcu.name() + " is getting " +
+                (its.upload ? "program " + its.upload->program.name : "a program") +
+                "; wait for its end");
   }
-  const auto same_name = find(program.name);
-  if (same_name && *same_name != mcu.id) {
-    return fail("MCU " + installation_[*same_name].name() + " has a program of that name; erase " +
-                "it, or give this one another name");
+  for (const McuId other : installation_.mcus()) {
+    if (other == mcu.id || !has_or_gets(other, program.name)) continue;
+    return fail("MCU " + installation_[other].name() + " has a program of that name; erase it, " +
+                "or give this one another name");
   }
   if (!program.line_table || program.line_table_is_there) return {};
   if (!mcu.uploads() && installation_.rests(mcu)) return {};
@@ -135,10 +162,15 @@ void Programs::request(const api::Asker& asker, const api::PutProgram& request) 
   const McuId id = program->mcu;
   const Mcu& mcu = installation_[id];
   mcus_[id].program.reset();
+  keep(id, nullptr);
+  for (const McuId other : installation_.mcus()) {
+    const auto& kept = mcus_[other].kept;
+    if (kept && kept->program == program->name) keep(other, nullptr);
+  }
   if (program->line_table && !program->line_table_is_there) {
     mcu.offers.uploads->upload(mcu.on_bus(), program->line_table->view());
   }
-  mcus_[id].upload = Upload{.program = std::move(*program), .asker = asker};
+  mcus_[id].upload = Upload{.program = std::move(*program), .source = request, .asker = asker};
   follow_upload(id);
 }
 
@@ -179,6 +211,7 @@ void Programs::end_upload(McuId id, const Result<void>& how) {
                        .detail = {}});
   }
   mcus_[id].program = std::move(upload.program);
+  keep(id, &upload.source);
   upload.asker.answer(api::Completed{
       .outcome = Outcome::kDone, .reason = "done", .detail = api::ProgramList{{entry(id)}}});
 }
@@ -200,8 +233,57 @@ void Programs::request(const api::Asker& asker, const api::EraseProgram& request
   }
   asker.answer(api::Accepted{});
   mcus_[*id].program.reset();
+  keep(*id, nullptr);
   mcu.offers.programs->erase_program(mcu.on_bus());
-  asker.answer(api::done("done"));
+  mcus_[*id].erase = asker;
+}
+
+void Programs::follow_erase(McuId id) {
+  const Mcu& mcu = installation_[id];
+  if (mcu.busy() || !view(id).known) return;
+  const api::Asker asker = *std::exchange(mcus_[id].erase, std::nullopt);
+  if (view(id).state.stage == BUSHD_PROGRAM_NONE) return asker.answer(api::done("done"));
+  asker.answer(api::Completed{.outcome = Outcome::kFault,
+                              .reason = "MCU " + mcu.name() + " has a program still",
+                              .detail = {}});
+}
+
+// -- over restarts of the daemon
+
+// Null: there is none.
+void Programs::keep(McuId id, const api::PutProgram* source) {
+  mcus_[id].kept.reset();
+  state::Settings kept;
+  if (source != nullptr) {
+    kept[kName].value = source->program;
+    kept[kText].value = source->text;
+    for (const auto& points : source->points) kept[kPoints + points.file].value = points.text;
+  }
+  kept_.keep("program/" + installation_[id].name(), kept);
+}
+
+void Programs::take_kept() {
+  for (const McuId id : installation_.mcus()) {
+    const state::Settings kept = kept_.settings("program/" + installation_[id].name());
+    if (!kept.contains(kName) || !kept.contains(kText)) continue;
+    api::PutProgram source{.program = kept.at(kName).value, .text = kept.at(kText).value};
+    for (const auto& [key, points] : kept) {
+      if (!key.starts_with(kPoints)) continue;
+      source.points.push_back({key.substr(std::string_view(kPoints).size()), points.value});
+    }
+    mcus_[id].kept = std::move(source);
+  }
+}
+
+// If the MCU has its bytes. It is not told to anybody who might wait for it.
+void Programs::know_again(McuId id) {
+  const api::PutProgram source = *std::exchange(mcus_[id].kept, std::nullopt);
+  auto text = parse_program(source);
+  if (!text) return;
+  auto program = compile_program(installation_, source.program, std::move(*text));
+  if (program && program->mcu == id && program->crc == view(id).state.crc && !find(program->name)) {
+    mcus_[id].program = std::move(*program);
+  }
 }
 
 }  // namespace bushd::daemon

@@ -1,8 +1,9 @@
 // Programs of MCUs (docs/programs.md): who may have which, and the one result of each run.
 //
-// An MCU has one program. What it is the daemon knows only of those that it has put itself, by
-// their checksum: another one is shown, and can be stopped. A program goes by what held when it was
-// put; a run checks all of it again, from where the motors stand.
+// An MCU has one program. What it is the daemon knows of those that it has put, also before it was
+// started if there is a state store, by their checksum: another one is shown, and can be stopped. A
+// program goes by what held when it was put; a run checks all of it again, from where the motors
+// stand.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +24,7 @@ namespace bushd::daemon {
 
 class Programs final : public Service {
  public:
-  Programs(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,
+  Programs(Installation& installation, Interlocks& interlocks, OpenMoves& open_moves,
            KeptPositions& kept, IdleDrivers& idle_drivers, Outputs& outputs);
 
   void request(const api::Asker& asker, const api::PutProgram& request);
@@ -36,10 +37,16 @@ class Programs final : public Service {
   void stop(MotorId motor);
   void pause(MotorId motor);
   void resume(MotorId motor);
-  bool is_paused(MotorId motor) const;  // all its motors stand
+  Result<void> may_resume(MotorId motor) const;  // precondition: is_paused
+  bool is_paused(MotorId motor) const;           // all its motors stand
+  // The state store has been read.
+  void take_kept();
   // The daemon ends: those that go on without a host are left to themselves.
   void leave();
+  // No MCU that answers has one under way.
+  bool at_rest() const;
 
+  void goes_online(Mcu& mcu) override;
   void goes_offline(Mcu& mcu, const std::string& cause) override;
   void refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) override;
   void end_overtaken(std::int64_t now_us) override;
@@ -53,25 +60,31 @@ class Programs final : public Service {
 
   struct Upload {
     CheckedProgram program;
+    api::PutProgram source;
     api::Asker asker;
     bool began = false;  // its bytes are being sent; else its line table
   };
   // Its motors are in the program until it ends.
   struct Run {
     std::vector<MotorId> motors{};
-    std::uint8_t number = 0;  // as the MCU has it; 0: not asked yet
+    std::uint8_t number = 0;  // as the MCU has it
+    bool asked = false;       // of the MCU
     bool known = true;        // it was begun here
     bool without_host = false;
     bool taken = false;        // the MCU has it
     bool stop_wanted = false;  // somebody has stopped it
     bool stop_asked = false;   // and its MCU has been told
     bool pause_asked = false;
+    bool table_asked = false;               // that of its lines, once more
+    std::uint16_t forbidden_before = 0;     // motors whose limit switch was active at its start
     std::optional<std::string> ended_by{};  // why, if nobody has stopped it
   };
   struct OfMcu {
     std::optional<CheckedProgram> program{};  // that was put; it may be another one by now
+    std::optional<api::PutProgram> kept{};    // by a daemon before, and not yet looked at
     std::optional<Upload> upload{};
     std::optional<Run> run{};
+    std::optional<api::Asker> erase{};  // until the MCU has done it
     std::uint8_t last_number = 0;
   };
   // Runs that begin together, until all have been taken.
@@ -86,18 +99,27 @@ class Programs final : public Service {
   const link::ProgramView& view(McuId mcu) const;
   bool is_loaded(McuId mcu) const;  // with what was put
   std::optional<McuId> find(const std::string& name) const;
+  bool has_or_gets(McuId mcu, const std::string& name) const;
   Result<void> may_be_put(const CheckedProgram& program) const;
   Result<void> may_run(McuId mcu) const;
   Result<std::vector<McuId>> mcus_of(const api::RunPrograms& request) const;
   api::ProgramEntry entry(McuId mcu) const;
   void follow_upload(McuId mcu);
+  void keep(McuId mcu, const api::PutProgram* source);
+  void know_again(McuId mcu);
   void end_upload(McuId mcu, const Result<void>& how);
-  Result<bool> make_ready(std::int64_t now_us, const Start& start);
+  bool has_line_table(McuId mcu) const;
+  enum class Ready { kNow, kNotYet, kNever };
+  Ready make_ready(std::int64_t now_us, const Start& start);
   void begin(std::int64_t now_us, Start& start);
   bool follow(std::int64_t now_us, Start& start);
   void adopt(McuId mcu);
+  std::uint16_t forbidden(McuId mcu) const;
   void follow(McuId mcu);
+  void follow_end(McuId mcu);
+  void follow_erase(McuId mcu);
   void give_up(const Start& start, api::Outcome outcome, const std::string& reason);
+  void give_up_start_of(McuId mcu, api::Outcome outcome, const std::string& reason);
   void end(McuId mcu, api::Outcome outcome, const std::string& reason);
   std::string where(McuId mcu) const;
 

@@ -40,7 +40,7 @@ Result<void> Programs::may_run(McuId id) const {
   }
   const auto now = check_program(installation_, program.name, program.text);
   if (!now) return fail(now.error());
-  if (now->bytes != program.bytes || (now->line_table && !now->line_table_is_there)) {
+  if (now->bytes != program.bytes) {
     return fail(
         "tables, speeds or limits of its motors are not those with which it was put; put it again");
   }
@@ -97,22 +97,45 @@ void Programs::request(const api::Asker& asker, const api::RunPrograms& request)
   installation_.changed = true;
 }
 
-// As soon as the disk knows of the motion and drivers are enabled.
-Result<bool> Programs::make_ready(std::int64_t now_us, const Start& start) {
+bool Programs::has_line_table(McuId id) const {
+  const tables::TablePtr& table = mcus_[id].program->line_table;
+  return !table || installation_[id].has_table(table->view());
+}
+
+// As soon as its MCUs have the tables of lines, which may have been replaced since, the disk knows
+// of the motion, and drivers are enabled. If that does not come to pass,
+// the start is given up.
+Programs::Ready Programs::make_ready(std::int64_t now_us, const Start& start) {
   bool ready = true;
   for (const McuId id : start.mcus) {
     if (auto may = interlocks_.may_begin(mcus_[id].run->motors.front()); !may) {
-      return fail(may.error());
+      give_up(start, Outcome::kStopped, "it did not begin: " + may.error().text());
+      return Ready::kNever;
+    }
+    if (!has_line_table(id)) {
+      const Mcu& mcu = installation_[id];
+      const bushd_table& table = mcus_[id].program->line_table->view();
+      if (!std::exchange(mcus_[id].run->table_asked, true)) {
+        mcu.offers.uploads->upload(mcu.on_bus(), table);
+      } else if (!mcu.uploads()) {
+        give_up(start, Outcome::kFault,
+                "MCU " + mcu.name() + " did not take the table of its lines; run it again");
+        return Ready::kNever;
+      }
+      ready = false;
     }
     for (const MotorId motor : mcus_[id].run->motors) {
       const auto its = kept_.make_ready(now_us, motor);
-      if (!its) return fail(its.error());
+      if (!its) {
+        give_up(start, Outcome::kFault, its.error().text());
+        return Ready::kNever;
+      }
       ready = *its && ready;
     }
     ready = idle_drivers_.make_ready(now_us, id) && ready;
     ready = !installation_[id].busy() && ready;
   }
-  return ready;
+  return ready ? Ready::kNow : Ready::kNotYet;
 }
 
 void Programs::begin(std::int64_t now_us, Start& start) {
@@ -129,6 +152,8 @@ void Programs::begin(std::int64_t now_us, Start& start) {
       its.last_number = its.last_number == UINT8_MAX ? 1 : its.last_number + 1;
     }
     its.run->number = its.last_number;
+    its.run->asked = true;
+    its.run->forbidden_before = forbidden(id);
     programs.run_program(installation_[id].on_bus(), its.run->number, at);
   }
   const std::int64_t ticks = at - first.bus().tick_at(now_us);
@@ -139,13 +164,9 @@ void Programs::begin(std::int64_t now_us, Start& start) {
 // Whether it is over: all have begun, or none does.
 bool Programs::follow(std::int64_t now_us, Start& start) {
   if (!start.confirmed_by_us) {
-    const auto ready = make_ready(now_us, start);
-    if (!ready) {
-      give_up(start, Outcome::kStopped, "it did not begin: " + ready.error().text());
-      return true;
-    }
-    if (*ready) begin(now_us, start);
-    return false;
+    const Ready ready = make_ready(now_us, start);
+    if (ready == Ready::kNow) begin(now_us, start);
+    return ready == Ready::kNever;
   }
   const auto of = [this](McuId id) -> const auto& { return mcus_[id].run; };
   if (std::ranges::all_of(start.mcus, [&](McuId id) { return of(id) && of(id)->taken; })) {
@@ -166,6 +187,15 @@ bool Programs::follow(std::int64_t now_us, Start& start) {
 
 void Programs::give_up(const Start& start, Outcome outcome, const std::string& reason) {
   for (const McuId id : start.mcus) end(id, outcome, reason);
+}
+
+// Precondition: its MCUs have not been asked.
+void Programs::give_up_start_of(McuId id, Outcome outcome, const std::string& reason) {
+  std::erase_if(starts_, [&](const Start& start) {
+    if (std::ranges::find(start.mcus, id) == start.mcus.end()) return false;
+    give_up(start, outcome, reason);
+    return true;
+  });
 }
 
 void Programs::end_overtaken(std::int64_t) {
@@ -189,6 +219,7 @@ void Programs::step(std::int64_t now_us) {
   std::erase_if(starts_, [&](Start& start) { return follow(now_us, start); });
   for (const McuId id : installation_.mcus()) {
     if (mcus_[id].upload) follow_upload(id);
+    if (mcus_[id].erase) follow_erase(id);
     follow(id);
   }
 }
@@ -199,12 +230,22 @@ std::int64_t Programs::next_wake_us() const {
   return wake;
 }
 
+// Motors whose limit switch inhibits a direction.
+std::uint16_t Programs::forbidden(McuId id) const {
+  const bushd_report& report = installation_[id].report();
+  return report.forbidden_positive | report.forbidden_negative;
+}
+
 // A program of before this daemon, or of before its MCU was lost.
 void Programs::adopt(McuId id) {
   const Mcu& mcu = installation_[id];
   const bushd_program_state& state = view(id).state;
   const bool without_host = (state.flags & BUSHD_PROGRAM_WITHOUT_HOST) != 0;
-  Run run{.number = state.number, .known = false, .without_host = without_host, .taken = true};
+  Run run{.number = state.number,
+          .asked = true,
+          .known = false,
+          .without_host = without_host,
+          .taken = true};
   for (const MotorId motor : mcu.motors()) {
     if ((state.motors >> installation_[motor].output().value & 1) == 0) continue;
     if (installation_[motor].has_plan()) continue;
@@ -220,29 +261,59 @@ void Programs::adopt(McuId id) {
   installation_.changed = true;
 }
 
+// An MCU that answers hears of a stop, also while it is not configured.
 void Programs::follow(McuId id) {
   const Mcu& mcu = installation_[id];
-  if (!mcu.online() || !mcu.can_have_program() || !view(id).known) return;
-  auto& run = mcus_[id].run;
+  OfMcu& its = mcus_[id];
+  if (mcu.offers.programs == nullptr) return;
+  if (mcu.offline() || !view(id).known) {
+    if (its.run) its.run->stop_asked = its.run->pause_asked = false;
+    return;
+  }
+  if (its.kept && mcu.online() && !mcu.busy()) know_again(id);
+  if (!its.run && view(id).under_way() && !installation_.shutting_down) adopt(id);
+  if (!its.run || !its.run->asked) return;
+  Run& run = *its.run;
   const bushd_program_state& state = view(id).state;
-  if (!run && view(id).under_way() && !installation_.shutting_down) adopt(id);
-  if (!run || run->number == 0) return;
-  if (state.number == run->number && state.stage >= BUSHD_PROGRAM_WAITS) run->taken = true;
-  if (run->stop_wanted && !std::exchange(run->stop_asked, true)) {
+  if (state.number == run.number && state.stage >= BUSHD_PROGRAM_WAITS) run.taken = true;
+  if (run.stop_wanted && !std::exchange(run.stop_asked, true)) {
     return mcu.offers.programs->stop_program(mcu.on_bus(), BUSHD_STOP_RAMP);
   }
-  if (mcu.busy()) return;
-  if (run->taken && state.number != run->number) {
+  if (mcu.online() && !mcu.busy()) follow_end(id);
+}
+
+// Precondition: it was asked for, and what is known of its MCU is true now.
+void Programs::follow_end(McuId id) {
+  const Mcu& mcu = installation_[id];
+  Run& run = *mcus_[id].run;
+  const bushd_program_state& state = view(id).state;
+  if (!run.taken) {
+    if (!run.stop_asked) return;
+    const Outcome outcome = run.ended_by ? Outcome::kFault : Outcome::kStopped;
+    return end(id, outcome, std::string(run.ended_by.value_or(kStoppedBefore)));
+  }
+  if (state.number != run.number) {
     return end(id, Outcome::kLink, "MCU " + mcu.name() + " restarted while it was under way");
   }
-  if (run->taken ? state.stage != BUSHD_PROGRAM_ENDED : !run->stop_asked) return;
-  if (!run->taken) return end(id, Outcome::kStopped, kStoppedBefore);
+  if (state.stage < BUSHD_PROGRAM_WAITS) {
+    return end(id, Outcome::kLink,
+               "somebody else has put another program into MCU " + mcu.name() + " meanwhile");
+  }
+  if (state.stage == BUSHD_PROGRAM_RUNS) run.pause_asked = false;
+  if (state.stage != BUSHD_PROGRAM_ENDED) return;
   // Positions of the end, not of before.
   const bushd_report& report = mcu.report();
   if (static_cast<std::int32_t>(report.tick - state.tick) < 0) return;
   if (((report.moving | report.autonomous) & state.motors) != 0) return;
+  for (const MotorId motor : run.motors) {
+    const bool met =
+        (forbidden(id) & ~run.forbidden_before) >> installation_[motor].output().value & 1;
+    if (!met || installation_.config()[motor].limit_action != BUSHD_STOP_IMMEDIATE) continue;
+    installation_[motor].trust().is_uncertain(
+        "it was stopped immediately at its limit switch and may have overrun");
+  }
   ProgramEnd ending = end_of_program(state, mcu);
-  if (run->ended_by) ending = {Outcome::kFault, *run->ended_by};
+  if (run.ended_by) ending = {Outcome::kFault, *run.ended_by};
   end(id, ending.outcome, ending.reason + where(id));
 }
 
@@ -262,24 +333,47 @@ void Programs::end(McuId id, Outcome outcome, const std::string& reason) {
 
 void Programs::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
   auto& run = mcus_[mcu.id].run;
-  if (type != BUSHD_MSG_PROGRAM || !run || run->number == 0) return;
-  run->pause_asked = false;
-  if (run->taken) return;
-  end(mcu.id, Outcome::kFault,
-      "MCU " + mcu.name() + " refused to run it: " + bushd_status_text(status));
+  if (type != BUSHD_MSG_PROGRAM || !run || !run->asked) return;
+  if (run->taken) {
+    // A pause before its first tick, or of one that has just ended.
+    if (std::exchange(run->pause_asked, false)) run->stop_wanted = true;
+    return;
+  }
+  const std::string reason =
+      "MCU " + mcu.name() + " refused to run it: " + bushd_status_text(status);
+  if (status != BUSHD_E_LATE) return end(mcu.id, Outcome::kFault, reason);
+  // It may have been taken all the same, and is being stopped.
+  if (!run->ended_by) run->ended_by = reason;
+  run->stop_wanted = run->stop_asked = true;
+}
+
+// Another firmware, or one that denies programs: nobody will tell what has become of it.
+void Programs::goes_online(Mcu& mcu) {
+  if (!mcus_[mcu.id].run || mcu.can_have_program()) return;
+  end(mcu.id, Outcome::kLink, "MCU " + mcu.name() + " came back and knows no programs");
 }
 
 void Programs::goes_offline(Mcu& mcu, const std::string& cause) {
   OfMcu& its = mcus_[mcu.id];
   if (its.upload) end_upload(mcu.id, fail(cause));
-  if (!its.run) return;
-  its.run->stop_asked = false;
-  if (its.run->taken && its.run->without_host) {
-    outputs_.log(LogLevel::kWarning, mcu.id,
-                 "MCU " + mcu.name() + ": its program goes on without a host");
-    return;
+  if (its.erase) {
+    std::exchange(its.erase, std::nullopt)
+        ->answer(api::Completed{.outcome = Outcome::kLink, .reason = cause, .detail = {}});
   }
-  end(mcu.id, Outcome::kLink, cause + "; its program ends as soon as it hears no host");
+  if (!its.run) return;
+  Run& run = *its.run;
+  run.stop_asked = run.pause_asked = false;
+  if (!run.asked) return give_up_start_of(mcu.id, Outcome::kLink, cause);
+  if (!run.without_host) {
+    return end(mcu.id, Outcome::kLink, cause + "; its program ends as soon as it hears no host");
+  }
+  if (!run.taken) {
+    run.stop_wanted = true;
+    run.ended_by = cause + " before it was known to have begun";
+  }
+  outputs_.log(LogLevel::kWarning, mcu.id,
+               "MCU " + mcu.name() + ": its program goes on without a host" +
+                   (run.stop_wanted ? "; it is stopped as soon as the MCU is heard" : ""));
 }
 
 // -- stop, pause, resume
@@ -288,15 +382,11 @@ void Programs::stop(MotorId motor) {
   const McuId id = installation_.mcu_of(motor).id;
   auto& run = mcus_[id].run;
   if (!run || !installation_[motor].is<motion::InProgram>()) return;
-  if (run->number != 0) {
+  if (run->asked) {
     run->stop_wanted = true;
     return follow(id);
   }
-  std::erase_if(starts_, [&](const Start& start) {
-    if (std::ranges::find(start.mcus, id) == start.mcus.end()) return false;
-    give_up(start, Outcome::kStopped, kStoppedBefore);
-    return true;
-  });
+  give_up_start_of(id, Outcome::kStopped, kStoppedBefore);
 }
 
 bool Programs::is_paused(MotorId motor) const {
@@ -309,9 +399,21 @@ void Programs::pause(MotorId motor) {
   const Mcu& mcu = installation_.mcu_of(motor);
   auto& run = mcus_[mcu.id].run;
   if (!run || !mcu.online()) return;
-  const bool waits = !run->taken || view(mcu.id).state.stage == BUSHD_PROGRAM_WAITS;
-  if (waits) return stop(motor);  // nothing has moved
+  if (!run->taken) return stop(motor);  // nothing has moved
   if (!std::exchange(run->pause_asked, true)) mcu.offers.programs->pause_program(mcu.on_bus());
+}
+
+// It moves all its motors.
+Result<void> Programs::may_resume(MotorId motor) const {
+  if (auto may = interlocks_.may_begin(motor); !may) return may;
+  for (const MotorId other : mcus_[installation_.mcu_of(motor).id].run->motors) {
+    const motion::Motor& its = installation_[other];
+    if (its.hold().is_set()) {
+      return fail(its.name() + ": " + its.hold().text() + "; run " +
+                  words::remedy("release", its.name()) + " first");
+    }
+  }
+  return {};
 }
 
 void Programs::resume(MotorId motor) {
@@ -327,6 +429,12 @@ void Programs::leave() {
     if (!run || !run->taken || run->stop_wanted || !run->without_host) continue;
     end(id, Outcome::kLink, "the daemon ends, and its program goes on by itself");
   }
+}
+
+bool Programs::at_rest() const {
+  return std::ranges::none_of(installation_.mcus(), [this](McuId id) {
+    return mcus_[id].run && !installation_[id].offline();
+  });
 }
 
 }  // namespace bushd::daemon

@@ -127,7 +127,8 @@ void Stops::follow() {
         stopping.outcome = api::Outcome::kLink;
         stopping.done =
             "MCU " + mcu.name() +
-            " was lost meanwhile, so it is unknown whether its motors stand: " + mcu.view().detail;
+            " was lost meanwhile, so it is unknown whether its motors stand: " + mcu.view().detail +
+            (away ? "; its program is stopped as soon as it is heard" : "");
         return true;
       }
       if (!motor.moves() || motor.stops()) return false;

@@ -76,7 +76,7 @@ struct Armed {
 };
 struct Local {};       // the inputs at its MCU move it, or another master does
 struct Travelling {};  // by its MCU, between its limits or for one step, or it is about to
-struct InProgram {};   // a program of its MCU has it, also while it rests, or is about to
+struct InProgram {};   // a program of its MCU controls it, also at rest, or is about to
 using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine, Travelling, InProgram>;
 
 // What an MCU reports, and what is known beside.

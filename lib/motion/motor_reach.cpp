@@ -24,7 +24,7 @@ Result<void> MotorReach::may_be_used() const {
                 words::remedy("stop", motor_.name()) + " first");
   }
   if (motor_.is<InProgram>()) {
-    return fail("a program of its MCU has it; run " + words::remedy("stop", motor_.name()) +
+    return fail("a program of its MCU controls it; run " + words::remedy("stop", motor_.name()) +
                 " first");
   }
   if (motor_.is<Local>() && !motor_.autonomous_) {

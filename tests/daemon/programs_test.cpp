@@ -185,6 +185,36 @@ TEST(Programs, PauseAndGoOn) {
   EXPECT_THAT(lab.steps.of(0, 0), SizeIs(2000 + 1993));
 }
 
+TEST(Programs, DoNotGoOnWhileOneOfTheirMotorsIsHeld) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\", \"m02\"", "[[frame]]\nmove_by = [900, 900]\n").result, "done");
+  const std::int64_t run = lab.run({"a"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 200; }));
+  EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m01"}})).reason, "paused: 1 motor");
+  lab.wait(lab.send(api::Hold{{"m02"}}));
+  EXPECT_THAT(lab.wait(lab.send(api::Resume{{"m01"}})).reason, HasSubstr("'bushctl release m02'"));
+  const std::int64_t stood = lab.shaft_steps("m02");
+  lab.run_for(2);
+  EXPECT_EQ(lab.shaft_steps("m02"), stood);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m02"})).result, "done");
+  EXPECT_EQ(lab.wait(run).result, "stopped");
+}
+
+// The same with a limit that stops without a ramp: nobody knows whether it has overrun.
+TEST(Programs, ALimitThatStopsThemAtOnceLeavesAPositionUncertain) {
+  std::string toml = hall_of_programs(1, 1);
+  toml.insert(toml.find("group = \"axes\"\n") + 15,
+              "inputs = { positive = 3 }\nlimit_action = \"immediate\"\n");
+  ProgramLab lab(toml);
+  ASSERT_EQ(lab.put("a", "\"m01\"", "[[frame]]\nmove_by = [900]\n").result, "done");
+  const std::int64_t run = lab.run({"a"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 200; }));
+  lab.bus(0).mcu(0).set_inputs({1U << 3, 0});
+  const Answer result = lab.wait(run);
+  EXPECT_EQ(result.result, "limit") << result.reason;
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+}
+
 TEST(Programs, AnEmergencyStopEndsThem) {
   ProgramLab lab;
   ASSERT_EQ(lab.put("a", "\"m01\"", kToAndFro).result, "done");

@@ -153,7 +153,8 @@ void add_program_put(CommandLine& commands) {
           "FILE is TOML (docs/programs.md); files of points that it names are read beside it. It "
           "takes the place of the program that this MCU has; nothing moves. Prints what the "
           "program will do from where its motors stand.")
-      .option("PROGRAM", &options->program, "Its name: 1 to 64 of a-z A-Z 0-9 . _ -")
+      .option("PROGRAM", &options->program,
+              "Its name: 1 to 63 of A-Z a-z 0-9 _ . -, the first one no -")
       .option("FILE", &options->file, "The program")
       .flag("--dry-run", &options->dry_run, "Only check it, and print what it would do")
       .flag("--json", &options->json, "Print JSON")

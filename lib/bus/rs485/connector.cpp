@@ -429,6 +429,8 @@ void Connector::go_online(McuIndex mcu) {
   mcus_[mcu].view.phase = McuPhase::kOnline;
   mcus_[mcu].view.detail.clear();
   link.was_online = link.taken_over = false;
+  // Told while it connected, its ticks may have been others.
+  if (link.adopts) link.program.want_state();
   if (link.not_local != link.not_local_told) tell_local(mcu);
   listener_.came_online(mcu);
 }

@@ -256,7 +256,7 @@ class Client(Moving):
 
             client.put_program("scan", pathlib.Path("scan.toml").read_text())
 
-        name: 1 to 64 of a-z A-Z 0-9 . _ -
+        name: 1 to 63 of A-Z a-z 0-9 _ . -, the first one no -
         program: TOML (docs/programs.md of bushd).
         points: the text of each file of points that the program names, by that name: {"way.csv": "x,y\\n1,2\\n"}.
         dry_run: only check it.
