@@ -39,7 +39,7 @@ Programs::Programs(Installation& installation, Interlocks& interlocks, OpenMoves
     return fail(
         "MCU " + mcu.name() +
         " is told its inputs when the program of before, which runs there, has ended; run " +
-        words::remedy("stop", installation_[run->motors.front()].name()) + " first");
+        words::remedy("stop", stopped_by(mcu.id)) + " first");
   });
 }
 
@@ -63,6 +63,13 @@ std::optional<McuId> Programs::find(const std::string& name) const {
     if (mcus_[id].program && mcus_[id].program->name == name) return id;
   }
   return std::nullopt;
+}
+
+// A motor of the program that is under way, by which that is stopped.
+const std::string& Programs::stopped_by(McuId id) const {
+  const auto& run = mcus_[id].run;
+  const bool known = run && !run->motors.empty();
+  return installation_[known ? run->motors.front() : installation_[id].motors().front()].name();
 }
 
 // It has one of that name, or is getting it.
@@ -125,7 +132,7 @@ Result<void> Programs::may_be_put(const CheckedProgram& program) const {
   const OfMcu& its = mcus_[program.mcu];
   if (its.run || view(mcu.id).under_way()) {
     return fail("the program of MCU " + mcu.name() + " is under way; run " +
-                words::remedy("stop", installation_[program.motors.front()].name()) + " first");
+                words::remedy("stop", stopped_by(mcu.id)) + " first");
   }
   if (its.upload || view(mcu.id).uploading) {
     return fail("MCU " + mcu.name() + " is getting " +
@@ -150,6 +157,7 @@ void Programs::request(const api::Asker& asker, const api::PutProgram& request) 
   auto program = check_program(installation_, request.program, std::move(*text));
   if (!program) return asker.answer(api::Refused{program.error().text()});
   if (request.dry_run) {
+    asker.answer(api::Accepted{});
     api::ProgramList list{{entry_of(installation_, *program)}};
     list.programs.front().memory = view(program->mcu).state.memory;
     return asker.answer(
@@ -225,8 +233,7 @@ void Programs::request(const api::Asker& asker, const api::EraseProgram& request
   const Mcu& mcu = installation_[*id];
   if (mcus_[*id].run || view(*id).under_way()) {
     return asker.answer(
-        api::Refused{"it is under way; run " +
-                     words::remedy("stop", installation_[mcu.motors().front()].name()) + " first"});
+        api::Refused{"it is under way; run " + words::remedy("stop", stopped_by(*id)) + " first"});
   }
   if (const auto online = mcu.must_be_online(); !online) {
     return asker.answer(api::Refused{online.error().text()});

@@ -99,6 +99,7 @@ class Programs final : public Service {
   const link::ProgramView& view(McuId mcu) const;
   bool is_loaded(McuId mcu) const;  // with what was put
   std::optional<McuId> find(const std::string& name) const;
+  const std::string& stopped_by(McuId mcu) const;
   bool has_or_gets(McuId mcu, const std::string& name) const;
   Result<void> may_be_put(const CheckedProgram& program) const;
   Result<void> may_run(McuId mcu) const;

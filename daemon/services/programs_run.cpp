@@ -63,7 +63,8 @@ Result<std::vector<McuId>> Programs::mcus_of(const api::RunPrograms& request) co
   for (const std::string& name : request.programs) {
     const auto id = find(name);
     if (!id) {
-      return fail("no MCU has a program \"" + name + "\"; 'bushctl program put' puts it there");
+      return fail("no MCU has a program \"" + name +
+                  "\"; 'bushctl program list' shows those that there are");
     }
     if (std::ranges::find(mcus, *id) != mcus.end()) return fail(name + " is named twice");
     if (!mcus.empty() && installation_[*id].config.bus != installation_[mcus.front()].config.bus) {
