@@ -110,7 +110,7 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
       {"no motor", {1, 0, 0}},
       {"a motor that is not the program's", {1, 4, 0, 9, 0, 0, 0, 0, 0}},
       {"no point", {3, 1, 0, 0, 0, 0, 0, 0}},
-      {"a line by the volatile bank", {3, 1, 0, 8, 0, 0, 1, 0, 1, 0, 0, 0}},
+      {"a line by a bank that there is not", {3, 1, 0, 9, 0, 0, 1, 0, 1, 0, 0, 0}},
       {"no wait", {5, 0, 0, 0, 0}},
       {"too long a wait", {5, 1, 0xA4, 0x93, 0xD6}},
       {"input 20", {6, 20, 1, 0, 0, 0, 0}},
@@ -127,6 +127,8 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
     with_end.push_back(0);
     EXPECT_EQ(check(program(with_end)), BUSHD_E_FORMAT) << what;
   }
+  EXPECT_EQ(check(program({3, 1, 0, 8, 0, 0, 1, 0, 1, 0, 0, 0, 0})), BUSHD_OK)
+      << "a line by the volatile bank";
   EXPECT_EQ(check(program({5, 0, 0xA4, 0x93, 0xD6, 0})), BUSHD_OK) << "an hour";
   EXPECT_EQ(check(program({7, 0x40, 0x42, 0x0F, 0, 0})), BUSHD_OK) << "a second";
   EXPECT_EQ(check(program({8, 2, 0, 8, 2, 0, 8, 2, 0, 8, 2, 0, 9, 9, 9, 9, 0})), BUSHD_OK)
