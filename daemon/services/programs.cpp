@@ -159,6 +159,7 @@ void Programs::request(const api::Asker& asker, const api::PutProgram& request) 
   if (request.dry_run) {
     asker.answer(api::Accepted{});
     api::ProgramList list{{entry_of(installation_, *program)}};
+    list.programs.front().stage = stage_word(BUSHD_PROGRAM_NONE);  // as far as this text goes
     list.programs.front().memory = view(program->mcu).state.memory;
     return asker.answer(
         api::Completed{.outcome = Outcome::kDone, .reason = "done", .detail = list});

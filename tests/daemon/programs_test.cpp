@@ -70,6 +70,7 @@ TEST(Programs, ADryRunLeavesTheMcuAlone) {
   const Answer answer = lab.wait(lab.send(put));
   ASSERT_THAT(answer.programs, SizeIs(1));
   EXPECT_EQ(answer.programs[0].motors[0].edges, 180);
+  EXPECT_EQ(answer.programs[0].stage, "none");
   EXPECT_EQ(lab.entry().stage, "none");
 }
 
