@@ -222,7 +222,7 @@ struct ProgramEntry {
     friend bool operator==(const Motor&, const Motor&) = default;
   };
   std::string mcu{};
-  std::string program{};   // its name; "": none, or one that was put by another daemon
+  std::string program{};   // its name; "": none, or one that the daemon does not know
   std::string checksum{};  // CRC-32 of its bytes, 8 hexadecimal digits; "": the MCU has none
   std::string stage{};   // none, loading, loaded, waits, runs, pauses, paused, ends, ended, unknown
   std::string reason{};  // why its last run has ended, in words; "": it has not
