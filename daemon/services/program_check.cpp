@@ -94,6 +94,11 @@ Result<CheckedProgram> compile_and_walk(const Installation& installation, const 
                 " may not go on without a host; set programs_without_host = true in its [[mcu]], "
                 "or leave without_host out");
   }
+  if (program.text.at_power_on && !mcu.config.programs_at_power_on) {
+    return fail("it says at_power_on = true, and programs of MCU " + mcu.name() +
+                " may not begin by themselves; set programs_at_power_on = true in its [[mcu]], or "
+                "leave at_power_on out");
+  }
   programs::McuPlace place{.name = "MCU " + mcu.name(),
                            .memory = mcu.offers.programs->program(mcu.on_bus()).state.memory,
                            .tick_ns = installation.bus_of(mcu).config.tick_ns(),
@@ -159,6 +164,8 @@ api::ProgramEntry entry_of(const Installation& installation, const CheckedProgra
                           .program = program.name,
                           .checksum = fmt::format("{:08x}", program.crc),
                           .without_host = program.text.without_host,
+                          .at_power_on = program.text.at_power_on,
+                          .kept = program.text.kept,
                           .bytes = static_cast<std::int32_t>(program.bytes.size()),
                           .duration_us = static_cast<std::int64_t>(walk.ticks) * tick_us,
                           .pulses = static_cast<std::int64_t>(walk.pulses),

@@ -65,6 +65,16 @@ std::optional<McuId> Programs::find(const std::string& name) const {
   return std::nullopt;
 }
 
+// One that was put by another daemon, perhaps for another configuration, has no name.
+std::optional<McuId> Programs::find_by_checksum(const std::string& checksum) const {
+  for (const McuId id : installation_.mcus()) {
+    if (installation_[id].can_have_program() && view(id).known && entry(id).checksum == checksum) {
+      return id;
+    }
+  }
+  return std::nullopt;
+}
+
 // A motor of the program that is under way, by which that is stopped.
 const std::string& Programs::stopped_by(McuId id) const {
   const auto& run = mcus_[id].run;
@@ -108,6 +118,9 @@ api::ProgramEntry Programs::entry(McuId id) const {
   if (whole) entry.checksum = fmt::format("{:08x}", state.crc);
   if (state.stage == BUSHD_PROGRAM_ENDED) entry.reason = end_of_program(state, mcu).reason;
   entry.without_host = (state.flags & BUSHD_PROGRAM_WITHOUT_HOST) != 0;
+  entry.at_power_on = (state.flags & BUSHD_PROGRAM_AT_POWER_ON) != 0;
+  entry.kept = (state.flags & BUSHD_PROGRAM_KEPT) != 0;
+  entry.stored = entry.kept && (state.flags & BUSHD_PROGRAM_STORED) != 0;
   entry.bytes = its.uploading ? static_cast<std::int32_t>(its.put) : state.size;
   if (its.uploading) entry.stage = "loading";
   entry.memory = state.memory;
@@ -180,10 +193,18 @@ void Programs::request(const api::Asker& asker, const api::PutProgram& request) 
     mcu.offers.uploads->upload(mcu.on_bus(), program->line_table->view());
   }
   mcus_[id].upload = Upload{.program = std::move(*program), .source = request, .asker = asker};
-  follow_upload(id);
+  installation_.changed = true;
 }
 
-void Programs::follow_upload(McuId id) {
+// Until a reset would leave what is there now; for a while only, since motors may move for hours.
+bool Programs::waits_until_stored(std::int64_t now_us, McuId id,
+                                  std::optional<std::int64_t>& by_us) const {
+  if ((view(id).state.flags & BUSHD_PROGRAM_STORED) != 0) return false;
+  if (!by_us) by_us = now_us + kStoredWithinUs;
+  return now_us < *by_us;
+}
+
+void Programs::follow_upload(std::int64_t now_us, McuId id) {
   Upload& upload = *mcus_[id].upload;
   const Mcu& mcu = installation_[id];
   if (!upload.began) {
@@ -199,6 +220,10 @@ void Programs::follow_upload(McuId id) {
   }
   const link::ProgramView& its = view(id);
   if (its.uploading || !its.known || mcu.busy()) return;
+  if (its.refused == BUSHD_E_CAPACITY && upload.program.text.kept) {
+    return end_upload(id, fail("MCU " + mcu.name() +
+                               " keeps no program over a reset; leave kept and at_power_on out"));
+  }
   if (its.refused != BUSHD_OK) {
     return end_upload(id,
                       fail("MCU " + mcu.name() + " refused it: " + bushd_status_text(its.refused)));
@@ -206,6 +231,7 @@ void Programs::follow_upload(McuId id) {
   if (its.state.stage != BUSHD_PROGRAM_LOADED || its.state.crc != upload.program.crc) {
     return end_upload(id, fail("MCU " + mcu.name() + " has another program: somebody else put it"));
   }
+  if (upload.program.text.kept && waits_until_stored(now_us, id, upload.stored_by_us)) return;
   end_upload(id, {});
 }
 
@@ -226,7 +252,8 @@ void Programs::end_upload(McuId id, const Result<void>& how) {
 }
 
 void Programs::request(const api::Asker& asker, const api::EraseProgram& request) {
-  const auto id = find(request.program);
+  auto id = find(request.program);
+  if (!id) id = find_by_checksum(request.program);
   if (!id) {
     return asker.answer(api::Refused{"no MCU has a program \"" + request.program +
                                      "\"; 'bushctl program list' shows those that there are"});
@@ -242,18 +269,27 @@ void Programs::request(const api::Asker& asker, const api::EraseProgram& request
   asker.answer(api::Accepted{});
   mcus_[*id].program.reset();
   keep(*id, nullptr);
+  const bool kept = (view(*id).state.flags & BUSHD_PROGRAM_KEPT) != 0;
+  mcus_[*id].erase = Erase{.asker = asker, .kept = kept};
   mcu.offers.programs->erase_program(mcu.on_bus());
-  mcus_[*id].erase = asker;
 }
 
-void Programs::follow_erase(McuId id) {
+void Programs::follow_erase(std::int64_t now_us, McuId id) {
   const Mcu& mcu = installation_[id];
   if (mcu.busy() || !view(id).known) return;
-  const api::Asker asker = *std::exchange(mcus_[id].erase, std::nullopt);
-  if (view(id).state.stage == BUSHD_PROGRAM_NONE) return asker.answer(api::done("done"));
-  asker.answer(api::Completed{.outcome = Outcome::kFault,
-                              .reason = "MCU " + mcu.name() + " has a program still",
-                              .detail = {}});
+  Erase& erase = *mcus_[id].erase;
+  const bool gone = view(id).state.stage == BUSHD_PROGRAM_NONE;
+  if (gone && erase.kept && waits_until_stored(now_us, id, erase.stored_by_us)) return;
+  const bool for_good = !erase.kept || (view(id).state.flags & BUSHD_PROGRAM_STORED) != 0;
+  const api::Asker asker = erase.asker;
+  mcus_[id].erase.reset();
+  if (gone && for_good) return asker.answer(api::done("done"));
+  const std::string reason =
+      gone ? "MCU " + mcu.name() +
+                 " has erased it, and would have it again after a power cut: it writes what it "
+                 "keeps when its motors rest; put another one or erase it then"
+           : "MCU " + mcu.name() + " has a program still";
+  asker.answer(api::Completed{.outcome = Outcome::kFault, .reason = reason, .detail = {}});
 }
 
 // -- over restarts of the daemon

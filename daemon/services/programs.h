@@ -57,12 +57,20 @@ class Programs final : public Service {
   // The share of the time to a common start in which all have to take it.
   static constexpr std::int64_t kConfirmedIn = 1;
   static constexpr std::int64_t kConfirmedOf = 2;
+  // An MCU writes what it keeps when it has stayed the same for 512 ticks and no motor moves.
+  static constexpr std::int64_t kStoredWithinUs = 10'000'000;
 
   struct Upload {
     CheckedProgram program;
     api::PutProgram source;
     api::Asker asker;
-    bool began = false;  // its bytes are being sent; else its line table
+    bool began = false;                          // its bytes are being sent; else its line table
+    std::optional<std::int64_t> stored_by_us{};  // that it has, and is to outlive power cuts
+  };
+  struct Erase {
+    api::Asker asker;
+    bool kept = false;  // it was to outlive power cuts
+    std::optional<std::int64_t> stored_by_us{};
   };
   // Its motors are in the program until it ends.
   struct Run {
@@ -84,7 +92,7 @@ class Programs final : public Service {
     std::optional<api::PutProgram> kept{};    // by a daemon before, and not yet looked at
     std::optional<Upload> upload{};
     std::optional<Run> run{};
-    std::optional<api::Asker> erase{};  // until the MCU has done it
+    std::optional<Erase> erase{};  // until the MCU has done it
     std::uint8_t last_number = 0;
   };
   // Runs that begin together, until all have been taken.
@@ -99,13 +107,14 @@ class Programs final : public Service {
   const link::ProgramView& view(McuId mcu) const;
   bool is_loaded(McuId mcu) const;  // with what was put
   std::optional<McuId> find(const std::string& name) const;
+  std::optional<McuId> find_by_checksum(const std::string& checksum) const;
   const std::string& stopped_by(McuId mcu) const;
   bool has_or_gets(McuId mcu, const std::string& name) const;
   Result<void> may_be_put(const CheckedProgram& program) const;
   Result<void> may_run(McuId mcu) const;
   Result<std::vector<McuId>> mcus_of(const api::RunPrograms& request) const;
   api::ProgramEntry entry(McuId mcu) const;
-  void follow_upload(McuId mcu);
+  void follow_upload(std::int64_t now_us, McuId mcu);
   void keep(McuId mcu, const api::PutProgram* source);
   void know_again(McuId mcu);
   void end_upload(McuId mcu, const Result<void>& how);
@@ -118,7 +127,8 @@ class Programs final : public Service {
   std::uint16_t forbidden(McuId mcu) const;
   void follow(McuId mcu);
   void follow_end(McuId mcu);
-  void follow_erase(McuId mcu);
+  void follow_erase(std::int64_t now_us, McuId mcu);
+  bool waits_until_stored(std::int64_t now_us, McuId mcu, std::optional<std::int64_t>& by_us) const;
   void give_up(const Start& start, api::Outcome outcome, const std::string& reason);
   void give_up_start_of(McuId mcu, api::Outcome outcome, const std::string& reason);
   void end(McuId mcu, api::Outcome outcome, const std::string& reason);

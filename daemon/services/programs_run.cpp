@@ -219,8 +219,8 @@ void Programs::end_overtaken(std::int64_t) {
 void Programs::step(std::int64_t now_us) {
   std::erase_if(starts_, [&](Start& start) { return follow(now_us, start); });
   for (const McuId id : installation_.mcus()) {
-    if (mcus_[id].upload) follow_upload(id);
-    if (mcus_[id].erase) follow_erase(id);
+    if (mcus_[id].upload) follow_upload(now_us, id);
+    if (mcus_[id].erase) follow_erase(now_us, id);
     follow(id);
   }
 }
@@ -228,6 +228,11 @@ void Programs::step(std::int64_t now_us) {
 std::int64_t Programs::next_wake_us() const {
   std::int64_t wake = INT64_MAX;
   for (const Start& start : starts_) wake = std::min(wake, start.confirmed_by_us.value_or(wake));
+  for (const McuId id : installation_.mcus()) {
+    const OfMcu& its = mcus_[id];
+    if (its.upload) wake = std::min(wake, its.upload->stored_by_us.value_or(wake));
+    if (its.erase) wake = std::min(wake, its.erase->stored_by_us.value_or(wake));
+  }
   return wake;
 }
 
@@ -253,11 +258,14 @@ void Programs::adopt(McuId id) {
     installation_[motor].enter_program();
     run.motors.push_back(motor);
   }
-  const bool goes_on = without_host && mcu.config.programs_without_host;
+  const bool at_power_on = (state.flags & BUSHD_PROGRAM_AT_POWER_ON) != 0;
+  const bool goes_on = without_host && mcu.config.programs_without_host &&
+                       (!at_power_on || mcu.config.programs_at_power_on);
   run.stop_wanted = !goes_on;
   outputs_.log(LogLevel::kWarning, id,
-               fmt::format("MCU {}: a program of before, with the checksum {:08x}, {}", mcu.name(),
-                           state.crc, goes_on ? "goes on" : "is stopped"));
+               fmt::format("MCU {}: a program of before, with the checksum {:08x}, {}{}",
+                           mcu.name(), state.crc, goes_on ? "goes on" : "is stopped",
+                           at_power_on ? "; it begins whenever the power comes" : ""));
   mcus_[id].run = std::move(run);
   installation_.changed = true;
 }
@@ -359,7 +367,7 @@ void Programs::goes_offline(Mcu& mcu, const std::string& cause) {
   if (its.upload) end_upload(mcu.id, fail(cause));
   if (its.erase) {
     std::exchange(its.erase, std::nullopt)
-        ->answer(api::Completed{.outcome = Outcome::kLink, .reason = cause, .detail = {}});
+        ->asker.answer(api::Completed{.outcome = Outcome::kLink, .reason = cause, .detail = {}});
   }
   if (!its.run) return;
   Run& run = *its.run;

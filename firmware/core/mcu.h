@@ -47,6 +47,7 @@ typedef struct bushd_mcu_config {
   bool enable_at_boot : 1;  // what keep_enable was told last, after a watchdog reset; else false
   bool in_pieces : 1;       // answers are left to bushd_mcu_work; else they are sent at once
   bool keypad : 1;          // it has a line for one (keypad.h)
+  bool keeps_programs : 1;  // what nvm.h lists, a program too, outlives its resets
   bool no_slow_runs : 1;    // although the engine has them (BUSHD_SLOW_RUNS)
   int16_t* queue;           // queue_ticks x motors displacements
   // 32 .. 16384, a power of two: then absolute tick numbers wrap without a seam.

@@ -14,16 +14,33 @@ static bushd_mcu_nvm_region piece_of(void* at, size_t size) {
   return piece;
 }
 
-// Behind all else: what only some motors have.
+static bushd_mcu_nvm_region program_piece(bushd_mcu* mcu, uint8_t index) {
+#if BUSHD_PROGRAMS
+  bushd_mcu_program* const program = mcu->config.program;
+  if (program != NULL && mcu->config.keeps_programs) {
+    if (index == 0) return piece_of(&program->kept_bytes, sizeof program->kept_bytes);
+    const bool fits = program->kept_bytes <= program->memory;
+    if (index == 1) return piece_of(program->bytes, fits ? program->kept_bytes : 0);
+  }
+#else
+  (void)mcu;
+  (void)index;
+#endif
+  return piece_of(NULL, 0);
+}
+
+// Behind all else: what only some motors have, and the program.
 static bushd_mcu_nvm_region setting_of_motor(bushd_mcu* mcu, uint8_t index) {
   if (index < mcu->config.current_motors) {
     bushd_currents* const its = &mcu->config.currents[index].settings;
     return piece_of(its, sizeof *its);
   }
   index = (uint8_t)(index - mcu->config.current_motors);
-  if (index >= mcu->config.velocity_motors) return piece_of(NULL, 0);
-  bushd_mcu_velocity_settings* const its = &mcu->config.velocity[index].settings;
-  return piece_of(its, sizeof *its);
+  if (index < mcu->config.velocity_motors) {
+    bushd_mcu_velocity_settings* const its = &mcu->config.velocity[index].settings;
+    return piece_of(its, sizeof *its);
+  }
+  return program_piece(mcu, (uint8_t)(index - mcu->config.velocity_motors));
 }
 
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
@@ -79,6 +96,27 @@ void bushd_mcu_nvm_restored(bushd_mcu* mcu) {
   bushd_mcu_begin_inputs(mcu);
   bushd_mcu_restore_emission(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);
+#if BUSHD_PROGRAMS
+  bushd_mcu_restore_program(mcu);
+#endif
+}
+
+void bushd_mcu_nvm_compared(bushd_mcu* mcu, bool same) {
+#if BUSHD_PROGRAMS
+  bushd_mcu_program_compared(mcu, same);
+#else
+  (void)mcu;
+  (void)same;
+#endif
+}
+
+static size_t most_bytes(const bushd_mcu* mcu) {
+  size_t bytes = BUSHD_MCU_NVM_MAX_BYTES(mcu->config.code_count);
+#if BUSHD_PROGRAMS
+  const bushd_mcu_program* const program = mcu->config.program;
+  if (program != NULL) bytes += BUSHD_MCU_NVM_PROGRAM_BYTES(program->memory);
+#endif
+  return bytes;
 }
 
 void bushd_mcu_nvm_begin_scan(bushd_mcu_nvm_scan* scan) {
@@ -96,7 +134,7 @@ bushd_mcu_nvm_region bushd_mcu_nvm_scan_next(bushd_mcu* mcu, bushd_mcu_nvm_scan*
   }
   if (piece.at == NULL) return piece;
   BUSHD_ASSERT(scan->offset < piece.size);
-  BUSHD_ASSERT(scan->size < BUSHD_MCU_NVM_MAX_BYTES(mcu->config.code_count));
+  BUSHD_ASSERT(scan->size < most_bytes(mcu));
   const uint16_t left = (uint16_t)(piece.size - scan->offset);
   const bushd_mcu_nvm_region bytes = {(uint8_t*)piece.at + scan->offset, left < most ? left : most};
   scan->offset = (uint16_t)(scan->offset + bytes.size);

@@ -21,7 +21,7 @@ typedef struct bushd_mcu_nvm_region {
   uint16_t size;
 } bushd_mcu_nvm_region;
 bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
-// Bytes of all pieces together, with this much table memory and all motors.
+// Bytes of all pieces together but the program's, with this much table memory and all motors.
 #define BUSHD_MCU_NVM_MAX_BYTES(code_count)                                                     \
   (sizeof(bushd_set_outputs) + sizeof(uint32_t) + sizeof(bushd_format) +                        \
    sizeof(bushd_set_inputs) + BUSHD_MOTORS_PER_MCU * sizeof(bushd_mcu_switches) +               \
@@ -29,7 +29,11 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index);
    sizeof(uint8_t) + sizeof(uint16_t) + (code_count) * sizeof(uint16_t) +                       \
    BUSHD_MOTORS_PER_MCU * sizeof(int8_t) + BUSHD_MAX_CURRENT_MOTORS * sizeof(bushd_currents) +  \
    BUSHD_MAX_VELOCITY_MOTORS * sizeof(bushd_mcu_velocity_settings))
+// The program's, with bushd_mcu_config.keeps_programs.
+#define BUSHD_MCU_NVM_PROGRAM_BYTES(memory) (sizeof(uint16_t) + (memory))
 void bushd_mcu_nvm_restored(bushd_mcu* mcu);
+// A scan has ended: whether all pieces are as they would be after a reset now.
+void bushd_mcu_nvm_compared(bushd_mcu* mcu, bool same);
 
 // For a port that goes through all pieces a little at a time, again and again.
 typedef struct bushd_mcu_nvm_scan {
@@ -43,7 +47,7 @@ typedef struct bushd_mcu_nvm_scan {
 void bushd_mcu_nvm_begin_scan(bushd_mcu_nvm_scan* scan);
 // The next bytes, up to `most` (>= 1); empty at the end. Pieces may change between two calls: of
 // one that has become shorter than the scan has come, nothing is left. Never more bytes in all than
-// BUSHD_MCU_NVM_MAX_BYTES.
+// the two macros above say.
 bushd_mcu_nvm_region bushd_mcu_nvm_scan_next(bushd_mcu* mcu, bushd_mcu_nvm_scan* scan,
                                              uint16_t most);
 // At the end of a scan: whether what is kept has stayed the same for so long that it may be

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "firmware/core/access.h"
+#include "firmware/core/drivers.h"
 #include "firmware/core/line_run.h"
 #include "firmware/core/program_run.h"
 #include "firmware/core/state.h"
@@ -19,9 +20,17 @@ static bool has_motors(const bushd_mcu_program* p) {
   return p->motors != 0;
 }
 
+// A scan that has begun may have passed by it: the next whole one tells whether it is stored.
+static void keep(bushd_mcu_program* p, uint16_t bytes) {
+  p->kept_bytes = bytes;
+  p->stored = false;
+  p->scans_before = 2;
+}
+
 static void forget(bushd_mcu_program* p) {
   p->stage = BUSHD_PROGRAM_NONE;
   p->size = p->received = 0;
+  keep(p, 0);
   p->crc = 0;
   memset(&p->program, 0, sizeof p->program);
 }
@@ -34,6 +43,14 @@ void bushd_mcu_boot_program(bushd_mcu* mcu) {
   memset(p, 0, sizeof *p);
   p->bytes = bytes;
   p->memory = memory;
+  keep(p, 0);
+}
+
+void bushd_mcu_program_compared(bushd_mcu* mcu, bool same) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (p == NULL) return;
+  if (p->scans_before != 0) --p->scans_before;
+  p->stored = same && p->scans_before == 0;
 }
 
 bushd_status bushd_mcu_put_program(bushd_mcu* mcu, const bushd_program_put* message) {
@@ -81,6 +98,9 @@ static bushd_status commit(bushd_mcu* mcu, uint32_t crc) {
   bushd_status status = bushd_program_check(p->bytes, p->size, bushd_mcu_own_motors(mcu), &program);
   if (status == BUSHD_OK) status = check_kinds(mcu, &program);
   if (status != BUSHD_OK) return status;
+  const bool kept = (program.flags & BUSHD_PROGRAM_KEPT) != 0;
+  if (kept && !mcu->config.keeps_programs) return BUSHD_E_CAPACITY;
+  keep(p, kept ? p->size : 0);
   p->program = program;
   p->crc = crc;
   p->reason = BUSHD_PROGRAM_NO_REASON;
@@ -98,15 +118,38 @@ static bushd_status check_tables(const bushd_mcu* mcu, const bushd_program* prog
   return BUSHD_OK;
 }
 
+static bool counts_from_start(const bushd_mcu_program* p) {
+  return (p->program.flags & BUSHD_PROGRAM_AT_POWER_ON) != 0;
+}
+
 static bushd_status check_motors(const bushd_mcu* mcu, const bushd_mcu_program* p) {
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((p->program.motors & motor_bit(m)) == 0) continue;
     const bushd_program_motor part = bushd_mcu_program_part_of(p, m);
     if (mcu->motor[m].table != (int8_t)part.bank) return BUSHD_E_NO_TABLE;
-    const int32_t at = bushd_mcu_position_at_rest(mcu, m);
+    const int32_t at = counts_from_start(p) ? 0 : bushd_mcu_position_at_rest(mcu, m);
     if (at < part.least_steps || at > part.most_steps) return BUSHD_E_FORMAT;
   }
   return check_tables(mcu, &p->program);
+}
+
+// From its first frame. Its stage says when.
+static void begin(bushd_mcu* mcu, uint8_t number) {
+  bushd_mcu_program* p = mcu->config.program;
+  p->number = number;
+  p->motors = p->program.motors;
+  p->at = p->program.frames;
+  p->next_frame = p->point = 0;
+  p->depth = 0;
+  p->repeats = 0;
+  p->moving = 0;
+  p->has_frame = p->resumes = false;
+  p->frame = (bushd_program_frame){0};
+  p->reason = BUSHD_PROGRAM_NO_REASON;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    p->origin_steps[m] = counts_from_start(p) ? bushd_mcu_position_at_rest(mcu, m) : 0;
+  }
+  mcu->local.held &= (uint16_t)~p->motors;
 }
 
 static bushd_status run(bushd_mcu* mcu, uint8_t number, uint32_t first_tick) {
@@ -121,20 +164,48 @@ static bushd_status run(bushd_mcu* mcu, uint8_t number, uint32_t first_tick) {
     return BUSHD_E_CAPACITY;
   const bushd_status status = check_motors(mcu, p);
   if (status != BUSHD_OK) return status;
-  p->number = number;
+  begin(mcu, number);
   p->start_tick = first_tick;
-  p->motors = p->program.motors;
-  p->at = p->program.frames;
-  p->next_frame = p->point = 0;
-  p->depth = 0;
-  p->repeats = 0;
-  p->moving = 0;
-  p->has_frame = p->resumes = false;
-  p->frame = (bushd_program_frame){0};
-  p->reason = BUSHD_PROGRAM_NO_REASON;
   p->stage = BUSHD_PROGRAM_WAITS;
-  mcu->local.held &= (uint16_t)~p->motors;
   return BUSHD_OK;
+}
+
+// With a wait before its first frame. Where something is in its way it says so, and does not begin
+// before the power comes anew.
+static void begin_at_power_on(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  const bool fault = (mcu->faults & BUSHD_MCU_PROGRAM_ENDING_FAULTS) != 0;
+  if (fault || check_motors(mcu, p) != BUSHD_OK) {
+    p->reason = fault ? BUSHD_PROGRAM_FAULT : BUSHD_PROGRAM_REFUSED;
+    p->stage = BUSHD_PROGRAM_ENDED;
+    return;
+  }
+  begin(mcu, 0);
+  p->frame.kind = BUSHD_PROGRAM_WAIT;
+  p->has_frame = true;
+  p->until = mcu->uptime + bushd_mcu_program_ticks(mcu, BUSHD_MCU_PROGRAM_POWER_ON_US);
+  p->stage = BUSHD_PROGRAM_RUNS;
+  // With what it was configured with before; a host that comes with the same goes on with it.
+  mcu->flags |= BUSHD_FLAG_CONFIGURED;
+  bushd_mcu_set_enable(mcu, true);
+}
+
+static bool power_was_off(const bushd_mcu* mcu) {
+  return mcu->config.reset_cause == BUSHD_RESET_POWER_ON ||
+         mcu->config.reset_cause == BUSHD_RESET_BROWN_OUT;
+}
+
+void bushd_mcu_restore_program(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (p == NULL || p->kept_bytes == 0) return;
+  p->stage = BUSHD_PROGRAM_LOADING;
+  p->size = p->received = p->kept_bytes;
+  const uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, p->bytes, p->size);
+  if (commit(mcu, crc) != BUSHD_OK) {
+    forget(p);
+  } else if (counts_from_start(p) && power_was_off(mcu)) {
+    begin_at_power_on(mcu);
+  }
 }
 
 static bool is_waiting(const bushd_mcu_program* p) {
@@ -192,7 +263,7 @@ bushd_program_state bushd_mcu_state_of_program(const bushd_mcu* mcu) {
       .stage = p->stage,
       .reason = p->reason,
       .number = p->number,
-      .flags = p->program.flags,
+      .flags = (uint8_t)(p->program.flags | (p->stored ? BUSHD_PROGRAM_STORED : 0)),
       .motors = p->program.motors,
       .memory = p->memory,
       .size = is_whole(p) ? p->size : p->received,

@@ -18,6 +18,9 @@ typedef struct bushd_mcu bushd_mcu;
 // Frames, and points of a line, that begin in one tick at most: what a tick costs has a bound.
 #define BUSHD_MCU_PROGRAM_BEGINS 8u
 #define BUSHD_MCU_PROGRAM_FARTHEST_START 32767  // ticks ahead
+// From power-on until one that begins by itself does: supplies and drivers settle, and inputs are
+// heard.
+#define BUSHD_MCU_PROGRAM_POWER_ON_US UINT32_C(1000000)
 // These end any program; others are a matter between the MCU and its host.
 #define BUSHD_MCU_PROGRAM_ENDING_FAULTS                                          \
   (BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT | \
@@ -53,11 +56,19 @@ typedef struct bushd_mcu_program {
   bushd_mcu_repeat repeat[BUSHD_PROGRAM_MOST_DEPTH];
   uint32_t repeats;
   uint32_t start_tick;
+  uint16_t kept_bytes;   // of it, over resets: all or none (nvm.h)
+  uint8_t scans_before;  // that must end before one tells whether it is stored
+  bool stored : 1;
   uint32_t until;  // uptime at which WAIT is over; while it pauses: how many ticks are left
   int32_t target_steps[BUSHD_MOTORS_PER_MCU];  // of the present motion
+  int32_t origin_steps[BUSHD_MOTORS_PER_MCU];  // from where its range counts
 } bushd_mcu_program;
 
 void bushd_mcu_boot_program(bushd_mcu* mcu);
+// What outlived the reset is there again. One that begins at power-on does, if power was off.
+void bushd_mcu_restore_program(bushd_mcu* mcu);
+// All that is kept has been compared with what would be there after a reset.
+void bushd_mcu_program_compared(bushd_mcu* mcu, bool same);
 bushd_status bushd_mcu_put_program(bushd_mcu* mcu, const bushd_program_put* message);
 bushd_status bushd_mcu_control_program(bushd_mcu* mcu, const bushd_program_control* message);
 bushd_program_state bushd_mcu_state_of_program(const bushd_mcu* mcu);

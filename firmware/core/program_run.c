@@ -155,7 +155,9 @@ static bool set_targets(bushd_mcu* mcu) {
     const int32_t steps = bushd_program_entry_of(&p->frame, p->point, nth++).steps;
     const int64_t target = relative ? (int64_t)bushd_mcu_position_at_rest(mcu, m) + steps : steps;
     const bushd_program_motor part = bushd_mcu_program_part_of(p, m);
-    if (target < part.least_steps || target > part.most_steps) return false;
+    const int64_t from = p->origin_steps[m];
+    if (target - from < part.least_steps || target - from > part.most_steps) return false;
+    if (target < INT32_MIN || target > INT32_MAX) return false;
     p->target_steps[m] = (int32_t)target;
   }
   return true;
@@ -196,7 +198,7 @@ static void look_after_runs(bushd_mcu* mcu) {
 
 // Waits.
 
-static uint32_t ticks_of(const bushd_mcu* mcu, uint32_t us) {
+uint32_t bushd_mcu_program_ticks(const bushd_mcu* mcu, uint32_t us) {
   return (uint32_t)(((uint64_t)us * 1000u + mcu->tick_ns - 1u) / mcu->tick_ns);
 }
 
@@ -278,7 +280,7 @@ static void begin_frame(bushd_mcu* mcu) {
       break;
     case BUSHD_PROGRAM_WAIT:
     case BUSHD_PROGRAM_WAIT_INPUT:
-      p->until = mcu->uptime + ticks_of(mcu, p->frame.us);
+      p->until = mcu->uptime + bushd_mcu_program_ticks(mcu, p->frame.us);
       break;
     case BUSHD_PROGRAM_PULSE:
       break;

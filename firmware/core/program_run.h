@@ -14,6 +14,8 @@ void bushd_mcu_stop_program_motors(bushd_mcu* mcu, bushd_stop_mode mode, uint32_
 // The same, and the program has ended as soon as they rest. Precondition: it has motors.
 void bushd_mcu_end_program(bushd_mcu* mcu, bushd_program_reason why, bushd_stop_mode mode,
                            uint32_t next);
+// So many ticks as the time has, rounded up.
+uint32_t bushd_mcu_program_ticks(const bushd_mcu* mcu, uint32_t us);
 // What the program says of one of its motors.
 bushd_program_motor bushd_mcu_program_part_of(const bushd_mcu_program* p, uint8_t m);
 // At the beginning of the tick that is prepared next, of a motor at rest.

@@ -227,10 +227,13 @@ struct ProgramEntry {
   std::string stage{};   // none, loading, loaded, waits, runs, pauses, paused, ends, ended, unknown
   std::string reason{};  // why its last run has ended, in words; "": it has not
   bool without_host = false;
-  std::int32_t bytes = 0;   // of it, or of what has arrived of it
-  std::int32_t memory = 0;  // bytes that one may have
-  std::int32_t frame = 0;   // that is carried out, or was last, from 1; 0: none yet
-  std::int32_t point = 0;   // of it, if it is a line, from 1
+  bool at_power_on = false;  // it begins by itself when the power comes
+  bool kept = false;         // it is to outlive power cuts
+  bool stored = false;       // and would now
+  std::int32_t bytes = 0;    // of it, or of what has arrived of it
+  std::int32_t memory = 0;   // bytes that one may have
+  std::int32_t frame = 0;    // that is carried out, or was last, from 1; 0: none yet
+  std::int32_t point = 0;    // of it, if it is a line, from 1
   std::int64_t repeats = 0;
   // The walk; of a program that the daemon knows.
   std::int64_t duration_us = 0;  // without the time in which it waits for inputs
@@ -246,6 +249,9 @@ struct ProgramEntry {
     visit("stage", self.stage);
     visit("reason", self.reason);
     visit("without_host", self.without_host);
+    visit("at_power_on", self.at_power_on);
+    visit("kept", self.kept);
+    visit("stored", self.stored);
     visit("bytes", self.bytes);
     visit("memory", self.memory);
     visit("frame", self.frame);

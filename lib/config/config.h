@@ -117,6 +117,7 @@ struct Mcu {
   std::uint32_t enable_settle_ms = 0;  // from enabling them to the first step
   std::uint32_t keypad_ms = 500;       // that a key of its keypad counts; 0: until the next one
   bool programs_without_host = false;  // its programs may go on when no host is heard
+  bool programs_at_power_on = false;   // and begin by themselves when the power comes
   bool stand_in = false;               // for a bus that has no MCUs
   KeyPlaces places{};                  // of `address`
 };

@@ -21,6 +21,7 @@
 #include "config/keypad_section.h"
 #include "config/output_levels.h"
 #include "config/port_check.h"
+#include "config/programs_section.h"
 #include "config/pseudo_section.h"
 #include "config/serial_pulse_section.h"
 #include "config/state_section.h"
@@ -213,6 +214,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
                                   "enable_settle_ms",
                                   "keypad_ms",
                                   "programs_without_host",
+                                  "programs_at_power_on",
                                   "enable_active",
                                   "step_active",
                                   "direction_active"});
@@ -248,11 +250,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
       if (!ms) return fail(ms.error());
       mcu.keypad_ms = static_cast<std::uint32_t>(*ms);
     }
-    if (reader.has("programs_without_host")) {
-      const auto may = reader.boolean("programs_without_host");
-      if (!may) return fail(may.error());
-      mcu.programs_without_host = *may;
-    }
+    if (auto read = read_programs(reader, &mcu); !read) return read;
     config->mcus.push_back(std::move(mcu));
   }
   return {};

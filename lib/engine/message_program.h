@@ -64,12 +64,16 @@ typedef enum bushd_program_reason {
   BUSHD_PROGRAM_LATE = 10      // the ticks of the bus have changed before its first tick
 } bushd_program_reason;
 
+// A bit of bushd_program_state.flags: a reset leaves the program as it is now, or none if there is
+// none that is to be kept.
+#define BUSHD_PROGRAM_STORED 0x80u
+
 // The answer to PROGRAM_STATE, true of one tick.
 typedef struct bushd_program_state {
   uint8_t stage;   // bushd_program_stage
   uint8_t reason;  // bushd_program_reason of the last run
   uint8_t number;  // of the last RUN taken; 0: none since boot
-  uint8_t flags;   // of the program
+  uint8_t flags;   // of the program; BUSHD_PROGRAM_STORED
   uint16_t motors;
   uint16_t memory;      // bytes that a program may have
   uint16_t size;        // of the program, or of what has come of it

@@ -82,13 +82,25 @@ static bool in_range(const bushd_program_frame* frame, const uint8_t* at, uint16
   }
 }
 
-static bushd_status check_frames(reader* r, uint16_t motors) {
+static bool leads_to_position(uint8_t kind) {
+  return kind == BUSHD_PROGRAM_MOVE_TO || kind == BUSHD_PROGRAM_LINE_TO;
+}
+
+static bool flags_fit(uint8_t flags) {
+  const uint8_t alone = BUSHD_PROGRAM_WITHOUT_HOST | BUSHD_PROGRAM_KEPT;
+  if ((flags & BUSHD_PROGRAM_AT_POWER_ON) == 0) return (flags & ~alone) == 0;
+  return flags == (alone | BUSHD_PROGRAM_AT_POWER_ON);
+}
+
+static bushd_status check_frames(reader* r, const bushd_program* program) {
+  const bool by_distances = (program->flags & BUSHD_PROGRAM_AT_POWER_ON) != 0;
   uint8_t depth = 0;
   for (;;) {
     const uint8_t* const at = r->at;
     const bushd_program_frame frame = get_frame(r);
     if (r->short_of_bytes) return BUSHD_E_LENGTH;
-    if (!in_range(&frame, at, motors)) return BUSHD_E_FORMAT;
+    if (!in_range(&frame, at, program->motors)) return BUSHD_E_FORMAT;
+    if (by_distances && leads_to_position(frame.kind)) return BUSHD_E_FORMAT;
     if (frame.kind == BUSHD_PROGRAM_REPEAT && ++depth > BUSHD_PROGRAM_MOST_DEPTH) {
       return BUSHD_E_FORMAT;
     }
@@ -115,8 +127,7 @@ bushd_status bushd_program_check(const uint8_t* bytes, size_t size, uint16_t own
   program->parts = r.at;
   program->end = r.end;
   if (r.short_of_bytes) return BUSHD_E_LENGTH;
-  if ((program->flags & ~BUSHD_PROGRAM_WITHOUT_HOST) != 0 || program->motors == 0 ||
-      (program->motors & ~own_motors) != 0) {
+  if (!flags_fit(program->flags) || program->motors == 0 || (program->motors & ~own_motors) != 0) {
     return BUSHD_E_FORMAT;
   }
   for (uint8_t left = count_of(program->motors); left > 0; --left) {
@@ -125,7 +136,7 @@ bushd_status bushd_program_check(const uint8_t* bytes, size_t size, uint16_t own
     if (part.bank >= BUSHD_TABLE_BANKS || part.least_steps > part.most_steps) return BUSHD_E_FORMAT;
   }
   program->frames = r.at;
-  return check_frames(&r, program->motors);
+  return check_frames(&r, program);
 }
 
 bushd_program_motor bushd_program_part(const bushd_program* program, uint8_t nth) {

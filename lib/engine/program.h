@@ -25,7 +25,15 @@ extern "C" {
 #define BUSHD_PROGRAM_INPUTS 20u        // those of motors, then those of the system, bit by bit
 #define BUSHD_PROGRAM_SYSTEM_INPUT 16u  // the first of these
 
-enum { BUSHD_PROGRAM_WITHOUT_HOST = 1 << 0 };  // of bushd_program.flags
+// Bits of bushd_program.flags.
+enum {
+  BUSHD_PROGRAM_WITHOUT_HOST = 1 << 0,
+  BUSHD_PROGRAM_KEPT = 1 << 1,  // it outlives resets and power cuts
+  // It begins by itself when the power comes. The other two are set then, it has no MOVE_TO and no
+  // LINE_TO, since nobody knows where its motors are, and its parts' ranges count from where each
+  // motor is when it begins, however that was asked for.
+  BUSHD_PROGRAM_AT_POWER_ON = 1 << 2
+};
 
 #define BUSHD_PROGRAM_HEAD 4u
 #define BUSHD_PROGRAM_MOTOR 9u  // bytes of each motor's part
@@ -61,7 +69,7 @@ typedef struct bushd_program {
 
 typedef struct bushd_program_motor {
   uint8_t bank;         // the table that the motor must have
-  int32_t least_steps;  // where it may go
+  int32_t least_steps;  // where it may go; AT_POWER_ON: how far
   int32_t most_steps;
 } bushd_program_motor;
 

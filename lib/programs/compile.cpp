@@ -30,7 +30,7 @@ class Compiler {
   }
 
   Result<std::vector<std::uint8_t>> compile() {
-    head();
+    if (auto put = put_head(); !put) return fail(put.error());
     for (const Frame& frame : program_.frames) {
       const auto put = std::visit(Overloaded{[&](const Move& move) { return put_move(move); },
                                              [&](const Line& line) { return put_line(line); },
@@ -50,17 +50,42 @@ class Compiler {
   }
 
  private:
-  void head() {
+  unsigned flags() const {
+    unsigned flags = 0;
+    if (program_.without_host) flags |= BUSHD_PROGRAM_WITHOUT_HOST;
+    if (program_.kept) flags |= BUSHD_PROGRAM_KEPT;
+    if (program_.at_power_on) flags |= BUSHD_PROGRAM_AT_POWER_ON;
+    return flags;
+  }
+
+  // Steps, the least one first: positions, or distances with at_power_on.
+  Result<std::pair<std::int64_t, std::int64_t>> range_of(std::size_t i) const {
+    const MotorPlace& motor = motors_[i];
+    if (!program_.at_power_on) return std::pair{motor.least_steps, motor.most_steps};
+    const auto least = steps_of(i, program_.range[i].least, true);
+    if (!least) return fail(least.error());
+    const auto most = steps_of(i, program_.range[i].most, true);
+    if (!most) return fail(most.error());
+    const std::pair<std::int64_t, std::int64_t> range = std::minmax(*least, *most);
+    if (range.second - range.first <= motor.most_steps - motor.least_steps) return range;
+    return fail("motor \"" + motor.name +
+                "\": its range is wider than the way between its soft limits");
+  }
+
+  Result<void> put_head() {
     out_.put(BUSHD_PROGRAM_FORMAT, 1);
-    out_.put(program_.without_host ? BUSHD_PROGRAM_WITHOUT_HOST : 0, 1);
+    out_.put(flags(), 1);
     unsigned mask = 0;
     for (const MotorPlace& motor : motors_) mask |= 1u << motor.output;
     out_.put(mask, 2);
     for (const std::size_t i : by_output_) {
+      const auto range = range_of(i);
+      if (!range) return fail(range.error());
       out_.put(motors_[i].bank, 1);
-      out_.put(static_cast<std::uint32_t>(motors_[i].least_steps), 4);
-      out_.put(static_cast<std::uint32_t>(motors_[i].most_steps), 4);
+      out_.put(static_cast<std::uint32_t>(range->first), 4);
+      out_.put(static_cast<std::uint32_t>(range->second), 4);
     }
+    return {};
   }
 
   Result<std::int32_t> steps_of(std::size_t i, double value, bool relative) const {

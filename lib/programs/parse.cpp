@@ -281,16 +281,87 @@ Result<void> read_motors(const TomlReader& toml, Program& program) {
                                        " motors; allowed: 1 to 16, all of one MCU"));
 }
 
+Result<void> read_flag(const TomlReader& toml, const char* key, bool& flag) {
+  if (!toml.has(key)) return {};
+  const auto value = toml.boolean(key);
+  if (!value) return fail(value.error());
+  flag = *value;
+  return {};
+}
+
+Result<void> read_range(const TomlReader& toml, Program& program) {
+  constexpr const char* kKey = "range";
+  constexpr const char* kAllowed =
+      "two distances of each motor, the first not above 0, the second not below it: "
+      "range = { theta = [-1, 1] }";
+  if (!program.at_power_on) {
+    if (!toml.has(kKey)) return {};
+    return fail(toml.error(kKey, "is for at_power_on = true, which is not there; remove it"));
+  }
+  const toml::table* const table = toml.table(kKey);
+  if (table == nullptr) {
+    return fail(toml.error(toml.has(kKey) ? kKey : "at_power_on",
+                           "needs a range, since nobody knows where motors are then; allowed: " +
+                               std::string(kAllowed)));
+  }
+  for (const auto& [name, node] : *table) {
+    if (std::ranges::find(program.motors, std::string(name.str())) == program.motors.end()) {
+      return fail(
+          toml.error(kKey, "\"" + std::string(name.str()) +
+                               "\" is not in `motors`; allowed: the motors of the program"));
+    }
+  }
+  for (std::size_t i = 0; i < program.motors.size(); ++i) {
+    const std::string& name = program.motors[i];
+    const toml::array* const ends = (*table)[name].as_array();
+    if (ends == nullptr || ends->size() != 2) {
+      return fail(toml.error(kKey, "\"" + name + "\" has no two distances; allowed: " + kAllowed));
+    }
+    const auto least = toml.number(kKey, i, (*ends)[0], kAllowed);
+    if (!least) return fail(least.error());
+    const auto most = toml.number(kKey, i, (*ends)[1], kAllowed);
+    if (!most) return fail(most.error());
+    if (*least > 0 || *most < 0) {
+      return fail(
+          toml.error(kKey, "that of \"" + name + "\" does not have 0; allowed: " + kAllowed));
+    }
+    program.range.push_back({*least, *most});
+  }
+  return {};
+}
+
+// Nobody is heard when the power comes, and nobody knows positions then.
+Result<void> check_power_on(const TomlReader& toml, const Program& program) {
+  if (!program.at_power_on) return {};
+  for (const auto& [is, key] :
+       {std::pair{program.kept, "kept"}, std::pair{program.without_host, "without_host"}}) {
+    if (is) continue;
+    return fail(toml.error("at_power_on", std::string("true wants ") + key + " = true as well"));
+  }
+  for (const Frame& frame : program.frames) {
+    const auto* const move = std::get_if<Move>(&frame.what);
+    const auto* const line = std::get_if<Line>(&frame.what);
+    if ((move == nullptr || move->relative) && (line == nullptr || line->relative)) continue;
+    return fail(frame.place +
+                ": a position, in a program with at_power_on: nobody knows then where motors are; "
+                "allowed: move_by and line_by");
+  }
+  return {};
+}
+
 Result<void> read_head(const TomlReader& toml, Program& program) {
-  if (auto only = toml.only({"motors", "without_host", "unit", "frame"}); !only) {
+  if (auto only =
+          toml.only({"motors", "without_host", "kept", "at_power_on", "range", "unit", "frame"});
+      !only) {
     return fail(only.error());
   }
   if (auto motors = read_motors(toml, program); !motors) return fail(motors.error());
-  if (toml.has("without_host")) {
-    const auto without_host = toml.boolean("without_host");
-    if (!without_host) return fail(without_host.error());
-    program.without_host = *without_host;
+  for (const auto& [key, flag] :
+       {std::pair{"without_host", &program.without_host}, std::pair{"kept", &program.kept},
+        std::pair{"at_power_on", &program.at_power_on}}) {
+    if (auto read = read_flag(toml, key, *flag); !read) return read;
   }
+  if (auto read = read_range(toml, program); !read) return read;
   if (!toml.has("unit")) return {};
   const auto unit = toml.string("unit", "\"user\" or \"steps\"");
   if (!unit) return fail(unit.error());
@@ -341,6 +412,7 @@ Result<Program> parse(std::string_view text, const std::string& file, const Read
     program.frames.push_back(std::move(*frame));
   }
   if (auto nested = check_nesting(program); !nested) return fail(nested.error());
+  if (auto fits = check_power_on(toml, program); !fits) return fail(fits.error());
   return program;
 }
 

@@ -2,6 +2,9 @@
 //
 //     motors = ["theta", "x"]        # of one MCU; the order of numbers below
 //     without_host = false           # true: it goes on when no host is heard
+//     kept = false                   # true: it outlives power cuts
+//     at_power_on = false            # true: and begins by itself when the power comes
+//     range = { theta = [-5, 5] }    # then: how far each may come from where it is then
 //     unit = "user"                  # of positions: "user", or "steps"
 //
 //     [[frame]]
@@ -71,10 +74,19 @@ struct Frame {
   std::string place{};  // "scan.toml:7", for refusals
 };
 
+// Distances from where the motor is when the program begins; 0 is among them.
+struct Range {
+  double least = 0;
+  double most = 0;
+};
+
 struct Program {
   std::vector<std::string> motors;
   bool without_host = false;
-  bool steps = false;  // positions are steps, not user units
+  bool kept = false;
+  bool at_power_on = false;       // then it is kept, without a host, and goes by distances
+  std::vector<Range> range = {};  // with at_power_on: of each motor
+  bool steps = false;             // positions are steps, not user units
   std::vector<Frame> frames;
 };
 

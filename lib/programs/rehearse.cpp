@@ -111,6 +111,23 @@ class Walk {
     }
   }
 
+  // What the MCU holds one to that begins at power-on: distances from where it is then.
+  Result<void> within_its_range(std::size_t i, std::int64_t target) const {
+    if (!text_.at_power_on) return {};
+    const MotorPlace& motor = motors_[i];
+    std::uint8_t nth = 0;
+    for (const MotorPlace& other : motors_) {
+      if (other.output < motor.output) ++nth;
+    }
+    const bushd_program_motor part = bushd_program_part(&program_, nth);
+    const std::int64_t distance = target - motor.at_steps;
+    if (distance >= part.least_steps && distance <= part.most_steps) return {};
+    return fail(text_.frames[frame_ - 1].place + ": motor \"" + motor.name + "\" would come " +
+                std::to_string(distance) + " steps from where it begins, but its range is " +
+                std::to_string(part.least_steps) + " to " + std::to_string(part.most_steps) +
+                " steps");
+  }
+
   Result<std::int64_t> go(const bushd_program_frame& frame, std::uint16_t point, std::uint8_t nth,
                           std::size_t i) {
     Rehearsal::Way& way = out_.motors[i];
@@ -126,6 +143,7 @@ class Walk {
                   motor.coordinates.text(motor.least_steps) + " to " +
                   motor.coordinates.text(motor.most_steps));
     }
+    if (auto fits = within_its_range(i, target); !fits) return fail(fits.error());
     const std::int64_t distance = std::abs(target - way.end_steps);
     if (distance > INT32_MAX) {
       return fail(text_.frames[frame_ - 1].place + ": motor \"" + motor.name +

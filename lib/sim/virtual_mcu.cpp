@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "firmware/core/nvm.h"
 #include "sim/disabled_capabilities.h"
 
 namespace bushd::sim {
@@ -30,6 +31,13 @@ VirtualMcu::VirtualMcu(const McuOptions& options, std::size_t index, Driver& dri
   config.mcu.keypad = true;
   config.mcu.scratch = &scratch_;
   config.mcu.program = &program_;
+  config.mcu.keeps_programs = options.keeps;
+  if (options.keeps) {
+    nvm_.resize(BUSHD_MCU_NVM_MAX_BYTES(std::size_t{options.code_count}) +
+                BUSHD_MCU_NVM_PROGRAM_BYTES(std::size_t{options.program_bytes}));
+    config.nvm = nvm_.data();
+    config.nvm_size = nvm_.size();
+  }
   disable_capabilities(options.disabled_capabilities, &config.mcu);
   const std::uint64_t unique_id = options.unique_id != 0 ? options.unique_id : index + 1;
   for (std::size_t i = 0; i < BUSHD_UNIQUE_ID_SIZE; ++i) {

@@ -23,6 +23,7 @@ struct McuOptions {
   std::uint16_t queue_ticks = 1024;  // a power of two
   std::uint16_t code_count = 16384;
   std::uint16_t program_bytes = 8192;
+  bool keeps = false;  // tables, settings and programs over resets, as a port with flash does
   std::uint32_t disabled_capabilities = 0;  // BUSHD_CAN_*: it has all others
   // How many motors it controls the currents of, and how many may move by the velocity loop; >= 1:
   // an MCU without these capabilities has them disabled.
@@ -100,6 +101,7 @@ class VirtualMcu final : public Mcu {
   std::vector<std::uint16_t> codes_;
   bushd_mcu_scratch scratch_{};
   std::vector<std::uint8_t> program_bytes_;
+  std::vector<std::uint8_t> nvm_;
   bushd_mcu_program program_{};
   struct Wired {
     std::size_t output;

@@ -1,5 +1,6 @@
 // Tables and settings that an image keeps over resets. Its virtual twin keeps nothing.
 #include "conformance/targets.h"
+#include "engine/program.h"
 #include "sim/mcu_alone.h"
 
 namespace bushd::sim::nvm_test {
@@ -159,6 +160,77 @@ TEST_P(Nvm, WhatIsTheSameIsNotWrittenAgain) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   pass(real_->keeps_within_ns(kCodes));
   EXPECT_EQ(real_->nvm_writes(), written);
+}
+
+class NvmProgram : public Nvm {
+ protected:
+  // By 70 steps, and 30 back.
+  static Bytes program(std::uint8_t flags) {
+    Bytes bytes = {BUSHD_PROGRAM_FORMAT, flags, 1 << 3, 0, 0};
+    const auto append = [&bytes](std::int32_t value, int size) {
+      for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
+    };
+    append(-5, 4);
+    append(70, 4);
+    for (const std::int32_t steps : {70, -30}) {
+      bytes.push_back(BUSHD_PROGRAM_MOVE_BY);
+      append(1 << 3, 2);
+      append(steps, 4);
+      append(0, 2);
+    }
+    bytes.push_back(BUSHD_PROGRAM_END);
+    return bytes;
+  }
+  void load(const Bytes& bytes) {
+    Bytes part = {0, 0, static_cast<std::uint8_t>(bytes.size()), 0};
+    part.insert(part.end(), bytes.begin(), bytes.end());
+    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_PROGRAM_PUT, part), BUSHD_OK);
+    const std::uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, bytes.data(), bytes.size());
+    ASSERT_EQ(control(BUSHD_PROGRAM_COMMIT, crc), BUSHD_OK);
+  }
+  bushd_status control(std::uint8_t action, std::uint32_t value) {
+    return ask(BUSHD_MSG_PROGRAM, bushd_encode_program_control,
+               bushd_program_control{action, 0, value});
+  }
+  bushd_program_state state() {
+    bushd_program_state state{};
+    const auto reply = master_.request(kAddress, BUSHD_MSG_PROGRAM_STATE, Bytes{});
+    EXPECT_TRUE(reply && bushd_decode_program_state(reply->payload.data(), reply->payload.size(),
+                                                    &state) == BUSHD_OK);
+    return state;
+  }
+};
+BUSHD_FOR_TARGETS(NvmProgram, targets_with(BUSHD_CAN_PROGRAM));
+
+TEST_P(NvmProgram, AProgramOutlivesAResetAndBeginsWhenThePowerComes) {
+  ASSERT_NO_FATAL_FAILURE(make_ready());
+  pass(real_->keeps_within_ns(kCodes));
+  const Bytes bytes =
+      program(BUSHD_PROGRAM_WITHOUT_HOST | BUSHD_PROGRAM_KEPT | BUSHD_PROGRAM_AT_POWER_ON);
+  ASSERT_NO_FATAL_FAILURE(load(bytes));
+  EXPECT_EQ(state().flags & BUSHD_PROGRAM_STORED, 0);
+  pass(real_->keeps_within_ns(kCodes));
+  EXPECT_NE(state().flags & BUSHD_PROGRAM_STORED, 0);
+  reboot();
+  EXPECT_EQ(state().stage, BUSHD_PROGRAM_LOADED) << "its power was not off";
+  pass(1'500'000'000);
+  EXPECT_EQ(steps_made(3), 0u);
+  ASSERT_TRUE(real_->power_comes_back_next());
+  reboot();
+  EXPECT_EQ(state().stage, BUSHD_PROGRAM_RUNS);
+  EXPECT_EQ(steps_made(3), 0u) << "not before a second has passed";
+  pass(2'000'000'000);
+  EXPECT_EQ(state().stage, BUSHD_PROGRAM_ENDED);
+  EXPECT_EQ(state().reason, BUSHD_PROGRAM_DONE);
+  EXPECT_EQ(steps_made(3), 100u);
+  EXPECT_EQ(master_.poll(kAddress).motor[3].position_steps, 40);
+  ASSERT_EQ(control(BUSHD_PROGRAM_ERASE, 0), BUSHD_OK);
+  EXPECT_EQ(state().flags & BUSHD_PROGRAM_STORED, 0) << "a reset would bring it back";
+  pass(real_->keeps_within_ns(kCodes));
+  EXPECT_NE(state().flags & BUSHD_PROGRAM_STORED, 0);
+  ASSERT_TRUE(real_->power_comes_back_next());
+  reboot();
+  EXPECT_EQ(state().stage, BUSHD_PROGRAM_NONE);
 }
 
 // Bank 8, which is never kept, whether the MCU has it or refuses it.

@@ -110,6 +110,10 @@ class Lm3s6965 final : public McuUnderTest {
   TimeNs keeps_within_ns(std::size_t) const override { return 2'000'000'000; }
   std::uint64_t nvm_writes() const override { return qemu_->flash_writes(); }
   void hang() override { qemu_->stop_ticks(); }
+  bool power_comes_back_next() override {
+    qemu_->power_comes_back_next();
+    return true;
+  }
   void flip_nvm_bit() override { qemu_->flip_flash_bit(0x27800 + 20 + 32, 2); }  // nvm.h
   void expect_unharmed() const override {
     EXPECT_EQ(qemu_->overruns(), 0u);

@@ -45,6 +45,8 @@ class McuUnderTest {
   virtual void flip_nvm_bit() = 0;               // of a table; from the next boot on
 
   virtual void hang() = 0;  // until its watchdog bites
+  // Its next reset is that of a supply that was off; false: its simulator has none.
+  virtual bool power_comes_back_next() { return false; }
 
   // After a test: what its simulator knows to be wrong.
   virtual void expect_unharmed() const = 0;

@@ -100,7 +100,7 @@ class Lab::Client final : public api::Session {
 };
 
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink,
-         std::uint32_t disabled_capabilities)
+         std::uint32_t disabled_capabilities, bool keeps)
     : client_(std::make_shared<Client>()) {
   directory_ = std::filesystem::temp_directory_path() / ("bushd-lab-" + std::to_string(::getpid()));
   std::filesystem::create_directories(directory_);
@@ -130,6 +130,7 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
                               .boot_ns = static_cast<std::int64_t>(m) * 777'777};
       options.unique_id = ++unique_id;
       options.disabled_capabilities = disabled_capabilities;
+      options.keeps = keeps;
       if (config_.mcus[m].emission.measures()) options.supply = sim::SupplyRules{};
       buses_[b].bus->add_mcu(options);
     }

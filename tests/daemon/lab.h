@@ -79,9 +79,11 @@ class Lab : public daemon::Outputs, private state::Backend {
  public:
   // `toml` as in bushd.toml; its ports are only names here. Every MCU of it exists.
   // `glacier` is the text of a table file of that name beside it, if not empty.
-  // `disabled_capabilities`: BUSHD_CAN_*, of all MCUs.
+  // `disabled_capabilities`: BUSHD_CAN_*, of all MCUs. `keeps`: what MCUs with flash keep outlives
+  // their resets.
   explicit Lab(const std::string& toml, const std::string& glacier = {},
-               sim::EdgeSink* sink = nullptr, std::uint32_t disabled_capabilities = 0);
+               sim::EdgeSink* sink = nullptr, std::uint32_t disabled_capabilities = 0,
+               bool keeps = false);
   ~Lab() override;
 
   // Runs until `done` holds (checked after every event) or `limit_s` has passed; returns whether it

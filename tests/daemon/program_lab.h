@@ -29,19 +29,26 @@ class StepTimes final : public sim::EdgeSink {
   std::map<std::pair<std::size_t, unsigned>, std::vector<sim::TimeNs>> at_ns_;
 };
 
-// Programs of its MCUs may go on without a host, if `without_host`.
-inline std::string hall_of_programs(int mcus, int motors, bool without_host = false) {
+// With these keys in each [[mcu]].
+inline std::string hall_with(int mcus, int motors, const std::string& keys) {
   std::string toml = hall(mcus, motors);
   const std::string mcu = "[[mcu]]\n";
-  for (std::size_t at = toml.find(mcu); without_host && at != std::string::npos;
-       at = toml.find(mcu, at + 1)) {
-    toml.insert(at + mcu.size(), "programs_without_host = true\n");
+  for (std::size_t at = toml.find(mcu); at != std::string::npos; at = toml.find(mcu, at + 1)) {
+    toml.insert(at + mcu.size(), keys);
   }
   return toml;
 }
 
+// Programs of its MCUs may go on without a host, if `without_host`.
+inline std::string hall_of_programs(int mcus, int motors, bool without_host = false) {
+  return hall_with(mcus, motors, without_host ? "programs_without_host = true\n" : "");
+}
+
 struct ProgramLab : Lab {
-  explicit ProgramLab(const std::string& toml) : Lab(toml, {}, &steps) { connect(); }
+  explicit ProgramLab(const std::string& toml, bool keeps = false)
+      : Lab(toml, {}, &steps, 0, keeps) {
+    connect();
+  }
   ProgramLab() : ProgramLab(hall_of_programs(2, 2)) {}
 
   static api::PutProgram put_of(const std::string& name, const std::string& motors,

@@ -40,7 +40,7 @@ inline std::vector<Wide> times_of(const Reference& run, std::uint32_t increment,
 // Lines of an MCU with four motors; the run is of `law`, in bank 0, as are their tables.
 class OfLines : public Streams {
  protected:
-  OfLines() : Streams({.queue_ticks = 256}) {}
+  explicit OfLines(RigOptions options = {.queue_ticks = 256}) : Streams(options) {}
 
   struct Frame {
     std::uint32_t first = 0;

@@ -240,6 +240,8 @@ class ProgramWalk {
 // A READY MCU that is asked for programs.
 class Programs : public OfLines {
  protected:
+  using OfLines::OfLines;
+
   bushd_status put(const Bytes& part, std::size_t offset, std::size_t total) {
     Bytes payload;
     append(payload, offset, 2);

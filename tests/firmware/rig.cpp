@@ -121,6 +121,7 @@ Rig::Rig(RigOptions options)
   config.keypad = true;
   config.scratch = &scratch_;
   config.program = &program_;
+  config.keeps_programs = options.keeps_programs;
   sim::disable_capabilities(options.disabled_capabilities, &config);
   // These are the port's: the core sees by itself that it gives no function for them.
   config.disabled_capabilities = static_cast<std::uint16_t>(
@@ -155,7 +156,7 @@ Rig::Rig(RigOptions options)
   bushd_mcu_prepare(&mcu_);
 }
 
-void Rig::restart_with_nvm() {
+void Rig::restart_with_nvm(bushd_reset_cause cause) {
   std::vector<Bytes> kept;
   for (std::uint8_t i = 0;; ++i) {
     const bushd_mcu_nvm_region piece = bushd_mcu_nvm_region_at(&mcu_, i);
@@ -164,9 +165,11 @@ void Rig::restart_with_nvm() {
     kept.emplace_back(bytes, bytes + piece.size);
   }
   const bushd_port port = mcu_.port;
-  const bushd_mcu_config config = mcu_.config;
+  bushd_mcu_config config = mcu_.config;
+  config.reset_cause = cause;
   currents_ = {};
   velocity_ = {};
+  std::ranges::fill(program_bytes_, std::uint8_t{0x5A});
   bushd_mcu_boot(&mcu_, &port, &config);
   for (std::uint8_t i = 0; i < kept.size(); ++i) {
     std::ranges::copy(kept[i], static_cast<std::uint8_t*>(bushd_mcu_nvm_region_at(&mcu_, i).at));

@@ -37,6 +37,7 @@ struct RigOptions {
   std::uint8_t current_motors = 1;  // whose windings' currents the port controls; >= 1
   std::uint8_t velocity_motors = 2;
   std::uint16_t program_bytes = 1024;
+  bool keeps_programs = false;
 };
 
 struct Answer {
@@ -95,7 +96,7 @@ class Rig {
   Rig& operator=(const Rig&) = delete;
 
   // A reset by a port that keeps what it may.
-  void restart_with_nvm();
+  void restart_with_nvm(bushd_reset_cause cause = BUSHD_RESET_POWER_ON);
   void feed(std::span<const std::uint8_t> bytes);
   // A frame on the bus, without looking at what comes back.
   void frame(std::uint8_t address, std::uint8_t type, const Bytes& payload);

@@ -105,6 +105,9 @@ TEST(ProgramMessages, EachFieldHasItsName) {
   using Entry = api::ProgramEntry;
   const std::vector<std::pair<bool Entry::*, std::int8_t program_t::*>> flags{
       {&Entry::without_host, &program_t::without_host},
+      {&Entry::at_power_on, &program_t::at_power_on},
+      {&Entry::kept, &program_t::kept},
+      {&Entry::stored, &program_t::stored},
       {&Entry::endless, &program_t::endless},
       {&Entry::waits_for_inputs, &program_t::waits_for_inputs},
       {&Entry::cut, &program_t::cut}};

@@ -84,5 +84,34 @@ TEST_F(CompiledPrograms, AreRefusedWithTheFigure) {
   says(refusal("[[frame]]\nmove_to = [1, 1]\n"), "has 38 bytes, but MCU 3 has memory for 30");
 }
 
+TEST_F(CompiledPrograms, ThatBeginAtPowerOnHaveRangesOfDistances) {
+  const auto of_range = [&](const char* range) {
+    auto program =
+        parse(std::string("motors = [\"x\", \"theta\"]\nwithout_host = true\nkept = true\n"
+                          "at_power_on = true\nrange = ") +
+              range + "\n[[frame]]\nmove_by = [1, 1]\n");
+    EXPECT_TRUE(program) << program.error().text();
+    return compile(*program);
+  };
+  motors_[0].coordinates = *units::Coordinates::make(
+      {.unit = "mm", .steps_per_unit = {10, 1}, .negative = true, .offset = 3});
+  auto bytes = of_range("{ theta = [-2, 3], x = [-1, 5] }");
+  ASSERT_TRUE(bytes) << bytes.error().text();
+  bushd_program read;
+  ASSERT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
+  EXPECT_EQ(read.flags,
+            BUSHD_PROGRAM_WITHOUT_HOST | BUSHD_PROGRAM_KEPT | BUSHD_PROGRAM_AT_POWER_ON);
+  const bushd_program_motor theta = bushd_program_part(&read, 0);
+  EXPECT_EQ(theta.least_steps, -800);
+  EXPECT_EQ(theta.most_steps, 1200);
+  const bushd_program_motor x = bushd_program_part(&read, 1);
+  EXPECT_EQ(x.least_steps, -50) << "its scale is turned, and an offset is none of a distance";
+  EXPECT_EQ(x.most_steps, 10);
+  bytes = of_range("{ theta = [-20, 20], x = [0, 0] }");  // 16000 steps
+  ASSERT_FALSE(bytes);
+  EXPECT_NE(bytes.error().text().find("wider than the way between its soft limits"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -124,5 +124,46 @@ TEST_F(ProgramFiles, AreRefusedWithPlaceAndRemedy) {
       << parse(deep).error().text();
 }
 
+TEST_F(ProgramFiles, MayBeginAtPowerOn) {
+  const std::string head = "motors = [\"x\", \"theta\"]\nwithout_host = true\nkept = true\n";
+  const std::string frame = "[[frame]]\nmove_by = [1, 2]\n";
+  const auto program =
+      parse(head + "at_power_on = true\nrange = { theta = [-0.5, 3], x = [0, 1] }\n" + frame);
+  ASSERT_TRUE(program) << program.error().text();
+  EXPECT_TRUE(program->kept);
+  EXPECT_TRUE(program->at_power_on);
+  ASSERT_EQ(program->range.size(), 2u);
+  EXPECT_EQ(program->range[0].most, 1.0);
+  EXPECT_EQ(program->range[1].least, -0.5);
+  EXPECT_TRUE(parse(head + frame)) << "one that is only kept";
+  const std::string power = "at_power_on = true\n";
+  const std::string range = "range = { theta = [-1, 1], x = [-1, 1] }\n";
+  const struct {
+    std::string text;
+    const char* error;
+  } refused[] = {
+      {head + power + frame, "p.toml:4:15: at_power_on: needs a range"},
+      {head + range + frame, "p.toml:4:9: range: is for at_power_on = true"},
+      {head + power + "range = { theta = [-1, 1] }\n" + frame, "\"x\" has no two distances"},
+      {head + power + "range = { theta = [-1, 1], x = [1, 2] }\n" + frame,
+       "that of \"x\" does not have 0"},
+      {head + power + "range = { theta = [-1, 1], x = [1] }\n" + frame,
+       "\"x\" has no two distances"},
+      {head + power + "range = { theta = [-1, 1], x = [-1, 1], y = [0, 0] }\n" + frame,
+       "\"y\" is not in `motors`"},
+      {head + power + range + "[[frame]]\nmove_to = [1, 2]\n", "p.toml:6: a position"},
+      {head + power + range + "[[frame]]\nline_to = [[1, 2]]\n", "p.toml:6: a position"},
+      {"motors = [\"x\", \"theta\"]\nkept = true\n" + power + range + frame,
+       "true wants without_host = true as well"},
+      {"motors = [\"x\", \"theta\"]\nwithout_host = true\n" + power + range + frame,
+       "true wants kept = true as well"},
+  };
+  for (const auto& one : refused) {
+    const auto parsed = parse(one.text);
+    ASSERT_FALSE(parsed) << one.text;
+    EXPECT_NE(parsed.error().text().find(one.error), std::string::npos) << parsed.error().text();
+  }
+}
+
 }  // namespace
 }  // namespace bushd::test

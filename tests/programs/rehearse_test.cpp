@@ -105,5 +105,30 @@ TEST_F(Rehearsals, AreCutWhereTheyWouldNotEnd) {
   EXPECT_TRUE(told->cut);
 }
 
+TEST_F(Rehearsals, OfThoseThatBeginAtPowerOnStayWithinTheirRange) {
+  motors_[0].at_steps = 1000;
+  const auto rehearsed = [&](int steps) -> Result<programs::Rehearsal> {
+    const auto program = parse(
+        "motors = [\"x\", \"theta\"]\nwithout_host = true\nkept = true\nat_power_on = true\n"
+        "range = { theta = [0, 0], x = [-40, 100] }\n[[frame]]\nrepeat = 3\n[[frame]]\n"
+        "move_by = { x = " +
+        std::to_string(steps) + " }\n[[frame]]\nnext = true\n");
+    EXPECT_TRUE(program) << program.error().text();
+    const auto bytes = compile(*program);
+    if (!bytes) return fail(bytes.error());
+    return programs::rehearse(*program, mcu_, motors_, *bytes);
+  };
+  const auto told = rehearsed(33);
+  ASSERT_TRUE(told) << told.error().text();
+  EXPECT_EQ(told->motors[0].end_steps, 1099);
+  for (const int steps : {34, -14}) {
+    const auto beyond = rehearsed(steps);
+    ASSERT_FALSE(beyond);
+    EXPECT_EQ(beyond.error().text(),
+              "p.toml:8: motor \"x\" would come " + std::to_string(3 * steps) +
+                  " steps from where it begins, but its range is -40 to 100 steps");
+  }
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -463,7 +463,8 @@ class HostileBytes(unittest.TestCase):
         request = messages.request_t()
         way = messages.program_motor_t(motor="x", least_steps=-3, most_steps=4, end_steps=1, edges=9)
         numbers = {"bytes": 212, "memory": 8192, "frame": 3, "point": 4, "repeats": 5, "pulses": 6}
-        flags = {"without_host": True, "endless": False, "waits_for_inputs": True, "cut": False}
+        flags = {"without_host": True, "at_power_on": False, "kept": True, "stored": False, "endless": False,
+                 "waits_for_inputs": True, "cut": False}
         words = {"mcu": "hall:1", "program": "scan", "checksum": "0a1b2c3d", "reason": "why"}
         told = messages.program_t(stage="paused", duration_us=1_500_000, motors=[way], **numbers, **flags, **words)
         heard = codec.decode("PROGRAM_REPLY", messages.program_reply_t(reply=reply(request, RESULT, "done"), programs=[told]).encode())

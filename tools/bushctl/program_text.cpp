@@ -46,6 +46,13 @@ std::string duration_text(const api::ProgramEntry& program) {
                      program.endless ? " a pass" : "");
 }
 
+const char* kept_text(const api::ProgramEntry& program) {
+  if (program.stage == "none") return "outlives power cuts, once it is put";
+  return program.stored
+             ? "outlives power cuts"
+             : "does not outlive a power cut yet: its MCU writes it when its motors rest";
+}
+
 std::string frame_text(const api::ProgramEntry& program) {
   if (program.frame == 0) return "-";
   if (program.point == 0) return fmt::to_string(program.frame);
@@ -71,6 +78,8 @@ std::vector<std::string> lines(const api::ProgramEntry& program, const Status& s
   }
   if (program.cut) out.emplace_back("longer than was looked at: this is its beginning");
   if (program.without_host) out.emplace_back("goes on when no host is heard");
+  if (program.kept) out.emplace_back(kept_text(program));
+  if (program.at_power_on) out.emplace_back("begins by itself when the power comes");
   return out;
 }
 
@@ -80,7 +89,12 @@ std::vector<std::string> table(const api::ProgramList& list) {
   grid.row({"MCU", "PROGRAM", "STAGE", "FRAME", "REPEATS", "BYTES", "DURATION", "CHECKSUM", ""});
   for (const api::ProgramEntry& program : list.programs) {
     std::string notes = bushd::printable(program.reason);
-    if (program.without_host) notes += notes.empty() ? "without host" : "; without host";
+    const auto note = [&notes](bool is, const char* text) {
+      if (is) notes += std::string(notes.empty() ? "" : "; ") + text;
+    };
+    note(program.without_host, "without host");
+    note(program.kept, program.stored ? "kept" : "not kept yet");
+    note(program.at_power_on, "at power-on");
     grid.row({bushd::printable(program.mcu),
               program.program.empty() ? "-" : bushd::printable(program.program),
               bushd::printable(program.stage), frame_text(program), fmt::to_string(program.repeats),

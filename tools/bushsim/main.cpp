@@ -102,11 +102,15 @@ int run(int argc, char** argv) {
   app.add_option("--bus", bus, "Name of the bus, if the configuration has several");
   app.add_option("--boot-number", options.boot_number, "Boot number of all MCUs (default: new)")
       ->check(CLI::Range(0, int{std::numeric_limits<std::uint16_t>::max()}));
+  app.add_flag(
+      "--keep", options.keep,
+      "Virtual MCUs keep tables, settings and programs over resets, as those with flash do");
   app.add_option("--console", options.console,
                  "What is typed is pressed at this MCU: F and R hold its inputs FORWARD and "
                  "REVERSE, X releases them; E presses its emergency input, O shorts its supply as "
-                 "its current sensor sees it, and both end that when typed again; P resets it, W "
-                 "does so as its watchdog (of a virtual MCU only); f, r, s, x are keys of a keypad "
+                 "its current sensor sees it, and both end that when typed again; P resets it; "
+                 "of a virtual MCU W does so as its watchdog, and D as if its power went and came "
+                 "back; f, r, s, x are keys of a keypad "
                  "at a line of its own, and what that would show is printed")
       ->check(CLI::Range(1, 255));
   int latency_ms = 0;

@@ -103,6 +103,7 @@ void Simulator::add_mcus(const Options& options) {
     if (is_virtual_.back()) {
       bushd::sim::McuOptions mcu{.address = address,
                                  .boot_number = options.boot_number,
+                                 .keeps = options.keep,
                                  .boot_ns = boot_ns,
                                  .unique_id = setup_.first_unique_id + bus_.mcu_count()};
       if (setup_.measuring.contains(address)) mcu.supply = bushd::sim::SupplyRules{};
@@ -240,12 +241,12 @@ void Simulator::overload(bool on) {
 }
 
 // It boots again at once. An image boots as after a pulse at its RESET pin.
-void Simulator::reset(bool by_watchdog) {
-  if (by_watchdog && !is_virtual_[*console_]) {
-    fmt::print(stderr, "bushsim: W is for virtual MCUs; P resets this one\n");
+void Simulator::reset(bushd_reset_cause cause) {
+  if (cause != BUSHD_RESET_EXTERNAL && !is_virtual_[*console_]) {
+    fmt::print(stderr, "bushsim: D and W are for virtual MCUs; P resets this one\n");
     return;
   }
-  if (by_watchdog) bus_.mcu(*console_).set_reset_cause(BUSHD_RESET_WATCHDOG);
+  if (is_virtual_[*console_]) bus_.mcu(*console_).set_reset_cause(cause);
   bus_.reboot(*console_);
 }
 
@@ -272,8 +273,11 @@ void Simulator::press(char key) {
     case 'O':
       return overload(!overloaded_);
     case 'P':
+      return reset(BUSHD_RESET_EXTERNAL);
     case 'W':
-      return reset(key == 'W');
+      return reset(BUSHD_RESET_WATCHDOG);
+    case 'D':
+      return reset(BUSHD_RESET_POWER_ON);
     default:
       return;
   }

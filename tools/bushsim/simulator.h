@@ -26,6 +26,7 @@ struct Options {
   std::vector<std::string> links;  // at least one: the port's names, each time it is plugged in
   std::string trace;               // empty: none
   std::uint16_t boot_number = 1;
+  bool keep = false;                    // virtual MCUs keep over resets what those with flash do
   std::optional<std::uint8_t> console;  // what is typed is pressed at this MCU (press)
   AdapterOptions adapter;
 };
@@ -54,7 +55,7 @@ class Simulator {
   bushd::Result<void> take_keys();
   void press(char key);
   void overload(bool on);
-  void reset(bool by_watchdog);
+  void reset(bushd_reset_cause cause);
   void show();
   void drive_inputs();
   bushd::sim::TimeNs wall_time_ns() const;

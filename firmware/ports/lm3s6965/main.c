@@ -135,6 +135,7 @@ static void boot(void) {
                              .code_count = TABLE_CODES,
                              .scratch = &scratch,
                              .program = &program,
+                             .keeps_programs = true,
                              .reply = reply};
   journal_state kept;
   name_parts_of_core();

@@ -6,7 +6,7 @@
 #include "firmware/ports/lm3s6965/flash.h"
 
 #define PAGES 96u
-#define MOST_PAGES 27u      // of a writing
+#define MOST_PAGES 31u      // of a writing
 #define COMPARED_BYTES 32u  // at a time
 
 typedef struct nvm_head {
@@ -104,12 +104,13 @@ void nvm_load(bushd_mcu* mcu) {
 }
 
 // At the end of a scan that only compares.
-static void compare_whole(const bushd_mcu* mcu) {
+static void compare_whole(bushd_mcu* mcu) {
   const bool same =
       newest.program == image_seal && newest.size == scan.size && newest.crc == scan.crc;
   const bool news = newest.number != 0 || mcu->tables.codes_used != 0;
   const bool quiet = bushd_mcu_nvm_is_quiet(mcu, &scan);
   const bool room = scan.size <= MOST_BYTES && next + pages_of(scan.size) <= room_end;
+  bushd_mcu_nvm_compared(mcu, same || !news);
   if (!same && news && quiet && room) phase = WRITES;
   planned = scan.crc;
   planned_size = scan.size;

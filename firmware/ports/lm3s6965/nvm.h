@@ -1,7 +1,7 @@
-// Tables, assignments and settings in flash, up to 26 KB of them. While motors stand they are
-// compared with what was written last; what has changed and then stays is written behind that, from
-// the next page on, 20 us a word. Pages are erased at boot only, where nobody minds that the CPU
-// stands for 20 ms.
+// Tables, assignments, settings and a program in flash, up to 30 KB of them. While motors stand
+// they are compared with what was written last; what has changed and then stays is written behind
+// that, from the next page on, 20 us a word. Pages are erased at boot only, where nobody minds that
+// the CPU stands for 20 ms.
 //
 // A writing is a head of five words and the content. The head comes last; its check tells that all
 // is there, so one that was cut off counts for nothing, and the one before is in use.

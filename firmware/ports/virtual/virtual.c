@@ -161,6 +161,51 @@ static void give_samples(bushd_virtual* v) {
   }
 }
 
+// What outlives resets: compared a little in every tick, and written at once when it has stayed the
+// same for as long as a real port wants it to.
+static void write_nvm(bushd_virtual* v, uint32_t crc, uint16_t size) {
+  size_t at = 0;
+  bushd_mcu_nvm_begin_scan(&v->scan);
+  for (;;) {
+    const bushd_mcu_nvm_region bytes = bushd_mcu_nvm_scan_next(&v->mcu, &v->scan, UINT16_MAX);
+    if (bytes.at == NULL) break;
+    assert(at + bytes.size <= v->config.nvm_size);
+    memcpy(v->config.nvm + at, bytes.at, bytes.size);
+    at += bytes.size;
+  }
+  assert(v->scan.crc == crc && v->scan.size == size);
+  v->kept.size = size;
+  v->kept.crc = crc;
+}
+
+static void go_on_with_nvm(bushd_virtual* v) {
+  if (v->config.nvm == NULL || v->mcu.state == BUSHD_STATE_RUN) return;
+  if (bushd_mcu_nvm_scan_next(&v->mcu, &v->scan, BUSHD_VIRTUAL_COMPARED_BYTES).at != NULL) return;
+  const bool same = v->kept.size == v->scan.size && v->kept.crc == v->scan.crc;
+  bushd_mcu_nvm_compared(&v->mcu, same);
+  const bool quiet = bushd_mcu_nvm_is_quiet(&v->mcu, &v->scan);
+  if (!same && quiet && (v->kept.size != 0 || v->mcu.tables.codes_used != 0)) {
+    const bushd_mcu_nvm_scan whole = v->scan;
+    write_nvm(v, whole.crc, whole.size);
+    v->scan = whole;
+  }
+  bushd_mcu_nvm_begin_scan(&v->scan);
+}
+
+static void load_nvm(bushd_virtual* v) {
+  v->scan = (bushd_mcu_nvm_scan){0};
+  bushd_mcu_nvm_begin_scan(&v->scan);
+  if (v->kept.size == 0) return;
+  for (size_t at = 0;;) {
+    const bushd_mcu_nvm_region bytes = bushd_mcu_nvm_scan_next(&v->mcu, &v->scan, UINT16_MAX);
+    if (bytes.at == NULL) break;
+    memcpy(bytes.at, v->config.nvm + at, bytes.size);
+    at += bytes.size;
+  }
+  bushd_mcu_nvm_begin_scan(&v->scan);
+  bushd_mcu_nvm_restored(&v->mcu);
+}
+
 static void tick_boundary(bushd_virtual* v) {
   emit_slots(v, v->next_event_ns);
   give_samples(v);
@@ -174,6 +219,7 @@ static void tick_boundary(bushd_virtual* v) {
     drive(v, v->now_ns, BUSHD_VIRTUAL_STEP, &v->step_levels, last_levels(v));
   }
   bushd_mcu_prepare(&v->mcu);
+  go_on_with_nvm(v);
 }
 
 // The delay is a few ms at most: the MCU's own clock is as good as true time for it.
@@ -292,6 +338,7 @@ static void boot(bushd_virtual* v) {
   memset(v->velocity, 0, sizeof v->velocity);
   begin_tick(v, 0);
   bushd_mcu_boot(&v->mcu, &port, &v->config.mcu);
+  load_nvm(v);
   bushd_mcu_prepare(&v->mcu);
 }
 

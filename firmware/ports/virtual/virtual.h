@@ -21,6 +21,7 @@
 #include <stdint.h>
 
 #include "firmware/core/mcu_state.h"
+#include "firmware/core/nvm.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -28,7 +29,8 @@ extern "C" {
 
 #define BUSHD_VIRTUAL_MAX_PPM 100000
 #define BUSHD_VIRTUAL_OUTPUTS 16u
-#define BUSHD_VIRTUAL_SAMPLE_NS 20000  // from one sample of the supply current to the next
+#define BUSHD_VIRTUAL_COMPARED_BYTES 1024  // of what outlives a reset, in a tick
+#define BUSHD_VIRTUAL_SAMPLE_NS 20000      // from one sample of the supply current to the next
 
 typedef enum bushd_virtual_signal {
   BUSHD_VIRTUAL_STEP = 0,
@@ -43,7 +45,10 @@ typedef struct bushd_virtual_config {
   int64_t boot_ns;  // the MCU comes out of reset here; before that it is deaf and its pins are low
   int32_t clock_ppm;  // rate error of its clock, > 0: fast; |clock_ppm| <= BUSHD_VIRTUAL_MAX_PPM
   uint32_t turnaround_ns;  // from the end of a request to the first bit of the reply
-  void* context;           // handed back in both callbacks
+  // Memory for what outlives a reset (firmware/core/nvm.h), if mcu.keeps_programs; enough of it.
+  uint8_t* nvm;
+  size_t nvm_size;
+  void* context;  // handed back in both callbacks
 
   // A pin changed. All pins are low at first. Times never fall from call to call. NULL if nobody
   // looks: then ticks cost no work per slot.
@@ -58,6 +63,12 @@ typedef struct bushd_virtual_config {
   // The MCU drives the line from start_ns on; `wire` is valid during the call only.
   void (*transmit)(void* context, int64_t start_ns, const uint8_t* wire, size_t size);
 } bushd_virtual_config;
+
+// What is in its non-volatile memory.
+typedef struct bushd_virtual_kept {
+  uint16_t size;  // 0: nothing yet
+  uint32_t crc;
+} bushd_virtual_kept;
 
 // What a motor on an ideal driver has done since the simulation began, whatever the MCU believes.
 typedef struct bushd_virtual_shaft {
@@ -98,6 +109,8 @@ typedef struct bushd_virtual {
   bushd_mcu_currents currents[BUSHD_MAX_CURRENT_MOTORS];
   bushd_mcu_velocity velocity[BUSHD_MAX_VELOCITY_MOTORS];
   bool compare_level;
+  bushd_mcu_nvm_scan scan;
+  bushd_virtual_kept kept;
   bushd_edge trigger_edge;  // awaited
 } bushd_virtual;
 

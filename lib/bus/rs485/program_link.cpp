@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/program.h"
+
 namespace bushd::link {
 namespace {
 
@@ -15,6 +17,10 @@ constexpr std::uint32_t bit(bushd_program_action action) {
   return std::uint32_t{1} << action;
 }
 constexpr std::uint32_t kBeginMotion = bit(BUSHD_PROGRAM_RUN) | bit(BUSHD_PROGRAM_RESUME);
+
+bool is_kept(std::uint8_t flags) {
+  return (flags & BUSHD_PROGRAM_KEPT) != 0;
+}
 
 SetupQueue::Request control(bushd_program_action action, std::uint8_t number, std::uint32_t value) {
   const bushd_program_control message = {
@@ -34,6 +40,7 @@ void ProgramLink::put(std::vector<std::uint8_t> bytes) {
   view_.total = bytes.size();
   view_.uploading = true;
   view_.refused = BUSHD_OK;
+  storing_ = is_kept(view_.state.flags) || (bytes.size() > 1 && is_kept(bytes[1]));
   if (bytes.empty() || bytes.size() > UINT16_MAX) return end_upload(BUSHD_E_CAPACITY);
   for (std::size_t at = 0; at < bytes.size(); at += BUSHD_PROGRAM_PUT_MAX) {
     const auto count =
@@ -73,6 +80,7 @@ void ProgramLink::discard(std::uint32_t actions) {
 void ProgramLink::erase() {
   if (view_.uploading) end_upload(BUSHD_OK);
   view_.put = view_.total = 0;
+  storing_ = is_kept(view_.state.flags);
   order(BUSHD_PROGRAM_ERASE, 0, 0);
 }
 
@@ -118,7 +126,8 @@ bool ProgramLink::takes_motion_away() const {
 
 std::int64_t ProgramLink::due_us() const {
   if (wanted_) return 0;
-  return view_.known && view_.under_way() ? view_.heard_us + kStatePeriodUs : INT64_MAX;
+  const bool news = view_.known && (view_.under_way() || storing_);
+  return news ? view_.heard_us + kStatePeriodUs : INT64_MAX;
 }
 
 const ProgramLink::Request& ProgramLink::ask(std::int64_t now_us) {
@@ -168,6 +177,8 @@ void ProgramLink::told(std::int64_t now_us, const bushd_program_state& state) {
   view_.state = state;
   view_.heard_us = now_us;
   wanted_ = false;
+  const bool all_done = !view_.uploading && orders_.empty();
+  if (all_done && (state.flags & BUSHD_PROGRAM_STORED) != 0) storing_ = false;
 }
 
 }  // namespace bushd::link

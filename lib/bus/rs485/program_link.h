@@ -2,8 +2,8 @@
 //
 // An upload is sent in parts when nothing else is asked of the MCU, then committed. Orders (run,
 // stop, pause, resume, erase) go in their order, each acknowledged before the next; one that is to
-// take motion away discards those that would begin it. After each, and while a program is under
-// way, the MCU is asked how it does.
+// take motion away discards those that would begin it. After each, while a program is under way,
+// and until one that is to outlive power cuts would, the MCU is asked how it does.
 #pragma once
 
 #include <cstddef>
@@ -90,6 +90,7 @@ class ProgramLink {
   std::uint32_t upload_serial_ = 0;
   bool wanted_ = false;
   bool denied_ = false;
+  bool storing_ = false;  // what it has now may not outlive a reset yet
   std::int64_t urgent_from_us_ = 0;
   Request question_{.type = BUSHD_MSG_PROGRAM_STATE, .payload = {}};
 };

@@ -353,6 +353,9 @@ class Program:
     stage: ProgramStage
     reason: str  # why its last run has ended; "": it has not
     without_host: bool  # it goes on when no host is heard
+    at_power_on: bool  # it begins by itself when the power comes
+    kept: bool  # it is to outlive power cuts
+    stored: bool  # and would now
     bytes: int  # of it, or of what has arrived of it
     memory: int  # bytes that a program may have there
     frame: int  # that is carried out, or was last, from 1; 0: none yet

@@ -92,6 +92,7 @@ QemuMcu::QemuMcu(const QemuOptions& options, std::size_t index, Driver& driver, 
     flash_[at += 4] = record_of(kKindBootNumber, static_cast<std::uint16_t>(boot));
   }
   if (!options.memory_owners.empty()) map_ = map_of(options);
+  next_reset_ = kExternal;
   start(kPowerOn);
 }
 
@@ -333,7 +334,11 @@ void QemuMcu::reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t) {
   advance(now_ns);
   fall(now_ns);
   boot_ns_ = boot_ns;
-  start(kExternal);
+  start(std::exchange(next_reset_, kExternal));
+}
+
+void QemuMcu::power_comes_back_next() {
+  next_reset_ = kPowerOn;
 }
 
 void QemuMcu::flip_flash_bit(std::uint32_t address, int bit) {

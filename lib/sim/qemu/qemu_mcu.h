@@ -72,6 +72,8 @@ class QemuMcu final : public Mcu {
   void wear_flash() { order(LOCKSTEP_WEAR_FLASH, 0); }      // it cannot be written
   void stick_inputs() { order(LOCKSTEP_STICK_INPUTS, 0); }  // the motors' all read high
 
+  // Its next reset is that of a supply that was off, not one of its pin.
+  void power_comes_back_next();
   // Flips a bit of what the image has written; from the next boot on.
   void flip_flash_bit(std::uint32_t address, int bit);
 
@@ -109,6 +111,7 @@ class QemuMcu final : public Mcu {
   std::vector<lockstep_message> orders_;          // not yet sent
   std::map<std::uint32_t, std::uint32_t> flash_;  // words that are not blank
   std::uint32_t kept_ram_ = 0;                    // over a watchdog reset
+  std::uint32_t next_reset_ = 0;                  // RESC
   TimeNs now_ns_ = 0;
   TimeNs boot_ns_ = 0;
   TimeNs delimiter_ns_ = -1;  // that came last

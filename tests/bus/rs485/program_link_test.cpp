@@ -6,6 +6,8 @@
 #include <numeric>
 #include <vector>
 
+#include "engine/program.h"
+
 namespace bushd::link {
 namespace {
 
@@ -190,6 +192,45 @@ TEST(ProgramLink, WhoDoesNotTellIsNotAskedAgain) {
   EXPECT_TRUE(link.denied());
   EXPECT_FALSE(link.view().known);
   EXPECT_EQ(next_action(link), -2);
+}
+
+// One that is to outlive power cuts is asked for until it would.
+TEST(ProgramLink, AsksUntilItIsStored) {
+  bushd_program_state stored = state_of(BUSHD_PROGRAM_LOADED);
+  stored.flags = BUSHD_PROGRAM_KEPT | BUSHD_PROGRAM_STORED;
+  bushd_program_state not_yet = stored;
+  not_yet.flags = BUSHD_PROGRAM_KEPT;
+  ProgramLink link;
+  link.told(kNow, state_of(BUSHD_PROGRAM_NONE));
+  link.put({1, BUSHD_PROGRAM_KEPT, 0});
+  link.told(kNow, stored);  // before any of it has come
+  for (const std::uint8_t type : {BUSHD_MSG_PROGRAM_PUT, BUSHD_MSG_PROGRAM}) {
+    link.ask_part();
+    link.acknowledged(type, BUSHD_OK);
+  }
+  EXPECT_EQ(next_action(link), -1);
+  link.told(kNow, not_yet);
+  EXPECT_EQ(next_action(link, kNow + 199'999), -2);
+  EXPECT_EQ(next_action(link, kNow + 200'000), -1);
+  link.told(kNow, stored);
+  EXPECT_EQ(link.due_us(), INT64_MAX);
+  link.erase();
+  link.told(kNow, stored);
+  EXPECT_EQ(next_action(link), BUSHD_PROGRAM_ERASE);
+  link.acknowledged(BUSHD_MSG_PROGRAM, BUSHD_OK);
+  link.told(kNow, state_of(BUSHD_PROGRAM_NONE));
+  EXPECT_EQ(link.due_us(), kNow + 200'000) << "a reset would bring it back";
+  bushd_program_state gone = state_of(BUSHD_PROGRAM_NONE);
+  gone.flags = BUSHD_PROGRAM_STORED;
+  link.told(kNow, gone);
+  EXPECT_EQ(link.due_us(), INT64_MAX);
+  link.put({1, BUSHD_PROGRAM_WITHOUT_HOST, 0});
+  link.ask_part();
+  link.acknowledged(BUSHD_MSG_PROGRAM_PUT, BUSHD_OK);
+  link.ask_part();
+  link.acknowledged(BUSHD_MSG_PROGRAM, BUSHD_OK);
+  link.told(kNow, state_of(BUSHD_PROGRAM_LOADED));
+  EXPECT_EQ(link.due_us(), INT64_MAX);
 }
 
 }  // namespace
