@@ -130,6 +130,21 @@ api::ProgramEntry Programs::entry(McuId id) const {
   return entry;
 }
 
+std::string Programs::text(McuId id) const {
+  if (installation_[id].offers.programs == nullptr) return {};
+  const link::ProgramView& its = view(id);
+  if (!its.known || !its.under_way()) return {};
+  const bushd_program_state& state = its.state;
+  const auto& program = mcus_[id].program;
+  const bool named = program && program->crc == state.crc;
+  std::string text = named ? program->name : fmt::format("{:08x}", state.crc);
+  text += std::string(" ") + stage_word(state.stage);
+  if (state.stage >= BUSHD_PROGRAM_RUNS) text += fmt::format(", frame {}", state.frame + 1);
+  if (state.repeats != 0) text += fmt::format(", after {} repeats", state.repeats);
+  if ((state.flags & BUSHD_PROGRAM_WITHOUT_HOST) != 0) text += ", without host";
+  return text;
+}
+
 // -- put, erase, list
 
 void Programs::request(const api::Asker& asker, const api::ListPrograms&) {

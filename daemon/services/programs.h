@@ -43,6 +43,9 @@ class Programs final : public Service {
   void take_kept();
   // The daemon ends: those that go on without a host are left to themselves.
   void leave();
+  // What an MCU has under way, and where: "scan runs, frame 3, after 2 repeats, without host"; "":
+  // nothing.
+  std::string text(McuId mcu) const;
   // No MCU that answers has one under way.
   bool at_rest() const;
 

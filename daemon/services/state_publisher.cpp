@@ -80,10 +80,12 @@ void show_inputs(const link::McuView& view, const config::MotorInputs& inputs,
 }  // namespace
 
 StatePublisher::StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
-                               const OpenMoves& open_moves, Outputs& outputs)
+                               const OpenMoves& open_moves, const Programs& programs,
+                               Outputs& outputs)
     : installation_(installation),
       pseudo_axes_(pseudo_axes),
       open_moves_(open_moves),
+      programs_(programs),
       outputs_(outputs) {
   for (std::size_t i = 0; i < installation.config().state_parts(); ++i) described_.add();
 }
@@ -185,6 +187,7 @@ api::StateSnapshot StatePublisher::state_of(const Mcu& mcu) const {
   state.state = state_word(view);
   state.detail = detail_of(mcu, bus.two_masters);
   if (view.reported) state.inputs = motion::system_inputs_words(view.report.system_inputs);
+  state.program = programs_.text(mcu.id);
   state.boot = view.identified ? view.identity.boot_number : 0;
   state.tick = view.tick;
   for (const MotorId motor : mcu.motors()) {

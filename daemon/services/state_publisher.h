@@ -8,6 +8,7 @@
 #include "daemon/model/installation.h"
 #include "daemon/model/outputs.h"
 #include "daemon/services/open_moves.h"
+#include "daemon/services/programs.h"
 #include "daemon/services/pseudo_axes.h"
 
 namespace bushd::daemon {
@@ -22,7 +23,7 @@ class StatePublisher {
   static constexpr std::int64_t kDescriptionPeriodUs = 500'000;
 
   StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
-                 const OpenMoves& open_moves, Outputs& outputs);
+                 const OpenMoves& open_moves, const Programs& programs, Outputs& outputs);
 
   void step(std::int64_t now_us);
   // As it is now, whether due or not.
@@ -43,6 +44,7 @@ class StatePublisher {
   Installation& installation_;
   const PseudoAxes& pseudo_axes_;
   const OpenMoves& open_moves_;
+  const Programs& programs_;
   Outputs& outputs_;
   ById<McuId, Described> described_;  // then computed axes
   std::int64_t due_us_ = 0;

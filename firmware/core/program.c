@@ -197,15 +197,18 @@ static bool power_was_off(const bushd_mcu* mcu) {
 
 void bushd_mcu_restore_program(bushd_mcu* mcu) {
   bushd_mcu_program* p = mcu->config.program;
-  if (p == NULL || p->kept_bytes == 0) return;
-  p->stage = BUSHD_PROGRAM_LOADING;
-  p->size = p->received = p->kept_bytes;
-  const uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, p->bytes, p->size);
-  if (commit(mcu, crc) != BUSHD_OK) {
-    forget(p);
-  } else if (counts_from_start(p) && power_was_off(mcu)) {
-    begin_at_power_on(mcu);
+  if (p == NULL) return;
+  if (p->kept_bytes != 0) {
+    p->stage = BUSHD_PROGRAM_LOADING;
+    p->size = p->received = p->kept_bytes;
+    if (commit(mcu, ~bushd_crc32(BUSHD_CRC32_START, p->bytes, p->size)) != BUSHD_OK) {
+      forget(p);
+      return;
+    }
   }
+  p->stored = true;
+  p->scans_before = 0;
+  if (counts_from_start(p) && power_was_off(mcu)) begin_at_power_on(mcu);
 }
 
 static bool is_waiting(const bushd_mcu_program* p) {

@@ -98,6 +98,7 @@ struct StateSnapshot {
   McuState state = McuState::kOffline;
   std::string detail{};   // cause of kOffline or kFault, else ""
   std::string inputs{};   // active ones: of emergency, forward, reverse, trigger, blanks between
+  std::string program{};  // under way, and where: "scan runs, frame 3, without host"; "": none
   std::int32_t boot = 0;  // its boot number; 0 until it was heard
   std::int64_t tick = 0;  // bus tick of the report behind this
   std::vector<MotorState> motors{};  // by output
@@ -107,6 +108,7 @@ struct StateSnapshot {
     visit("state", self.state, fields::Word{mcu_state_of});
     visit("detail", self.detail);
     visit("inputs", self.inputs);
+    visit("program", self.program);
     visit("boot_number", self.boot);
     visit("tick", self.tick);
     visit.list("motor_count", "motors", self.motors);

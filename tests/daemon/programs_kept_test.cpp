@@ -8,7 +8,9 @@ namespace bushd::test {
 namespace {
 
 using testing::Contains;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 constexpr const char* kConsents = "programs_without_host = true\nprograms_at_power_on = true\n";
 constexpr const char* kAtPowerOn =
@@ -79,12 +81,15 @@ TEST(ProgramsKept, OneThatBeginsAtPowerOnIsFollowed) {
   EXPECT_EQ(lab.entry().stage, "runs");
   EXPECT_EQ(lab.entry().program, "a");
   EXPECT_TRUE(lab.entry().at_power_on);
+  EXPECT_THAT(lab.state_of("hall:1").program, StartsWith("a runs, frame "));
+  EXPECT_THAT(lab.state_of("hall:1").program, EndsWith(" repeats, without host"));
   EXPECT_NE(lab.motor("m01").trust, api::Trust::kKnown) << "nobody knows where it began";
   EXPECT_THAT(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason, HasSubstr("a program of its"));
   EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
   const std::size_t made = lab.steps.of(0, 0).size();
   lab.run_for(3);
   EXPECT_EQ(lab.steps.of(0, 0).size(), made);
+  EXPECT_EQ(lab.state_of("hall:1").program, "");
   EXPECT_NE(lab.motor("m01").trust, api::Trust::kKnown);
 }
 

@@ -1,6 +1,7 @@
 """Programs of MCUs by bushctl and Python, down to the steps at the pins."""
 
 import json
+import subprocess
 import unittest
 
 import bushd
@@ -20,6 +21,22 @@ move_to = { a0 = 0 }
 """
 WAY = "a0,a1\n40,-20\n40,0\n"
 AWAY = 'motors = ["b0"]\n[[frame]]\nrepeat = 0\n[[frame]]\nmove_by = [2000]\n[[frame]]\nmove_by = [-2000]\n[[frame]]\nnext = true\n'
+KEPT = """motors = ["a0"]
+without_host = true
+kept = true
+at_power_on = true
+range = { a0 = [-10, 50] }
+[[frame]]
+repeat = 0
+[[frame]]
+move_by = [50]
+[[frame]]
+move_by = [-50]
+[[frame]]
+wait_s = 0.1
+[[frame]]
+next = true
+"""
 TOGETHER = 'motors = ["b0"]\n[[frame]]\nmove_by = [150]\n'
 
 
@@ -69,6 +86,7 @@ class Programs(EndToEndTest):
         self.assertIn("without end: this is one pass of what it repeats", said)
         run = self.start_bushctl("program", "run", "away", "--wait")
         self.wait_until("it to run", lambda: self.stage_of("away") == "runs")
+        self.assertIn("program away runs, frame", self.command("status").stdout)
         self.assertEqual(self.bushctl("move", "b0", 5).returncode, 1)
         self.assertEqual(self.bushctl("program", "erase", "away").returncode, 1)
         self.command("pause", "b0")
@@ -93,11 +111,34 @@ class Programs(EndToEndTest):
             self.assertEqual(client.run_programs("scan").outcome, bushd.Outcome.REACHED)
             motion = client.run_programs("away", wait=False)
             self.wait_until("b0 to move", lambda: client.where("b0").moving)
+            self.wait_until("its MCU to say so", lambda: any(
+                mcu.program.startswith("away runs, frame") for mcu in client.status().mcus.values()))
             self.assertEqual(motion.stop().outcome, bushd.Outcome.STOPPED)
             self.assertEqual(client.list_programs()[put.mcu].stage, bushd.ProgramStage.ENDED)
             client.erase_program("scan")
             client.erase_program("away")
             self.assertEqual({one.stage for one in client.list_programs().values()}, {bushd.ProgramStage.NONE})
+
+    def test_a_power_cut_leaves_what_is_kept_and_begins_what_says_so(self):
+        self.write_config()
+        text = self.file("bushd.toml").read_text()
+        self.file("bushd.toml").write_text(text.replace("[[mcu]]\n", "[[mcu]]\nprograms_without_host = true\nprograms_at_power_on = true\n"))
+        self.bushsim = self.start_bushsim(options=("--keep", "--console", 1), stdin=subprocess.PIPE)
+        self.bushd = self.start_bushd()
+        self.wait_until_ready()
+        self.survey()
+        self.file("kept.toml").write_text(KEPT)
+        self.assertIn("outlives power cuts\n", self.program("put", "kept", self.file("kept.toml")))
+        self.assertEqual(self.positions()["a0"], 0)
+        self.bushsim.process.stdin.write(b"D")
+        self.bushsim.process.stdin.flush()
+        self.wait_until("it to run by itself", lambda: self.stage_of("kept") == "runs")
+        entry = next(entry for entry in self.listed().values() if entry["program"] == "kept")
+        self.assertTrue(entry["at_power_on"] and entry["kept"] and entry["stored"] and entry["without_host"])
+        self.wait_until("its MCU to be there", lambda: self.motors()["a0"]["trust"] == "uncertain")
+        self.command("stop", "a0", "--wait")
+        self.program("erase", entry["checksum"])
+        self.assertIsNone(self.stage_of("kept"))
 
     def test_ctrl_c_stops_the_motors_of_the_program_alone(self):
         self.bring_up_programs()

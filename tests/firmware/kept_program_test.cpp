@@ -49,6 +49,7 @@ TEST_P(KeptProgram, IsThereAfterAResetAndWaitsToBeRun) {
   EXPECT_EQ(state().stage, BUSHD_PROGRAM_LOADED);
   EXPECT_EQ(state().crc, crc);
   EXPECT_EQ(state().flags & kAtPowerOn, kKept);
+  EXPECT_TRUE(is_stored());
   EXPECT_EQ(state().number, 0);
   EXPECT_EQ(rig.poll().flags & BUSHD_FLAG_ENABLED, 0);
   expect_nothing_moves(2 * kBefore);

@@ -360,6 +360,7 @@ TEST(FieldNames, State) {
                                    .state = api::McuState::kFault,
                                    .detail = "d",
                                    .inputs = "i",
+                                   .program = "p",
                                    .boot = 6,
                                    .tick = 7,
                                    .motors = {motor}};
@@ -387,6 +388,7 @@ TEST(FieldNames, State) {
   EXPECT_EQ(state.state, "FAULT");
   EXPECT_EQ(state.detail, "d");
   EXPECT_EQ(state.inputs, "i");
+  EXPECT_EQ(state.program, "p");
   EXPECT_EQ(state.boot_number, 6);
   EXPECT_EQ(state.tick, 7);
   const motor_t& motor = state.motors.at(0);

@@ -68,6 +68,11 @@ std::string notes_text(const api::MotorState& motor) {
   return all;
 }
 
+std::string about(const api::StateSnapshot& mcu) {
+  if (mcu.program.empty()) return mcu.detail;
+  return (mcu.detail.empty() ? "" : mcu.detail + "; ") + "program " + mcu.program;
+}
+
 bool has_unit(const units::Scale& scale) {
   return scale.unit != units::Coordinates::kSteps;
 }

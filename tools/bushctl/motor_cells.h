@@ -26,6 +26,8 @@ const char* moves_text(const bushd::api::MotorState& motor);
 
 // Since when it is not heard, which limit switch is active, who has armed it.
 std::string notes_text(const bushd::api::MotorState& motor);
+// What there is to say of an MCU beside its state: why it is so, and its program.
+std::string about(const bushd::api::StateSnapshot& mcu);
 
 // "12.345 mm", and bare steps of a motor without a unit; of one whose position nobody knows "-".
 std::string position_text(std::int64_t steps, double user, const bushd::units::Scale& scale);

@@ -65,7 +65,7 @@ std::vector<std::string> table(const Status& status) {
     }
     if (!is_mcu) continue;
     mcus.row({bushd::printable(mcu.mcu), std::string(word(mcu.state)), fmt::to_string(mcu.boot),
-              bushd::printable(mcu.detail)});
+              bushd::printable(about(mcu))});
     if (!told.insert(mcu.bus).second) continue;
     const std::string& port = status.descriptions.at(i).snapshot.port;
     buses.row({bushd::printable(mcu.bus), port.empty() ? "not open" : bushd::printable(port)});

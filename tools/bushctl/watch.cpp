@@ -53,7 +53,7 @@ class Changes {
       if (description.is_mcu()) {
         line(mcu.mcu,
              fmt::format("{} {} boot {}{}{}", bushd::printable(mcu.mcu), word(mcu.state), mcu.boot,
-                         mcu.detail.empty() ? "" : " ", bushd::printable(mcu.detail)));
+                         about(mcu).empty() ? "" : " ", bushd::printable(about(mcu))));
       }
       for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
         const std::string& name = mcu.motors[m].name;

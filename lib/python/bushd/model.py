@@ -217,6 +217,7 @@ class Mcu:
     state: McuState
     detail: str  # cause of OFFLINE or FAULT
     inputs: frozenset[str]  # active ones: of "emergency", "forward", "reverse", "trigger"
+    program: str  # that is under way, and where it is: "scan runs, frame 3, without host"; "": none
     boot_number: int  # 0 until the MCU was heard
     tick: int
     tick_ns: int

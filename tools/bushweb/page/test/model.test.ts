@@ -19,7 +19,7 @@ function motor(name: string, more: Partial<MotorState> = {}): MotorState {
 
 function mcu(name: string, part: number, motors: MotorState[]): McuState {
   return {
-    part, bus: "hall", mcu: name, state: "READY", detail: "", inputs: "", boot_number: 1, tick: 1, motors,
+    part, bus: "hall", mcu: name, state: "READY", detail: "", inputs: "", program: "", boot_number: 1, tick: 1, motors,
   };
 }
 

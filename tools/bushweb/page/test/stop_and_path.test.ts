@@ -42,7 +42,7 @@ test("deaf is a connected daemon of whose MCUs none is heard for a second", () =
   const model = new Model(() => ms);
   const hear = (name: string): void => model.takeState({
     kind: "state", daemon: "a", utime_us: ms * 1000, mcus: [{
-      part: 0, bus: "h", mcu: name, state: "READY", detail: "", inputs: "", boot_number: 1, tick: 1, motors: [],
+      part: 0, bus: "h", mcu: name, state: "READY", detail: "", inputs: "", program: "", boot_number: 1, tick: 1, motors: [],
     }],
   });
   const connect = (connected: boolean): void => model.takeDaemon({ kind: "daemon", daemon: "a", connected, why: "" });

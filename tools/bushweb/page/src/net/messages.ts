@@ -35,6 +35,7 @@ export interface McuState {
   state: string;
   detail: string;
   inputs: string;
+  program: string;
   boot_number: number;
   tick: number;
   motors: MotorState[];

@@ -16,7 +16,7 @@ import { Ruler } from "../ui/ruler";
 import { Trouble } from "../ui/trouble";
 
 const kFacts = [
-  "Target", "Speed", "State", "Inputs", "Dial", "Steps", "Line", "MCU", "Group", "Table",
+  "Target", "Speed", "State", "Inputs", "Dial", "Steps", "Line", "MCU", "Program", "Group", "Table",
 ] as const;
 
 export class MotorView implements View {
@@ -142,6 +142,7 @@ export class MotorView implements View {
     const mcu = motor.mcu;
     tell("MCU", `${mcu.name}, output ${about?.output ?? "–"}, ${mcu.state?.state ?? "not reported"}` +
       (mcu.state?.detail ? `: ${mcu.state.detail}` : ""));
+    tell("Program", mcu.state?.program ?? "");
     tell("Group", about?.group ?? "");
     const table = about?.table;
     const revision = table && table.revision > 0 ? `, revision ${table.revision}` : "";
