@@ -110,7 +110,7 @@ void bushd_mcu_nvm_compared(bushd_mcu* mcu, bool same) {
 #endif
 }
 
-static size_t most_bytes(const bushd_mcu* mcu) {
+static inline size_t most_bytes(const bushd_mcu* mcu) {
   size_t bytes = BUSHD_MCU_NVM_MAX_BYTES(mcu->config.code_count);
 #if BUSHD_PROGRAMS
   const bushd_mcu_program* const program = mcu->config.program;

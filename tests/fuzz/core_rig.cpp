@@ -64,6 +64,7 @@ void CoreRig::boot() {
                              .enable_at_boot = enable_at_boot_,
                              .in_pieces = configuration_.in_pieces,
                              .keypad = true,
+                             .keeps_programs = true,
                              .no_slow_runs = false,  // below
                              .queue = queue_.data(),
                              .queue_ticks = configuration_.queue_ticks,
