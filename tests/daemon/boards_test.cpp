@@ -350,7 +350,7 @@ TEST(Boards, ALowerSpeedInMotionIsApproachedAlongTheTable) {
   }
 }
 
-// A board that was reset while it rested waits for a header, and the code 250 is one.
+// A board that was reset while it rested waits for a header, and some codes look like one.
 TEST(Boards, EachMotionBeginsWithItsHeader) {
   BoardLab lab;
   EXPECT_EQ(lab.move("m0", 2).result, "reached");

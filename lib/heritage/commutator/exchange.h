@@ -1,7 +1,8 @@
 // The serial exchange with a commutator board of BUSHD-2 (JINR P10-85-635), without I/O and without
 // a clock.
 //
-//     to the board    0          the motion before is over: a header follows
+//     to the board    0          the motion before is over: a header follows; what is being
+//                                counted is dropped
 //                     1000 dnnn  header: bits 1..3 number of the motor 0..7, bit 4 direction
 //                                (1: left, reverse), bit 8 set, the rest 0
 //                     1..255     delay code: the board waits code / (250 F_start), then it steps

@@ -132,6 +132,29 @@ TEST(CommutatorBoard, TakesACodeForAHeaderOnlyAfterZero) {
   EXPECT_THAT(board.take_answers(), ElementsAre(0x10, 0x10));
 }
 
+// Who begins anew does not know that something is being counted: it would be a step of the motor
+// that is named now, and its answer would be taken for that to the code.
+TEST(CommutatorBoard, DropsTheCodeThatIsCountedWithZero) {
+  CommutatorBoard board(100);
+  for (const int byte : {0x81, 250, 0, 0x8A, 10}) board.receive(0, static_cast<std::uint8_t>(byte));
+  board.advance(400'000);
+  EXPECT_THAT(board.take_answers(), ElementsAre(0x10));
+  board.advance(20'000'000);
+  EXPECT_THAT(board.take_answers(), IsEmpty());
+  EXPECT_EQ(board.position(1), 0);
+  EXPECT_EQ(board.position(2), -1);
+}
+
+TEST(CommutatorBoard, WaitsForNothingButAHeaderOfItsForm) {
+  for (unsigned byte = 1; byte <= 255; ++byte) {
+    CommutatorBoard board(100);
+    board.receive(0, static_cast<std::uint8_t>(byte));
+    board.receive(0, 10);
+    board.advance(1'000'000);
+    EXPECT_EQ(board.take_answers().size(), byte / 16 == 8 ? 1u : 0u) << byte;
+  }
+}
+
 // Exchange and board on a line whose bytes take their time.
 class Line {
  public:
