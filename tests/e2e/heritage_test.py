@@ -42,11 +42,13 @@ class Heritage(EndToEndTest):
             self.assertIn(f'[control]\npath = "{SOCKET}"\n', text)
             self.file(name).write_text(text.replace(SOCKET, str(self.file("control"))))
 
-    def run_section(self, heading):
-        """All its commands; those with & behind them live on."""
+    def run_section(self, heading, with_image=""):
+        """All its commands; those with & behind them live on. `with_image`: what bushsim is told beside what is shown."""
         files, commands = sections()[heading]
         self.write_files(files)
         for number, command in enumerate(commands):
+            if with_image and command.startswith("bushsim "):
+                command = command.replace(" &", f" {with_image} &")
             if command.endswith(" &"):
                 # exec: a signal reaches the program, not its shell.
                 self.before = self.bushctl("status", "--json").returncode == 0 and self.positions()
@@ -81,7 +83,19 @@ class Heritage(EndToEndTest):
         self.assertRegex(jog.said(), "500 steps after the stop event")
 
     def test_commutator_boards(self):
-        self.run_section("Commutator boards")
+        self.moves_motors_of_a_board()
+
+    def test_commutator_board_that_one_can_build(self):
+        image = pathlib.Path(os.environ.get("COMMUTATOR_IMAGE", ""))
+        if not image.is_file():
+            self.skipTest("no image of a commutator board")
+        os.symlink(image, self.file(image.name))
+        words = f"--mcu 1=atmega328p:{image.name}"
+        self.assertIn(f"`{words}`", PAGE.read_text())
+        self.moves_motors_of_a_board(words)
+
+    def moves_motors_of_a_board(self, with_image=""):
+        self.run_section("Commutator boards", with_image)
         self.wait_until("m5 to come", lambda: self.position("m5") == 300)
         self.assertEqual(self.position("m0"), 400)
         self.assertEqual(self.programs[1].end(), 0)

@@ -18,7 +18,7 @@ import tomllib
 FREESTANDING = {"stdint.h", "stdbool.h", "stddef.h", "limits.h", "string.h"}
 # docs/rooms.toml says which other rooms these use.
 ROOMS_FILE = pathlib.Path(__file__).resolve().parents[2] / "docs/rooms.toml"
-FREESTANDING_ROOMS = ("lib/engine", "firmware/core")
+FREESTANDING_ROOMS = ("lib/engine", "firmware/commutator", "firmware/core")
 
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
 # A port may bring its own: BUSHD_OWN_CRC32, BUSHD_OWN_SLOTS_FILL, BUSHD_OWN_RUN_PARTS, BUSHD_OWN_LINE_FOLLOWER.

@@ -17,7 +17,11 @@ from collections import namedtuple
 import page_figures
 
 Chip = namedtuple("Chip", "ram_size return_address receiver")
-CHIPS = {"atmega2560": Chip(8192, 3, "__vector_25"), "atmega1284p": Chip(16384, 2, "__vector_20")}
+CHIPS = {
+    "atmega2560": Chip(8192, 3, "__vector_25"),
+    "atmega1284p": Chip(16384, 2, "__vector_20"),
+    "atmega328p": Chip(2048, 2, None),  # of nodes without interrupts
+}
 BRANCH = re.compile(r"br\w\w$")
 SKIP = {"cpse", "sbrc", "sbrs", "sbic", "sbis"}
 RETURN = {"ret", "reti"}

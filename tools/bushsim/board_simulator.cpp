@@ -7,12 +7,16 @@
 #include <csignal>
 #include <iterator>
 
+#ifdef BUSHSIM_AVR
+#include "sim/avr/avr_board.h"
+#endif
+
 namespace bushsim {
 namespace {
 
 using bushd::fail;
 using bushd::Result;
-using bushd::sim::CommutatorBoard;
+using bushd::sim::BoardMotors;
 using bushd::sim::TimeNs;
 
 }  // namespace
@@ -23,20 +27,33 @@ BoardSimulator::BoardSimulator(const Options& options, Waiter waiter, Pty pty,
       links_(options.links),
       pty_(std::move(pty)),
       trace_(std::move(trace)),
-      line_(options.setup.baud, options.setup.board_start_hz, trace_.get()),
+      board_(make_board(options, trace_.get())),
       start_ns_(monotonic_ns()) {
-  line_.board.keeps_steps = false;
+  BoardMotors& motors = board_->motors();
+  motors.keeps_steps = false;
   for (const SwitchAt& one : options.switches) {
-    CommutatorBoard::Motor& motor = line_.board.motor(one.output);
+    BoardMotors::Motor& motor = motors.motor(one.output);
     (one.options.positive_end ? motor.right_limit_at : motor.left_limit_at) = one.options.at_steps;
   }
 }
 
+std::unique_ptr<bushd::sim::BoardEnd> BoardSimulator::make_board(const Options& options,
+                                                                 bushd::sim::EdgeSink* trace) {
+  const Setup& setup = options.setup;
+#ifdef BUSHSIM_AVR
+  if (!options.image.empty()) {
+    return std::make_unique<bushd::sim::AvrBoard>(options.image, setup.baud, setup.board_start_hz,
+                                                  trace);
+  }
+#endif
+  return std::make_unique<bushd::sim::BoardLine>(setup.baud, setup.board_start_hz, trace);
+}
+
 Result<std::unique_ptr<BoardSimulator>> BoardSimulator::create(const Options& options) {
   for (const SwitchAt& one : options.switches) {
-    if (one.output < CommutatorBoard::kMotors && one.options.input == one.output) continue;
+    if (one.output < BoardMotors::kMotors && one.options.input == one.output) continue;
     return fail(fmt::format("--switch: a board has motors 0..{}, each with switches of its own",
-                            CommutatorBoard::kMotors - 1));
+                            BoardMotors::kMotors - 1));
   }
   auto pty = Pty::open(options.links.front());
   if (!pty) return fail(pty.error());
@@ -65,16 +82,16 @@ Result<void> BoardSimulator::run() {
     if (done) done = hand_out_answers();
     if (!trace_) continue;
     // A pulse ends after its step has been told.
-    trace_->settled(line_.advanced_to_ns());
+    trace_->settled(board_->advanced_to_ns());
     if (trace_->error()) done = fail(*trace_->error());
   }
   if (!trace_) return done;
-  const auto closed = trace_->close(std::max(now_ns(), line_.board.last_edge_ns()));
+  const auto closed = trace_->close(std::max(now_ns(), board_->motors().last_edge_ns()));
   return done ? closed : done;
 }
 
 Result<void> BoardSimulator::wait() const {
-  const TimeNs sleep_ns = std::min(line_.next_event_ns() - now_ns(), kIdleSleepNs);
+  const TimeNs sleep_ns = std::min(board_->next_event_ns() - now_ns(), kIdleSleepNs);
   const auto waited = waiter_.wait({pty_ ? pty_->fd() : -1}, sleep_ns);
   if (!waited) return fail(waited.error());
   return {};
@@ -100,13 +117,13 @@ Result<void> BoardSimulator::take_bytes() {
   std::array<std::uint8_t, kReadBytes> space;
   const auto size = pty_->read(space);
   if (!size) return fail(size.error());
-  line_.send(now_ns(), {space.data(), *size});
+  board_->send(now_ns(), {space.data(), *size});
   if (*size == 0) pty_->lift_exclusive_use();
   return {};
 }
 
 Result<void> BoardSimulator::hand_out_answers() {
-  const auto answers = line_.advance(now_ns());
+  const auto answers = board_->advance(now_ns());
   if (!pty_ || answers.empty()) return {};
   const auto taken = pty_->write(answers);
   if (!taken) return fail(taken.error());
@@ -115,8 +132,8 @@ Result<void> BoardSimulator::hand_out_answers() {
 
 std::string BoardSimulator::summary() const {
   std::string motors;
-  const CommutatorBoard& board = line_.board;
-  for (unsigned i = 0; i < CommutatorBoard::kMotors; ++i) {
+  const BoardMotors& board = board_->motors();
+  for (unsigned i = 0; i < BoardMotors::kMotors; ++i) {
     const std::uint64_t made = board.travel(i);
     if (made == 0) continue;
     fmt::format_to(std::back_inserter(motors), "{}step{} {} (at {:+})",

@@ -24,6 +24,7 @@ class BoardSimulator {
     std::vector<SwitchAt> switches;  // of its motors' numbers
     std::vector<std::string> links;  // as of Simulator
     std::string trace;
+    std::string image = {};  // that it runs in simavr; "": it is a model of one
   };
   // Makes all that can fail, and takes the signals of Waiter.
   static bushd::Result<std::unique_ptr<BoardSimulator>> create(const Options& options);
@@ -36,6 +37,8 @@ class BoardSimulator {
  private:
   BoardSimulator(const Options& options, Waiter waiter, Pty pty,
                  std::unique_ptr<bushd::sim::VcdWriter> trace);
+  static std::unique_ptr<bushd::sim::BoardEnd> make_board(const Options& options,
+                                                          bushd::sim::EdgeSink* trace);
   bushd::sim::TimeNs now_ns() const;
   bushd::Result<void> wait() const;
   bushd::Result<void> take_signals();
@@ -47,7 +50,7 @@ class BoardSimulator {
   std::size_t links_used_ = 1;
   std::optional<Pty> pty_;  // none: unplugged
   std::unique_ptr<bushd::sim::VcdWriter> trace_;
-  bushd::sim::BoardLine line_;
+  const std::unique_ptr<bushd::sim::BoardEnd> board_;
   const std::int64_t start_ns_;  // CLOCK_MONOTONIC at simulated time 0
   bool ended_ = false;
 };

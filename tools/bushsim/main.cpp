@@ -90,6 +90,7 @@ int run(int argc, char** argv) {
   app.add_option("--mcu", mcus,
                  "What an MCU is, ADDRESS=KIND: virtual (the default), atmega2560:IMAGE.elf or "
                  "atmega1284p:IMAGE.elf, which run in simavr, or lm3s6965:IMAGE.elf, in QEMU. "
+                 "A commutator board is 1=virtual or 1=atmega328p:IMAGE.elf. "
                  "Several times for several")
       ->allow_extra_args(false);
   std::vector<std::string> switches;
@@ -165,11 +166,12 @@ int run(int argc, char** argv) {
     return refuse({"this bus has no MCUs: leave out --latency-ms and --bit-errors"});
   }
   if (setup->board_start_hz != 0) {
-    if (!mcus.empty() || !doubled.empty()) {
-      return refuse({"a commutator board has no MCUs: leave out --mcu and --doubled"});
+    if (!doubled.empty()) {
+      return refuse({"a commutator board is alone on its line: leave out --doubled"});
     }
+    const std::string image = images->empty() ? "" : images->begin()->second.path;
     return simulate<bushsim::BoardSimulator>(bushsim::BoardSimulator::Options{
-        options.setup, options.switches, options.links, options.trace});
+        options.setup, options.switches, options.links, options.trace, image});
   }
   options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
   if (setup->pulses) return simulate<bushsim::PulseSimulator>(options);

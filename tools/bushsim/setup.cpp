@@ -48,8 +48,11 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
 namespace {
 
 // The package that this bushsim would have needed; empty if it can run the chip's images.
-Result<std::string> missing_for(const std::string& chip) {
-  if (chip == "atmega2560" || chip == "atmega1284p") {
+Result<std::string> missing_for(const std::string& chip, bool is_board) {
+  if (is_board && chip != "atmega328p") {
+    return fail("is neither virtual nor atmega328p:IMAGE.elf, which a commutator board has");
+  }
+  if (is_board || chip == "atmega2560" || chip == "atmega1284p") {
 #ifndef BUSHSIM_AVR
     return "simavr (libsimavr-dev, libdw-dev)";
 #endif
@@ -87,7 +90,7 @@ Result<Images> parse_images(const std::vector<std::string>& choices, const Setup
     if (kind == "virtual") continue;
     const std::size_t colon = std::min(kind.find(':'), kind.size());
     const Image image{kind.substr(0, colon), kind.substr(std::min(colon + 1, kind.size()))};
-    const auto missing = missing_for(image.chip);
+    const auto missing = missing_for(image.chip, setup.board_start_hz != 0);
     if (!missing) return fault(missing.error().message);
     if (!missing->empty()) return fault("this bushsim was built without " + *missing);
     if (!std::filesystem::exists(image.path)) return fault("there is no such file");
@@ -127,7 +130,9 @@ Result<std::vector<SwitchAt>> parse_switches(const std::vector<std::string>& cho
     if (std::ranges::find(setup.addresses, one.address) == setup.addresses.end()) {
       return fault(fmt::format("bus \"{}\" has no MCU of this address", setup.bus));
     }
-    if (images.contains(one.address)) return fault("only virtual MCUs can have one");
+    if (images.contains(one.address) && setup.board_start_hz == 0) {
+      return fault("only virtual MCUs can have one");
+    }
     one.options.input = input;
     one.options.positive_end = *sign == '+';
     one.options.hysteresis_steps = kHysteresisSteps;

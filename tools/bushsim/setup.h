@@ -30,7 +30,7 @@ bushd::Result<Setup> load_setup(const std::string& config_path, const std::strin
 
 // What runs the firmware of an MCU that is not virtual.
 struct Image {
-  std::string chip;  // atmega2560, atmega1284p, lm3s6965
+  std::string chip;  // atmega2560, atmega1284p, lm3s6965; atmega328p of a commutator board
   std::string path;
 };
 using Images = std::map<std::uint8_t, Image>;  // by address

@@ -9,6 +9,8 @@ extern "C" {
 #include <sim_io.h>
 }
 
+#include <cstdarg>
+#include <cstdio>
 #include <cstring>
 #include <stdexcept>
 
@@ -106,7 +108,16 @@ void mend_external_flags(avr_t* avr) {
   }
 }
 
+// What is written to stdout belongs to the program.
+void print_errors(avr_t*, const int level, const char* format, va_list arguments) {
+  if (level <= LOG_ERROR) std::vfprintf(stderr, format, arguments);
+}
+
 }  // namespace
+
+void log_errors_only() {
+  avr_global_logger_set(print_errors);
+}
 
 void mend(avr_t* avr, const AvrChip& chip) {
   mend_external_flags(avr);

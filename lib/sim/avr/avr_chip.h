@@ -43,6 +43,9 @@ struct AvrChip {
 // Throws std::runtime_error for another one than "atmega2560" and "atmega1284p".
 const AvrChip& avr_chip(const std::string& name);
 
+// simavr writes errors only, to stderr.
+void log_errors_only();
+
 // What simavr has otherwise than the data sheet of this chip.
 void mend(avr_t* avr, const AvrChip& chip);
 

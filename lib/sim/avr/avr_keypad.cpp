@@ -2,20 +2,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstdlib>
-#include <stdexcept>
-
-extern "C" {
-#include <avr_ioport.h>
-#include <sim_avr.h>
-#include <sim_elf.h>
-#include <sim_io.h>
-}
+#include <utility>
 
 namespace bushd::sim {
 namespace {
 
-constexpr std::uint32_t kKeypadHz = 16'000'000;
 constexpr int kKeys = 4;
 // Port B has segment g, and the digits from bit 1 on. Port D has segments a to f from bit 2 on.
 constexpr int kFirstDigit = 1;
@@ -35,66 +26,23 @@ constexpr std::array<std::pair<std::uint8_t, char>, 12> kCharacters{{{0b0111111,
                                                                      {0b1000000, '-'},
                                                                      {0, ' '}}};
 
-void never_sleep(avr_t*, avr_cycle_count_t) {}
-
 }  // namespace
 
-AvrKeypad::AvrKeypad(const std::string& image) {
-  elf_firmware_t firmware{};
-  if (elf_read_firmware(image.c_str(), &firmware) != 0) {
-    throw std::runtime_error(image + ": not an image for an AVR");
-  }
-  avr_ = avr_make_mcu_by_name("atmega328p");
-  if (avr_ == nullptr) throw std::runtime_error("simavr: no atmega328p");
-  avr_init(avr_);
-  avr_->frequency = firmware.frequency = kKeypadHz;
-  avr_load_firmware(avr_, &firmware);
-  avr_->sleep = never_sleep;
-  avr_->log = LOG_ERROR;
-  line_ = std::make_unique<AvrUartLine>(avr_, '0', [this](std::uint64_t cycle, std::uint8_t byte) {
-    if (on_byte) on_byte(static_cast<TimeNs>(cycle) * 125 / 2, byte);
-  });
+AvrKeypad::AvrKeypad(const std::string& image)
+    : node_(image, [this](TimeNs end_ns, std::uint8_t byte) {
+        if (on_byte) on_byte(end_ns, byte);
+      }) {
   for (std::size_t i = 0; i < pins_.size(); ++i) {
     const bool is_b = i < 8;
     pins_[i] = {this, is_b ? &port_b_ : &port_d_, static_cast<std::uint8_t>(1 << i % 8)};
-    avr_irq_register_notify(
-        avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(is_b ? 'B' : 'D'), static_cast<int>(i % 8)),
-        on_pin, &pins_[i]);
+    node_.watch(is_b ? 'B' : 'D', static_cast<int>(i % 8), on_pin, &pins_[i]);
   }
   hold(0);
 }
 
-AvrKeypad::~AvrKeypad() {
-  avr_terminate(avr_);
-  std::free(avr_);
-}
-
 // Keys close to ground.
 void AvrKeypad::hold(std::uint8_t keys) {
-  avr_ioport_external_t external{};
-  external.name = 'C';
-  external.mask = (1 << kKeys) - 1;
-  external.value = static_cast<std::uint8_t>(~keys) & ((1 << kKeys) - 1);
-  avr_ioctl(avr_, AVR_IOCTL_IOPORT_SET_EXTERNAL('C'), &external);
-  for (int key = 0; key < kKeys; ++key) {
-    avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ('C'), key), (keys >> key & 1) == 0);
-  }
-}
-
-TimeNs AvrKeypad::time_ns() const {
-  return static_cast<TimeNs>(avr_->cycle) * 125 / 2;
-}
-
-void AvrKeypad::advance(TimeNs now_ns) {
-  while (time_ns() < now_ns) {
-    line_->step();
-    const auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
-    avr_->run_cycle_limit = left;
-    avr_->run_cycle_count = std::min(avr_->run_cycle_count, left);
-    if (avr_run(avr_) == cpu_Crashed) {
-      throw std::runtime_error("simavr: the keypad's image has crashed");
-    }
-  }
+  node_.drive('C', (1 << kKeys) - 1, static_cast<std::uint8_t>(~keys));
 }
 
 // An edge calls twice, with other bits above the level.

@@ -5,11 +5,9 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
 
-#include "sim/avr/avr_uart_line.h"
-#include "sim/edge.h"
+#include "sim/avr/avr_node.h"
 
 namespace bushd::sim {
 
@@ -17,28 +15,23 @@ class AvrKeypad {
  public:
   // Throws std::runtime_error if the image cannot be read. It boots at time 0.
   explicit AvrKeypad(const std::string& image);
-  ~AvrKeypad();
-  AvrKeypad(const AvrKeypad&) = delete;
-  AvrKeypad& operator=(const AvrKeypad&) = delete;
 
   // In the order of the source: forward, reverse, slower, stop; bit n is key n. From now on.
   void hold(std::uint8_t keys);
   // What it has sent: when the stop bit ends, and the byte.
   std::function<void(TimeNs end_ns, std::uint8_t byte)> on_byte;
   // A byte for its display has ended now.
-  void receive(std::uint8_t byte) { line_->receive(byte); }
+  void receive(std::uint8_t byte) { node_.receive(byte); }
   // Up to this time. Throws std::runtime_error if the program crashes.
-  void advance(TimeNs now_ns);
+  void advance(TimeNs now_ns) { node_.advance(now_ns); }
   // What its four digits show, by the segments that were lit last; '?': no character.
   std::string shown() const;
 
  private:
-  TimeNs time_ns() const;
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
   void light(std::uint8_t bit);
 
-  avr_t* avr_;
-  std::unique_ptr<AvrUartLine> line_;
+  AvrNode node_;
   struct Pin {
     AvrKeypad* keypad;
     std::uint8_t* port;

@@ -49,11 +49,6 @@ constexpr std::size_t kBootNumberAt = 16;
 // Busy waiting is all that the image does; the simulator must not sleep for it in real time.
 void no_sleep(avr_t*, avr_cycle_count_t) {}
 
-// What is written to stdout belongs to the program.
-void print_errors(avr_t*, const int level, const char* format, va_list arguments) {
-  if (level <= LOG_ERROR) std::vfprintf(stderr, format, arguments);
-}
-
 avr_uart_t* find_uart(avr_t* avr) {
   for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
     if (std::strcmp(io->kind, "uart") != 0) continue;
@@ -76,7 +71,7 @@ struct AvrMcu::ResetHook {
 
 AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
     : chip_(avr_chip(options.chip)), index_(index), driver_(driver), sink_(sink) {
-  avr_global_logger_set(print_errors);
+  log_errors_only();
   elf_firmware_t firmware{};
   if (elf_read_firmware(options.image.c_str(), &firmware) != 0) {
     throw std::runtime_error(options.image + ": not an image for an AVR");

@@ -230,6 +230,21 @@ TEST_F(Bushsim, McusThatItCannotMakeAreRefused) {
   EXPECT_FALSE(there(link));
 }
 
+TEST_F(Bushsim, ImagesAreThoseOfTheirBus) {
+  EXPECT_THAT(refusal({"--config", config, "--link", link, "--mcu", "1=atmega328p:/dev/null"}),
+              HasSubstr("neither virtual nor atmega2560:IMAGE.elf"));
+  const std::string board = folder + "/board.toml";
+  std::ofstream(board)
+      << "[[group]]\nname = \"all\"\ntable = \"slow\"\n[[motor]]\nname = \"m0\"\nmcu = \"board\"\n"
+         "output = 0\ngroup = \"all\"\n[[bus]]\nname = \"board\"\nkind = \"commutator\"\n"
+         "port = \"/dev/null\"\nbaud = 500000\nstart_hz = 100\n";
+  const auto refused = [&](const std::string& mcu) {
+    return refusal({"--config", board, "--link", link, "--mcu", mcu});
+  };
+  EXPECT_THAT(refused("1=atmega2560:/dev/null"), HasSubstr("which a commutator board has"));
+  EXPECT_THAT(refused("2=virtual"), HasSubstr("no MCU of this address"));
+}
+
 #ifdef LM3S_IMAGE
 TEST_F(Bushsim, AnImageOfACortexMAnswersBesideAVirtualMcu) {
   start_ready({"--mcu", std::string("2=lm3s6965:") + LM3S_IMAGE});

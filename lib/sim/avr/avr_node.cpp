@@ -1,0 +1,105 @@
+#include "sim/avr/avr_node.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <stdexcept>
+#include <utility>
+
+#include "sim/avr/avr_chip.h"
+
+extern "C" {
+#include <avr_ioport.h>
+#include <sim_avr.h>
+#include <sim_cycle_timers.h>
+#include <sim_elf.h>
+#include <sim_io.h>
+}
+
+namespace bushd::sim {
+namespace {
+
+constexpr std::uint32_t kNodeHz = 16'000'000;
+constexpr std::uint16_t kNodeJumpToItself = 0xCFFF;
+constexpr std::size_t kNodeMcusr = 0x54;
+constexpr std::uint8_t kNodePowerOn = 1;
+
+void never_sleep(avr_t*, avr_cycle_count_t) {}
+
+avr_cycle_count_t stop_here(avr_t*, avr_cycle_count_t, void*) {
+  return 0;
+}
+
+}  // namespace
+
+AvrNode::AvrNode(const std::string& image, Sent sent) {
+  log_errors_only();
+  elf_firmware_t firmware{};
+  if (elf_read_firmware(image.c_str(), &firmware) != 0) {
+    throw std::runtime_error(image + ": not an image for an AVR");
+  }
+  avr_ = avr_make_mcu_by_name("atmega328p");
+  if (avr_ == nullptr) throw std::runtime_error("simavr: no atmega328p");
+  avr_init(avr_);
+  avr_->frequency = firmware.frequency = kNodeHz;
+  avr_load_firmware(avr_, &firmware);
+  avr_->sleep = never_sleep;
+  avr_->log = LOG_ERROR;
+  avr_->data[kNodeMcusr] = kNodePowerOn;
+  line_ = std::make_unique<AvrUartLine>(
+      avr_, '0', [sent = std::move(sent)](std::uint64_t cycle, std::uint8_t byte) {
+        sent(static_cast<TimeNs>(cycle) * 125 / 2, byte);
+      });
+}
+
+AvrNode::~AvrNode() {
+  avr_terminate(avr_);
+  std::free(avr_);
+}
+
+TimeNs AvrNode::time_ns() const {
+  return static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+}
+
+void AvrNode::advance(TimeNs now_ns) {
+  while (time_ns() < now_ns) {
+    line_->step();
+    const auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
+    avr_->run_cycle_limit = left;
+    // With each WDR simavr forgets how far it was to go on, but for its timers.
+    avr_cycle_timer_register(avr_, left, stop_here, this);
+    avr_->run_cycle_count = std::min(avr_->run_cycle_count, left);
+    if (avr_run(avr_) == cpu_Crashed) {
+      throw std::runtime_error("simavr: the node's image has crashed");
+    }
+  }
+}
+
+void AvrNode::watch(char port, int bit, Notify notify, void* param) {
+  avr_irq_register_notify(
+      avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), bit), notify,
+      param);
+}
+
+// For what the image reads, and for what simavr makes of the pins when the image writes to them.
+void AvrNode::drive(char port, std::uint8_t mask, std::uint8_t levels) {
+  avr_ioport_external_t external{};
+  external.name = port & 0x7F;
+  external.mask = mask;
+  external.value = levels & mask;
+  avr_ioctl(avr_, AVR_IOCTL_IOPORT_SET_EXTERNAL(static_cast<unsigned>(port)), &external);
+  for (int bit = 0; bit < 8; ++bit) {
+    if ((mask >> bit & 1) == 0) continue;
+    avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), bit),
+                  levels >> bit & 1);
+  }
+}
+
+void AvrNode::hang() {
+  const auto* const flash = reinterpret_cast<const std::uint16_t*>(avr_->flash);
+  const auto* const end = flash + (avr_->flashend + 1) / 2;
+  const auto* const loop = std::find(flash, end, kNodeJumpToItself);
+  if (loop == end) throw std::runtime_error("the image has no endless loop");
+  avr_->pc = static_cast<avr_flashaddr_t>((loop - flash) * 2);
+}
+
+}  // namespace bushd::sim
