@@ -25,14 +25,15 @@ function(bushd_images target prefix toolchain port)
 endfunction()
 
 if(TARGET bushd_sim_avr AND AVR_GCC)
-  bushd_images(avr_image AVR avr atmega2560 -500000.elf -1000000.elf)
+  bushd_images(avr_image AVR avr atmega2560 -500000.elf -1000000.elf -switch-500000.elf)
   bushd_images(atmega1284p_image ATMEGA1284P atmega1284p atmega1284p -500000.elf -1000000.elf)
-  bushd_images(keypad_image KEYPAD keypad keypad .elf)
+  bushd_images(keypad_image KEYPAD keypad keypad .elf -switch.elf)
   bushd_images(commutator_image COMMUTATOR commutator commutator -9600.elf -57600.elf -500000.elf)
   set(AVR_DEFINITIONS AVR_IMAGES="${AVR_IMAGES}"
     AVR_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega2560/memory_owners"
     ATMEGA1284P_IMAGES="${ATMEGA1284P_IMAGES}"
     KEYPAD_IMAGE="${KEYPAD_IMAGES}.elf"
+    KEYPAD_SWITCH_IMAGE="${KEYPAD_IMAGES}-switch.elf"
     COMMUTATOR_IMAGES="${COMMUTATOR_IMAGES}"
     ATMEGA1284P_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega1284p/memory_owners")
   bushd_check(avr_stack_is_bounded LABEL slow NEEDS avr_image COMMAND ${Python3_EXECUTABLE}
@@ -40,7 +41,7 @@ if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_check(atmega1284p_stack_is_bounded LABEL slow NEEDS atmega1284p_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega1284p avr-objdump ${ATMEGA1284P_IMAGES}-500000.elf)
   bushd_check(keypad_stack_is_bounded LABEL slow NEEDS keypad_image COMMAND ${Python3_EXECUTABLE}
-    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega328p avr-objdump ${KEYPAD_IMAGES}.elf)
+    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega328p avr-objdump ${KEYPAD_IMAGES}.elf ${KEYPAD_IMAGES}-switch.elf)
   bushd_check(commutator_stack_is_bounded LABEL slow NEEDS commutator_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega328p avr-objdump ${COMMUTATOR_IMAGES}-500000.elf)
 else()

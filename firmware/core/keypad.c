@@ -3,12 +3,12 @@
 #include "firmware/core/mcu_state.h"
 
 enum { FORWARD = 0x00, REVERSE = 0xFF, SLOWER = 0xFE, STOP = 0xFD };
-enum { TEXT = 5, LAST_AMOUNT = (BUSHD_KEYPAD_SLOWEST - BUSHD_KEYPAD_FIRST) / BUSHD_KEYPAD_SLOWER };
+enum { TEXT = 5, CHANGES = (BUSHD_KEYPAD_LAST - BUSHD_KEYPAD_FIRST) / BUSHD_KEYPAD_CHANGE };
 
-_Static_assert(LAST_AMOUNT < 0x7F, "counted in seven bits");
+_Static_assert(CHANGES < 0x7F, "counted in seven bits");
 
 static uint16_t delay_of(const bushd_mcu_keypad* keypad) {
-  return (uint16_t)(BUSHD_KEYPAD_FIRST + keypad->slower * BUSHD_KEYPAD_SLOWER);
+  return (uint16_t)(BUSHD_KEYPAD_FIRST + keypad->slower * BUSHD_KEYPAD_CHANGE);
 }
 
 void bushd_mcu_keypad_byte(bushd_mcu* mcu, uint8_t byte) {
@@ -21,7 +21,7 @@ void bushd_mcu_keypad_byte(bushd_mcu* mcu, uint8_t byte) {
       keypad->fresh = true;
       break;
     case SLOWER:
-      keypad->slower = (keypad->slower < LAST_AMOUNT ? keypad->slower + 1u : 0u) & 0x7Fu;
+      keypad->slower = (keypad->slower < CHANGES ? keypad->slower + 1u : 0u) & 0x7Fu;
       keypad->slowed = true;
       break;
     case STOP:

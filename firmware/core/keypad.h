@@ -4,7 +4,8 @@
 //     0xFD stop      anything else: nothing
 //
 // A direction counts until the next one, or, where LOCAL says so, for some ticks after it was heard
-// last. Back goes the delay of a step in units of 10 us, four decimal digits and a line feed, or
+// last. Back goes the delay of a step in units of 10 us (or of 0.1 ms, below), four decimal digits
+// and a line feed, or
 // "----" while the key counts for nothing: a fault or a limit forbids it, people use the inputs, a
 // host has the motors.
 #ifndef BUSHD_FIRMWARE_CORE_KEYPAD_H
@@ -21,18 +22,27 @@ extern "C" {
 
 typedef struct bushd_mcu bushd_mcu;
 
-// The figures of the source document: the first delay, what "slower" adds, and the longest.
+// The figures of the source document: the first delay, by how much "slower" changes it, and the
+// last one before the first again, in units of the display. keypad.c may be compiled for the other
+// keypad, whose key for the speed makes it faster: 250 ms to 50 ms.
+#ifdef BUSHD_KEYPAD_SWITCH
+#define BUSHD_KEYPAD_UNIT_NS UINT32_C(100000)
+#define BUSHD_KEYPAD_FIRST 2500
+#define BUSHD_KEYPAD_CHANGE (-500)
+#define BUSHD_KEYPAD_LAST 500
+#else
 #define BUSHD_KEYPAD_UNIT_NS UINT32_C(10000)
-#define BUSHD_KEYPAD_FIRST 300u
-#define BUSHD_KEYPAD_SLOWER 30u
-#define BUSHD_KEYPAD_SLOWEST 3000u
+#define BUSHD_KEYPAD_FIRST 300
+#define BUSHD_KEYPAD_CHANGE 30
+#define BUSHD_KEYPAD_LAST 3000
+#endif
 #define BUSHD_KEYPAD_BAUD 625u
 // A key that is held is repeated more often than that.
 #define BUSHD_KEYPAD_RELEASE_NS UINT32_C(500000000)
 
 typedef struct bushd_mcu_keypad {
   int8_t direction;            // of the key that counts, +1 or -1; 0: none does
-  uint8_t slower : 7;          // by so many amounts
+  uint8_t slower : 7;          // so many changes
   bool waits_for_release : 1;  // a key may be held that was pressed for what was set before
   uint16_t heard;    // when a tick was prepared first with the direction, in low bits of uptime
   uint8_t left : 3;  // characters of the display still to be sent

@@ -12,8 +12,9 @@ constexpr int kKeys = 4;
 constexpr int kFirstDigit = 1;
 constexpr int kFirstSegment = 2;
 
-// As a data sheet of such a display draws them: a at the top, clockwise to f, g in the middle.
-constexpr std::array<std::pair<std::uint8_t, char>, 12> kCharacters{{{0b0111111, '0'},
+// As a data sheet of such a display draws them: a at the top, clockwise to f, g in the middle. A Z
+// looks like a 2.
+constexpr std::array<std::pair<std::uint8_t, char>, 13> kCharacters{{{0b0111111, '0'},
                                                                      {0b0000110, '1'},
                                                                      {0b1011011, '2'},
                                                                      {0b1001111, '3'},
@@ -23,6 +24,7 @@ constexpr std::array<std::pair<std::uint8_t, char>, 12> kCharacters{{{0b0111111,
                                                                      {0b0000111, '7'},
                                                                      {0b1111111, '8'},
                                                                      {0b1101111, '9'},
+                                                                     {0b1110001, 'F'},
                                                                      {0b1000000, '-'},
                                                                      {0, ' '}}};
 

@@ -16,7 +16,8 @@ class AvrKeypad {
   // Throws std::runtime_error if the image cannot be read. It boots at time 0.
   explicit AvrKeypad(const std::string& image);
 
-  // In the order of the source: forward, reverse, slower, stop; bit n is key n. From now on.
+  // In the order of the source: forward, reverse, slower, stop; bit n is key n. Of the other node,
+  // bit 0 is the switch and bit 1 the speed key. From now on.
   void hold(std::uint8_t keys);
   // What it has sent: when the stop bit ends, and the byte.
   std::function<void(TimeNs end_ns, std::uint8_t byte)> on_byte;

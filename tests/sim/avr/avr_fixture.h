@@ -15,9 +15,11 @@ class AvrAlone : public McuAlone {
   static constexpr TimeNs kBootNs = 250'000'000;
 
   // `boots`: boot number of the boot before.
-  explicit AvrAlone(std::uint32_t baud = kBaud, std::uint16_t boots = 6) : McuAlone(baud, kBootNs) {
+  explicit AvrAlone(std::uint32_t baud = kBaud, std::uint16_t boots = 6,
+                    const std::string& kind = "-")
+      : McuAlone(baud, kBootNs) {
     AvrOptions options;
-    options.image = AVR_IMAGES "-" + std::to_string(baud) + ".elf";
+    options.image = AVR_IMAGES + kind + std::to_string(baud) + ".elf";
     options.address = kAddress;
     options.memory_owners = AVR_MEMORY_OWNERS;
     options.boots = boots;

@@ -3,6 +3,7 @@
 // here: BUSHD_KEYPAD_TRACE names the file.
 //
 //   tick NS               of the motor's MCU
+//   delays NS NS N        of a step: the first, what "slower" adds to it, and how many there are
 //   key NS BYTE           a byte of the keypad has ended at the motor's MCU
 //   break NS              a framing error has ended there
 //   silent NS             a key that is to be repeated has been released
@@ -23,10 +24,19 @@ constexpr std::uint8_t kMotor = 3;
 constexpr TimeNs kByteNs = 16'000'000;
 constexpr TimeNs kMs = 1'000'000;
 enum Key : std::uint8_t { kForward = 1, kReverse = 2, kSlower = 4, kStop = 8 };
+constexpr const char* kZ = "   2";
+
+struct Kind {
+  const char* node;
+  const char* motor;
+  const char* delays;
+};
+constexpr Kind kFourKeys{KEYPAD_IMAGE, "-", "3000000 300000 91"};
+constexpr Kind kSwitchAndKey{KEYPAD_SWITCH_IMAGE, "-switch-", "250000000 -50000000 5"};
 
 class KeypadPair : public AvrAlone {
  protected:
-  KeypadPair() {
+  explicit KeypadPair(const Kind& kind = kFourKeys) : AvrAlone(kBaud, 6, kind.motor), kind_(kind) {
     pass(kBootNs);
     if (const char* path = std::getenv("BUSHD_KEYPAD_TRACE")) {
       out_.open(path, std::ios::app);
@@ -50,9 +60,9 @@ class KeypadPair : public AvrAlone {
     }
     reboot();
     recorder_.edges.clear();
-    out_ << "tick " << kTickNs << '\n';
+    out_ << "tick " << kTickNs << "\ndelays " << kind_.delays << '\n';
     node_0_ns_ = bus_.now_ns();
-    node_ = std::make_unique<AvrKeypad>(KEYPAD_IMAGE);
+    node_ = std::make_unique<AvrKeypad>(kind_.node);
     node_->on_byte = [this](TimeNs end_ns, std::uint8_t byte) {
       if (plugged_) to_motor_.push_back({node_0_ns_ + end_ns, byte});
     };
@@ -129,6 +139,7 @@ class KeypadPair : public AvrAlone {
     EXPECT_EQ(avr_->overruns(), 0u);
   }
 
+  const Kind kind_;
   struct Byte {
     TimeNs end_ns;
     std::uint8_t byte;
@@ -145,14 +156,21 @@ class KeypadPair : public AvrAlone {
 TEST_F(KeypadPair, MovesTheMotorAsInTheDocument) {
   ASSERT_NO_FATAL_FAILURE(set_up(0));
   EXPECT_EQ(node_->shown(), "    ");
-  press(kForward, 500);
+  press(kForward, 300);
+  EXPECT_EQ(node_->shown(), kZ);
+  run(300);
   EXPECT_EQ(node_->shown(), "0300");
   press(kSlower, 500);
   EXPECT_EQ(node_->shown(), "0330");
   press(kSlower, 500);
   EXPECT_EQ(node_->shown(), "0360");
-  press(kReverse, 500);
+  press(kReverse, 300);
+  EXPECT_EQ(node_->shown(), "   F");
+  run(300);
+  EXPECT_EQ(node_->shown(), "0360");
   press(kStop, 300);
+  EXPECT_EQ(node_->shown(), "----");
+  run(300);
   EXPECT_EQ(node_->shown(), "0360");
   EXPECT_EQ(bytes_, 5);
   const std::size_t made = steps();
@@ -223,7 +241,7 @@ TEST_F(KeypadPair, ShowsThatALimitForbidsIt) {
   bushd_set_inputs inputs{};
   inputs.limit_positive = 1 << kMotor;
   ASSERT_NO_FATAL_FAILURE(set_up(0, inputs));
-  press(kForward, 400);
+  press(kForward, 700);
   EXPECT_EQ(node_->shown(), "0300");
   avr_->set_inputs({1 << kMotor, 0});
   run(300);
@@ -232,12 +250,99 @@ TEST_F(KeypadPair, ShowsThatALimitForbidsIt) {
   press(kForward, 300);
   EXPECT_EQ(steps(), made);
   EXPECT_EQ(node_->shown(), "----");
-  press(kReverse, 300);
+  press(kReverse, 700);
   EXPECT_GT(steps(), made + 20);
   EXPECT_EQ(node_->shown(), "0300");
   press(kStop, 300);
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.moving, 0);
+}
+
+// What the MCU refuses is never shown as if it had been taken.
+TEST_F(KeypadPair, ShowsNoWordForAKeyThatIsRefused) {
+  bushd_set_inputs inputs{};
+  inputs.limit_positive = 1 << kMotor;
+  ASSERT_NO_FATAL_FAILURE(set_up(0, inputs));
+  avr_->set_inputs({1 << kMotor, 0});
+  node_->hold(kForward);
+  for (int i = 0; i < 60; ++i) {
+    run(10);
+    EXPECT_NE(node_->shown(), kZ);
+    if (i == 5) node_->hold(0);
+  }
+  EXPECT_EQ(node_->shown(), "----");
+}
+
+// The document's other keypad, with the delays that belong to it.
+class KeypadSwitchPair : public KeypadPair {
+ protected:
+  static constexpr std::uint8_t kSwitch = 1;
+  static constexpr std::uint8_t kSpeed = 2;
+
+  KeypadSwitchPair() : KeypadPair(kSwitchAndKey) {}
+
+  void turn_switch(int ms) {
+    switched_ ^= kSwitch;
+    hold(switched_, ms);
+  }
+  void press_speed(int key_ms, int ms) {
+    hold(switched_ | kSpeed, key_ms);
+    hold(switched_, ms - key_ms);
+  }
+
+ private:
+  std::uint8_t switched_ = 0;
+};
+
+TEST_F(KeypadSwitchPair, MovesTheMotorAsInTheDocument) {
+  ASSERT_NO_FATAL_FAILURE(set_up(0));
+  run(500);
+  EXPECT_EQ(bytes_, 0) << "power alone moves nothing";
+  press_speed(60, 300);
+  EXPECT_EQ(node_->shown(), kZ);
+  run(1'000);
+  EXPECT_EQ(node_->shown(), "2500");
+  for (const char* delay : {"2000", "1500", "1000", "0500", "2500"}) {
+    press_speed(60, 2'000);
+    EXPECT_EQ(node_->shown(), delay);
+  }
+  turn_switch(300);
+  EXPECT_EQ(node_->shown(), "   F");
+  run(1'700);
+  EXPECT_EQ(node_->shown(), "2500");
+  turn_switch(2'000);
+  press_speed(1'200, 1'300);
+  EXPECT_EQ(node_->shown(), "----") << "held for a second: it stops";
+  run(700);
+  EXPECT_EQ(node_->shown(), "2500");
+  const std::size_t made = steps();
+  EXPECT_GT(made, 80u);
+  run(1'000);
+  EXPECT_EQ(steps(), made);
+  press_speed(60, 1'500);
+  EXPECT_GT(steps(), made + 2);
+  pull_cable();
+  run(500);
+  end();
+}
+
+TEST(KeypadSwitchNode, SendsNothingUntilSomebodyTouchesIt) {
+  for (std::uint8_t held = 0; held < 4; ++held) {
+    AvrKeypad node(KEYPAD_SWITCH_IMAGE);
+    std::vector<int> bytes;
+    node.on_byte = [&](TimeNs, std::uint8_t byte) { bytes.push_back(byte); };
+    node.hold(held);
+    node.advance(1'500 * kMs);
+    EXPECT_TRUE(bytes.empty()) << int{held};
+    node.hold(held & 1);
+    node.advance(2'000 * kMs);
+    EXPECT_TRUE(bytes.empty()) << int{held} << ": a key that was stuck is none";
+    node.hold(held ^ 1);
+    node.advance(2'250 * kMs);
+    ASSERT_FALSE(bytes.empty());
+    EXPECT_EQ(bytes.front(), (held & 1) == 0 ? 0xFF : 0x00);
+    EXPECT_EQ(bytes.size(), 3u) << "repeated every 100 ms";
+  }
 }
 
 }  // namespace
