@@ -17,7 +17,8 @@ class Statements(unittest.TestCase):
         rows = dict(re.findall(r"^\| (S\d+) \| .* \| (.*) \|$", (SOURCE / "docs/camac.md").read_text(), re.MULTILINE))
         self.assertEqual(list(rows), [f"S{number}" for number in range(1, 35)])
         tests = set()
-        sources = [*(SOURCE / "tests").glob("*/**/*camac*.cpp"), *(SOURCE / "tests/heritage/camac").glob("*.cpp")]
+        folder = SOURCE / "tests"
+        sources = [*folder.glob("*/**/*camac*.cpp"), *(folder / "heritage/camac").glob("*.cpp"), *folder.glob("*/**/commutator_test.cpp")]
         for source in sources:
             tests |= {f"{suite}.{name}" for suite, name in re.findall(r"^TEST(?:_[FP])?\((\w+), (\w+)\)", source.read_text(), re.MULTILINE)}
         for statement, cell in rows.items():

@@ -208,7 +208,7 @@ TEST_F(CommutatorRandomStreams, AreTakenAsTheModelTakesThem) {
       // The same byte or change before a step here, and after it there, would be no difference that
       // anybody could call one.
       const TimeNs due_ns = model.board.next_event_ns();
-      if (until_ns <= due_ns + kLateNs && until_ns + 1'000 >= due_ns) until_ns += 2 * kLateNs;
+      if (until_ns + 1'000 >= due_ns && until_ns <= due_ns + kLateNs) until_ns += 2 * kLateNs;
       now_ns = until_ns;
       for (const std::uint8_t byte : board.advance(now_ns)) answers.push_back(byte);
       for (const std::uint8_t byte : model.advance(now_ns)) foretold.push_back(byte);
@@ -219,7 +219,7 @@ TEST_F(CommutatorRandomStreams, AreTakenAsTheModelTakesThem) {
         // One at a time: when it ends is what must not be close to a step.
         const TimeNs due_ns = model.board.next_event_ns();
         const TimeNs end_ns = now_ns + byte_ns;
-        if (end_ns <= due_ns + kLateNs && end_ns + 1'000 >= due_ns) go_on(now_ns + 2 * kLateNs);
+        if (end_ns + 1'000 >= due_ns && end_ns <= due_ns + kLateNs) go_on(now_ns + 2 * kLateNs);
         board.send(now_ns, {&byte, 1});
         model.send(now_ns, {&byte, 1});
         now_ns += byte_ns;
@@ -263,7 +263,7 @@ TEST(CommutatorImage, IsDrivenByTheExchangeOfTheDaemon) {
     std::array<std::int64_t, BoardMotors::kMotors> counted{};
     Random random(start_hz, 0);
     TimeNs before_ns = 0;
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 30; ++i) {
       const auto motor = static_cast<unsigned>(random.below(BoardMotors::kMotors));
       const bool left = random.one_in(2);
       const auto delay_ns = static_cast<std::uint64_t>(random.between(1, 30)) * exchange.unit_ns();

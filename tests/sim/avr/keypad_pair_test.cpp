@@ -332,13 +332,13 @@ TEST(KeypadSwitchNode, SendsNothingUntilSomebodyTouchesIt) {
     std::vector<int> bytes;
     node.on_byte = [&](TimeNs, std::uint8_t byte) { bytes.push_back(byte); };
     node.hold(held);
-    node.advance(1'500 * kMs);
+    node.advance(1'100 * kMs);
     EXPECT_TRUE(bytes.empty()) << int{held};
     node.hold(held & 1);
-    node.advance(2'000 * kMs);
+    node.advance(1'200 * kMs);
     EXPECT_TRUE(bytes.empty()) << int{held} << ": a key that was stuck is none";
     node.hold(held ^ 1);
-    node.advance(2'250 * kMs);
+    node.advance(1'450 * kMs);
     ASSERT_FALSE(bytes.empty());
     EXPECT_EQ(bytes.front(), (held & 1) == 0 ? 0xFF : 0x00);
     EXPECT_EQ(bytes.size(), 3u) << "repeated every 100 ms";
