@@ -285,6 +285,15 @@ class Flash(unittest.TestCase):
         self.assertEqual(ran.returncode, 1)
         self.assertIn("there are 500000", ran.stderr)
 
+    def test_flashes_the_image_for_another_keypad(self):
+        (self.firmware / "bushd-atmega2560-switch-500000.hex").write_text("")
+        self.assertEqual(self.flash("atmega2560", "500000", "--keypad-switch").returncode, 0)
+        self.assertIn("/bushd-atmega2560-switch-500000.hex:i", (self.prefix / "called").read_text())
+        ran = self.flash("atmega2560", "1000000", "--keypad-switch")
+        self.assertIn("there is no image of atmega2560 for a keypad with a direction switch and 1000000 baud; there are 500000\n", ran.stderr)
+        # The others are no baud rates of it.
+        self.assertIn("there are 500000\n", self.flash("atmega2560", "250000").stderr)
+
     def test_runs_nothing_when_asked_for_the_commands_only(self):
         ran = self.flash("atmega2560", "500000", "--dry-run")
         self.assertIn("avrdude -p m2560", ran.stdout)
