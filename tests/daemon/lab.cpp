@@ -480,7 +480,7 @@ std::int64_t Lab::shaft_steps(const std::string& name) const {
       if (config_.mcus[m].bus == mcu.bus) ++in_bus;
     }
     const SimulatedBus& bus = buses_[mcu.bus.value];
-    if (bus.board) return bus.board->board.position(motor.output.value);
+    if (bus.board) return bus.board->motors().position(motor.output.value);
     return bus.bus->mcu(in_bus).shaft(motor.output.value).position_steps;
   }
   throw std::out_of_range(name);

@@ -169,7 +169,14 @@ class Lab : public daemon::Outputs, private state::Backend {
   link::PulseStatus pulse_driver = {.any_rate = true, .empty = true};
   // Their drivers pass nothing on, and say so, until this ends; of all buses, or of this one.
   void stall_pulses(bool stalled, std::optional<std::size_t> bus = {});
-  sim::CommutatorBoard& board(std::size_t index) { return buses_[index].board->board; }
+  // The model of a board, of a bus that has one.
+  sim::CommutatorBoard& board(std::size_t index) {
+    return dynamic_cast<sim::BoardLine&>(*buses_[index].board).board;
+  }
+  // Another kind of board is in its place from now on. Its time goes on from the lab's.
+  void replace_board(std::size_t index, std::unique_ptr<sim::BoardEnd> board) {
+    buses_[index].board = std::move(board);
+  }
   std::int64_t now_us() const { return now_ns_ / 1000; }
   const std::vector<std::string>& move_lines() const { return move_lines_; }
   // Which tables a restarted daemon is to have, as asked to keep last.
@@ -184,7 +191,7 @@ class Lab : public daemon::Outputs, private state::Backend {
     bool stalled = false;
     std::vector<std::uint8_t> received;
     bool plugged = true;
-    std::unique_ptr<sim::BoardLine> board = {};
+    std::unique_ptr<sim::BoardEnd> board = {};
   };
   class Client;
   void send(BusId bus, std::span<const std::uint8_t> bytes) override;

@@ -89,8 +89,12 @@ void AvrNode::drive(char port, std::uint8_t mask, std::uint8_t levels) {
   avr_ioctl(avr_, AVR_IOCTL_IOPORT_SET_EXTERNAL(static_cast<unsigned>(port)), &external);
   for (int bit = 0; bit < 8; ++bit) {
     if ((mask >> bit & 1) == 0) continue;
-    avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), bit),
-                  levels >> bit & 1);
+    const std::uint32_t level = levels >> bit & 1;
+    avr_irq_t* const pin =
+        avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), bit);
+    // After a reset the register has lost a level of which simavr thinks that it is told already.
+    pin->value = level ^ 1;
+    avr_raise_irq(pin, level);
   }
 }
 

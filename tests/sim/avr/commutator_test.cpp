@@ -135,6 +135,7 @@ TEST(CommutatorImage, KeepsItsPhasesWhenItHangs) {
   image.send({0, 0x86, 10});
   image.pass(kMs);
   EXPECT_EQ(image.board.motors().position(6), -1);
+  EXPECT_EQ(image.answers.back(), kDone);
 }
 
 // Bytes, inputs and pauses at random: to both boards the same.
