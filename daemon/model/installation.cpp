@@ -175,6 +175,7 @@ link::LineRun Mcu::line_run(const motion::LineShare& share, bushd_delay shortest
   // What really begins has its table there. A dry run may ask before: this is where it would be.
   const auto bank = offers.line_runs->bank_of(on_bus_, share.table->view());
   return {.bank = bank.value_or(BUSHD_SCRATCH_BANK),
+          .elementary = share.elementary != nullptr,
           .shortest_delay = shortest_delay,
           .longest = share.longest,
           .from = share.from,

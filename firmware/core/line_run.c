@@ -1,5 +1,6 @@
 // LINE_RUN and LINE_TRIGGER. One run for all motors of the line, made step by step; every motor is
-// asked which of its own steps fall into these (engine/line_follower.h). All MCUs of the line have
+// asked which of its own steps fall into these (engine/line_follower.h), or each step of the run is
+// that of one motor (engine/elementary.h). All MCUs of the line have
 // the same run, begun at the same tick, and changed at the same ticks by the same rules: so the
 // motors of all of them are on the line without a word between them.
 //
@@ -59,6 +60,15 @@ static bool is_taken(const bushd_mcu* mcu) {
   return mcu->line.motors != 0 || (mcu->line.waits && mcu->trigger.armed != 0);
 }
 
+#if BUSHD_ELEMENTARY
+bool bushd_mcu_makes_elementary(const bushd_mcu* mcu) {
+  const uint16_t disabled = mcu->config.disabled_capabilities;
+  return !mcu->config.no_elementary && (disabled & BUSHD_CAN_LINE_RUN) == 0;
+}
+
+static bool is_elementary(const bushd_mcu* mcu) { return mcu->line.elementary.sum != 0; }
+#endif
+
 bool bushd_mcu_place_on_line(bushd_mcu* mcu) {
   uint16_t* const unplaced = &mcu->line.unplaced;
   // The place of one that has left it is another's.
@@ -82,6 +92,19 @@ static void place_all(bushd_mcu* mcu) {
 }
 
 // The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
+#if BUSHD_ELEMENTARY
+static void lay_elementary(bushd_mcu* mcu, const bushd_line_part* part) {
+  bushd_elementary* line = &mcu->line.elementary;
+  bushd_elementary_clear(line);
+  if (!part->elementary) return;
+  const uint8_t* at = part->entries;
+  for (uint8_t i = 0; i < part->count; ++i) {
+    const bushd_line_entry entry = bushd_next_line_entry(&at);
+    bushd_elementary_add(line, entry.motor, entry.increment);
+  }
+}
+#endif
+
 static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
   bushd_run_start(&mcu->line.run, bushd_mcu_checked_table(mcu, part->bank), part->steps, 1,
                   part->shortest_delay);
@@ -90,6 +113,9 @@ static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, u
   mcu->line.longest = part->longest;
   mcu->line.step = part->from + 1u;
   mcu->line.last = part->from + part->steps;
+#if BUSHD_ELEMENTARY
+  lay_elementary(mcu, part);
+#endif
   const uint8_t* at = part->entries;
   for (uint8_t i = 0; i < part->count; ++i) {
     const bushd_line_entry entry = bushd_next_line_entry(&at);
@@ -115,6 +141,9 @@ bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* messa
                                       motors_of(part)};
   bushd_status status = bushd_mcu_check_tick_range(mcu, &range);
   if (status != BUSHD_OK) return status;
+#if BUSHD_ELEMENTARY
+  if (part->elementary && !bushd_mcu_makes_elementary(mcu)) return BUSHD_E_FORMAT;
+#endif
   bool barred;
   status = check_entries(mcu, message, &barred);
   if (status == BUSHD_OK)
@@ -138,6 +167,9 @@ bool bushd_mcu_begin_line(bushd_mcu* mcu, const bushd_line_run* message, uint16_
 }
 
 static bushd_status check_waiting(const bushd_mcu* mcu, const bushd_line_part* part) {
+#if BUSHD_ELEMENTARY
+  if (part->elementary && !bushd_mcu_makes_elementary(mcu)) return BUSHD_E_FORMAT;
+#endif
   const uint8_t* at = part->entries;
   for (uint8_t i = 0; i < part->count; ++i) {
     const bushd_line_entry entry = bushd_next_line_entry(&at);
@@ -199,6 +231,36 @@ __attribute__((noinline)) static void follow(bushd_mcu* mcu, bushd_slot_buffer* 
   slot_buffer->active |= active;
 }
 
+#if BUSHD_ELEMENTARY
+// The same, where each step of the run that ends is a step of one motor. One that has left the line
+// makes none of those that are its own.
+static void follow_elementary(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors,
+                              const bushd_run_spans* spans) {
+  const uint16_t keep_slots = bushd_mcu_steps_keep_slots(mcu) ? UINT16_MAX : 0;
+  const uint8_t ended = (uint8_t)(spans->count - (spans->parts < 256u ? 1u : 0u));
+  for (uint8_t i = 0; i < ended; ++i) {
+    const uint8_t m = bushd_elementary_step(&mcu->line.elementary);
+    const uint16_t bit = motor_bit(m) & motors;
+    if (bit == 0) continue;
+    spans->masks[bushd_run_span_slot(spans, i, UINT8_MAX)] |= bit & keep_slots;
+    slot_buffer->active |= bit;
+    const int16_t steps = slot_buffer->steps[m];
+    slot_buffer->steps[m] = (int16_t)(mcu->motor[m].on_line.direction < 0 ? steps - 1 : steps + 1);
+  }
+}
+#endif
+
+static void follow_by_law(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors,
+                          const bushd_run_spans* spans) {
+#if BUSHD_ELEMENTARY
+  if (is_elementary(mcu)) {
+    follow_elementary(mcu, slot_buffer, motors, spans);
+    return;
+  }
+#endif
+  follow(mcu, slot_buffer, motors, spans);
+}
+
 // Before its first step in the tick. Returns those that go forward.
 static uint16_t begin_tick(bushd_mcu_motor* motor, int16_t* steps, uint16_t motors) {
   uint16_t forward = 0;
@@ -229,7 +291,7 @@ __attribute__((noinline)) static void emit_tick(bushd_mcu* mcu, bushd_slot_buffe
   bushd_run_walk walk;
   bushd_run_spans spans;
   bushd_run_walk_begin(&walk, run, tick, &spans, mcu->line.step, slot_buffer->step);
-  while (bushd_run_walk_next(&walk, run, &spans)) follow(mcu, slot_buffer, motors, &spans);
+  while (bushd_run_walk_next(&walk, run, &spans)) follow_by_law(mcu, slot_buffer, motors, &spans);
   mcu->line.step = spans.step;
 }
 
@@ -257,9 +319,19 @@ uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu) {
   return concerned;
 }
 
+static uint32_t due_step(const bushd_mcu* mcu, uint8_t m) {
+#if BUSHD_ELEMENTARY
+  const bushd_elementary* line = &mcu->line.elementary;
+  if (is_elementary(mcu)) {
+    if (line->coordinate[m].made == line->coordinate[m].increment) return UINT32_MAX;
+    return bushd_elementary_due(line, m);
+  }
+#endif
+  return mcu->motor[m].on_line.follower.due_step;
+}
+
 static bool has_steps_left(const bushd_mcu* mcu, uint8_t m) {
-  return !bushd_run_done(&mcu->line.run) &&
-         mcu->motor[m].on_line.follower.due_step <= mcu->line.last;
+  return !bushd_run_done(&mcu->line.run) && due_step(mcu, m) <= mcu->line.last;
 }
 
 uint16_t bushd_mcu_line_delay(const bushd_mcu* mcu, uint8_t m) {
@@ -285,14 +357,22 @@ static void note_speed(bushd_mcu* mcu, bushd_mcu_motor* motor) {
   motor->still_ticks = 0;
 }
 
+static uint8_t fraction_of(const bushd_mcu* mcu, uint8_t m) {
+  const uint8_t parts = mcu->line.run.fraction;
+#if BUSHD_ELEMENTARY
+  if (is_elementary(mcu)) return bushd_elementary_fraction(&mcu->line.elementary, m, parts);
+#endif
+  return bushd_line_follower_fraction(&mcu->motor[m].on_line.follower, mcu->line.longest,
+                                      mcu->line.step, parts);
+}
+
 void bushd_mcu_leave_line(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   mcu->line.motors &= (uint16_t)~motor_bit(m);
   motor->remainder = 0;
   // It comes to rest on a whole step.
   if (mcu->format != BUSHD_FORMAT_FINE || !has_steps_left(mcu, m)) return;
-  const uint8_t fraction = bushd_line_follower_fraction(&motor->on_line.follower, mcu->line.longest,
-                                                        mcu->line.step, mcu->line.run.fraction);
+  const uint8_t fraction = fraction_of(mcu, m);
   motor->remainder = motor->on_line.direction < 0 ? (int16_t)-fraction : (int16_t)fraction;
   note_speed(mcu, motor);
 }

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "engine/elementary.h"
 #include "engine/message.h"
 #include "engine/run.h"
 #include "firmware/core/slot_buffer.h"
@@ -22,12 +23,19 @@ typedef struct bushd_mcu_line {
   uint32_t step;  // of the line, that is under way, counted from 1
   uint32_t last;  // and where the run ends
   bushd_run run;
+#if BUSHD_ELEMENTARY
+  bushd_elementary elementary;  // by motors; of a line by the other law its sum is 0
+#endif
 } bushd_mcu_line;
 
 bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message);
 // The same, but for what ticks and epochs ask of a master's frame: of a program, whose motors rest.
 // `motors` are those of its entries. False: another line is under way, or it would take too long.
 bool bushd_mcu_begin_line(bushd_mcu* mcu, const bushd_line_run* message, uint16_t motors);
+#if BUSHD_ELEMENTARY
+// Whether it makes lines by engine/elementary.h.
+bool bushd_mcu_makes_elementary(const bushd_mcu* mcu);
+#endif
 // Whether lines can go by the table in this bank, so fast.
 bushd_status bushd_mcu_check_line_table(const bushd_mcu* mcu, uint8_t bank,
                                         uint16_t shortest_delay);

@@ -49,6 +49,7 @@ typedef struct bushd_mcu_config {
   bool keypad : 1;          // it has a line for one (keypad.h)
   bool keeps_programs : 1;  // what nvm.h lists, a program too, outlives its resets
   bool no_slow_runs : 1;    // although the engine has them (BUSHD_SLOW_RUNS)
+  bool no_elementary : 1;   // lines by that law, although the engine has it (BUSHD_ELEMENTARY)
   int16_t* queue;           // queue_ticks x motors displacements
   // 32 .. 16384, a power of two: then absolute tick numbers wrap without a seam.
   uint16_t queue_ticks;

@@ -80,6 +80,7 @@ static bushd_status check_kinds(const bushd_mcu* mcu, const bushd_program* progr
     const bushd_program_frame frame = bushd_next_program_frame(program, &at);
     const bool line = bushd_program_is_line(frame.kind);
     if (line && (disabled & BUSHD_CAN_LINE_RUN) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
+    if (frame.elementary && !bushd_mcu_makes_elementary(mcu)) return BUSHD_E_FORMAT;
     const bool pulse = frame.kind == BUSHD_PROGRAM_PULSE;
     if (pulse && (disabled & BUSHD_CAN_POSITION_COMPARE) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
     const bool waits = frame.kind == BUSHD_PROGRAM_WAIT_INPUT;

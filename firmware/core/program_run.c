@@ -115,16 +115,23 @@ static bool begin_line(bushd_mcu* mcu, const int32_t* way) {
   line.line.bank = p->frame.bank;
   line.line.shortest_delay = p->frame.shortest_delay;
   bushd_line_entry entries[BUSHD_MOTORS_PER_MCU];
+  uint64_t sum = 0;
   uint8_t count = 0;
   uint16_t moving = 0;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if (way[m] == 0) continue;
     const bushd_line_entry entry = {m, way[m] < 0 ? -1 : 1, length_of(way[m])};
     if (entry.increment > line.line.longest) line.line.longest = entry.increment;
+    sum += entry.increment;
     entries[count++] = entry;
     moving |= motor_bit(m);
   }
   if (count == 0) return true;
+  line.line.elementary = p->frame.elementary;
+  if (line.line.elementary) {
+    if (sum > INT32_MAX) return false;
+    line.line.longest = (uint32_t)sum;
+  }
   line.line.steps = line.line.longest;
   line.first_tick = mcu->tick + 1u;
   uint8_t payload[BUSHD_LINE_RUN_HEADER + BUSHD_MOTORS_PER_MCU * BUSHD_LINE_RUN_ENTRY];

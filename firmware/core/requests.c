@@ -38,6 +38,8 @@ static uint32_t capabilities_of(const bushd_mcu* mcu) {
   if (mcu->config.keypad) all |= BUSHD_CAN_KEYPAD;
   if (mcu->config.scratch != NULL) all |= BUSHD_CAN_SCRATCH;
   if (BUSHD_SLOW_RUNS && !mcu->config.no_slow_runs) all |= BUSHD_CAN_SLOW_RUNS;
+  const bool lines = (mcu->config.disabled_capabilities & BUSHD_CAN_LINE_RUN) == 0;
+  if (BUSHD_ELEMENTARY && lines && !mcu->config.no_elementary) all |= BUSHD_CAN_ELEMENTARY;
 #if BUSHD_PROGRAMS
   if (mcu->config.program != NULL) all |= BUSHD_CAN_PROGRAM;
 #endif

@@ -4,6 +4,7 @@
 
 #define HEAD_MOTOR 0x0Fu
 #define HEAD_POSITIVE 0x80u
+#define BANK_ELEMENTARY 0x80u
 
 static bushd_line_entry get_entry(reader* r, bool* in_range) {
   const uint8_t head = get8(r);
@@ -16,6 +17,9 @@ static bushd_line_entry get_entry(reader* r, bool* in_range) {
 // All that is left: motors rise, and none makes more steps than the longest.
 static void get_entries(reader* r, bushd_line_part* line, bool* in_range) {
   line->entries = r->at;
+#if BUSHD_ELEMENTARY
+  uint64_t sum = 0;
+#endif
   uint16_t mask = 0;
   for (line->count = 0; r->at != r->end; ++line->count) {
     const bushd_line_entry entry = get_entry(r, in_range);
@@ -23,8 +27,14 @@ static void get_entries(reader* r, bushd_line_part* line, bool* in_range) {
     const uint16_t bit = (uint16_t)(1u << entry.motor);
     if (mask >= bit || entry.increment == 0 || entry.increment > line->longest) *in_range = false;
     mask |= bit;
+#if BUSHD_ELEMENTARY
+    sum += entry.increment;
+#endif
   }
   if (line->count == 0) *in_range = false;
+#if BUSHD_ELEMENTARY
+  if (line->elementary && (line->from != 0 || sum != line->longest)) *in_range = false;
+#endif
 }
 
 bushd_line_entry bushd_next_line_entry(const uint8_t** at) {
@@ -37,7 +47,11 @@ bushd_line_entry bushd_next_line_entry(const uint8_t** at) {
 
 static void put_line(writer* w, const bushd_line_part* line, const bushd_line_entry* entries,
                      uint8_t count) {
+#if BUSHD_ELEMENTARY
+  put8(w, (uint8_t)(line->bank | (line->elementary ? BANK_ELEMENTARY : 0u)));
+#else
   put8(w, line->bank);
+#endif
   put16(w, line->shortest_delay);
   put32(w, line->longest);
   put32(w, line->from);
@@ -51,6 +65,10 @@ static void put_line(writer* w, const bushd_line_part* line, const bushd_line_en
 // To the payload's end.
 static bushd_status get_line(reader* r, bushd_line_part* line, bool in_range) {
   line->bank = get8(r);
+#if BUSHD_ELEMENTARY
+  line->elementary = (line->bank & BANK_ELEMENTARY) != 0;
+  line->bank = (uint8_t)(line->bank & ~BANK_ELEMENTARY);
+#endif
   line->shortest_delay = get16(r);
   line->longest = get32(r);
   line->from = get32(r);

@@ -1,11 +1,13 @@
-// LINE_RUN, LINE_TRIGGER: motors that follow one run along a straight line (engine/line.h,
-// engine/message.h).
+// LINE_RUN, LINE_TRIGGER: motors that follow one run along a straight line, by the law of
+// engine/line.h or of engine/elementary.h (engine/message.h).
 #ifndef BUSHD_ENGINE_MESSAGE_LINE_H
 #define BUSHD_ENGINE_MESSAGE_LINE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
+#include "engine/elementary.h"
 #include "engine/message_motion.h"
 #include "engine/status.h"
 
@@ -16,10 +18,14 @@ extern "C" {
 // A run of a table, and the motors of one MCU that follow it. The others of the line are told the
 // same, but for their own entries.
 typedef struct bushd_line_part {
-  uint8_t bank;             // of the run's table, whosever it is, or BUSHD_SCRATCH_BANK
+  uint8_t bank;  // of the run's table, whosever it is, or BUSHD_SCRATCH_BANK
+#if BUSHD_ELEMENTARY
+  bool elementary;  // by engine/elementary.h: L is the sum of all increments, which are all here,
+                    // and `from` is 0
+#endif
   uint16_t shortest_delay;  // no delay of the run is shorter, time units of that table; 0: none
-  uint32_t longest;         // L, below 2^31
-  uint32_t from;            // steps of the line that are over when the run begins
+  uint32_t longest;  // L, below 2^31
+  uint32_t from;     // steps of the line that are over when the run begins
   uint32_t steps;           // of the run, >= 1, not beyond L
   uint8_t count;            // of entries, >= 1
   const uint8_t* entries;

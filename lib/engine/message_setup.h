@@ -52,6 +52,7 @@ enum {
 #define BUSHD_CAN_OUTPUTS UINT32_C(0x100000)     // levels of its outputs may be chosen
 #define BUSHD_CAN_SLOW_RUNS UINT32_C(0x200000)   // shortest delays and slow delays beyond 16 bits
 #define BUSHD_CAN_PROGRAM UINT32_C(0x400000)     // carries out programs by itself
+#define BUSHD_CAN_ELEMENTARY UINT32_C(0x800000)  // lines by engine/elementary.h
 
 // Only `protocol_version` is decoded of another version, the rest is zero: enough to say which one
 // it is.

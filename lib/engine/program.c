@@ -2,6 +2,8 @@
 
 #include "engine/cursor.h"
 
+#define BANK_ELEMENTARY 0x80u  // as in LINE_RUN
+
 static uint8_t count_of(uint16_t motors) {
   uint8_t count = 0;
   for (; motors != 0; motors = (uint16_t)(motors >> 1)) count = (uint8_t)(count + (motors & 1u));
@@ -22,14 +24,16 @@ static uint8_t entry_size(uint8_t kind) {
 }
 
 static void get_line(reader* r, bushd_program_frame* frame) {
-  frame->bank = get8(r);
+  const uint8_t bank = get8(r);
+  frame->bank = (uint8_t)(bank & ~BANK_ELEMENTARY);
+  frame->elementary = (bank & BANK_ELEMENTARY) != 0;
   frame->shortest_delay = get16(r);
   frame->points = get16(r);
 }
 
 // Its fields as they come; `entries` are skipped.
 static bushd_program_frame get_frame(reader* r) {
-  bushd_program_frame frame = {get8(r), 0, 0, 0, 0, 0, 0, 0, false, 0, NULL};
+  bushd_program_frame frame = {get8(r), 0, 0, 0, false, 0, 0, 0, 0, false, 0, NULL};
   const uint8_t size = entry_size(frame.kind);
   if (size != 0) {
     frame.motors = get16(r);

@@ -79,6 +79,7 @@ typedef struct bushd_program_frame {
   uint16_t motors;
   uint8_t motor_count;
   uint8_t bank;             // of a line
+  bool elementary;          // a line by engine/elementary.h, not by engine/line.h
   uint16_t shortest_delay;  // of a line; of moves each motor has its own
   uint16_t points;          // of a line; 1 of a move
   uint32_t us;              // WAIT; the longest one of WAIT_INPUT, 0: for ever; PULSE

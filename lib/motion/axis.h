@@ -3,7 +3,7 @@
 // another target. A target that the table cannot lead to in one go (too near, or behind) takes a
 // second run, from where the first has come to rest; whoever follows the axis starts it.
 //
-// The run may be that of a line (engine/line.h), by the table of the line. Then every motor of the
+// The run may be that of a line (engine/line.h, engine/elementary.h), by the table of the line. Then every motor of the
 // line has a copy of it, and makes of it what its share says: as long as all copies are started,
 // changed and stopped at the same ticks, the motors stay on the line, and none need know of
 // another. The same is so of a path (motion/path_run.h), whose run they all follow.
@@ -20,6 +20,7 @@
 #include <optional>
 #include <span>
 
+#include "engine/elementary.h"
 #include "engine/line.h"
 #include "engine/message.h"
 #include "engine/run.h"
@@ -55,9 +56,12 @@ struct LineShare {
   std::shared_ptr<RunBlocks> blocks = {};              // of the run of a line, for all its motors
   std::shared_ptr<const PathTrack> track = {};         // of a path, with the motor's place in it
   std::size_t motor = 0;
+  // Of a line by the elementary law, and which of its coordinates the motor is.
+  std::shared_ptr<const bushd_elementary> elementary = {};
+  std::uint8_t coordinate = 0;
   // |N|; of 0 the motor only waits for the others. Of a path as far as that.
   std::uint32_t increment = 0;
-  std::uint32_t longest = 0;  // L; of a path all its steps
+  std::uint32_t longest = 0;  // L, or S; of a path all its steps
   int direction = 1;
   // This run's part of the line, by its steps.
   std::uint32_t from = 0;
@@ -228,6 +232,21 @@ class Axis {
     bool went_down;
   };
   bool on_path() const { return share_ && share_->track != nullptr; }
+  bool is_elementary() const { return share_ && share_->elementary != nullptr; }
+  // In steps of the run from the line's beginning, and of the motor from there, 1/256 step.
+  std::int64_t elementary_256(std::uint64_t run_256) const;
+  static std::uint64_t run_256(const bushd_run& run, std::uint32_t from) {
+    return (std::uint64_t{from} + run.steps_done) * 256 + run.fraction;
+  }
+  void follow_elementary(Place& place, std::size_t ticks, std::int16_t* out,
+                         std::size_t stride) const;
+  // Where this run reaches its last step, and the fraction of it at which it does.
+  struct Crossing {
+    std::uint32_t step;
+    std::int64_t fraction;
+  };
+  Crossing last_crossing(bushd_line line, std::uint32_t made) const;
+  std::int16_t told_by(std::int64_t moved_256) const;
   bool run_over(const Place& place) const;
   std::uint32_t run_steps(const Place& place) const;  // made
   std::uint32_t run_steps_left(const Place& place) const;

@@ -11,8 +11,18 @@
 
 namespace bushd::motion {
 
-Way::Way(std::vector<Motor> motors) : motors_(std::move(motors)) {
-  for (std::size_t i = 0; i < motors_.size(); ++i) longest_ = std::max(longest_, increment(i));
+Way::Way(std::vector<Motor> motors, Law law) : motors_(std::move(motors)) {
+  if (law == Law::kElementary) {
+    bushd_elementary line;
+    bushd_elementary_clear(&line);
+    for (std::size_t i = 0; i < motors_.size(); ++i) {
+      bushd_elementary_add(&line, motors_[i].output, increment(i));
+    }
+    longest_ = line.sum;
+    elementary_ = std::make_shared<const bushd_elementary>(line);
+  } else {
+    for (std::size_t i = 0; i < motors_.size(); ++i) longest_ = std::max(longest_, increment(i));
+  }
   if (longest_ == 0) return;
   table_ = std::make_shared<const tables::Envelope>(parts(), longest_);
   shortest_delay_ = table_->shortest_delay();
@@ -26,7 +36,12 @@ std::uint32_t Way::increment(std::size_t motor) const {
 std::vector<tables::LinePart> Way::parts() const {
   std::vector<tables::LinePart> parts;
   for (std::size_t i = 0; i < motors_.size(); ++i) {
-    parts.push_back({motors_[i].table, increment(i), motors_[i].shortest_delay});
+    tables::LinePart part{motors_[i].table, increment(i), motors_[i].shortest_delay};
+    if (elementary_ && part.increment != 0) {
+      part.apart = bushd_elementary_apart(elementary_.get(), motors_[i].output);
+      part.late = bushd_elementary_late(elementary_.get(), motors_[i].output);
+    }
+    parts.push_back(part);
   }
   return parts;
 }
@@ -52,8 +67,12 @@ double Way::most_steps_per_s(std::size_t motor) const {
 }
 
 std::int64_t Way::position_at(std::size_t motor, std::uint32_t step) const {
-  const auto& [table, from, to, shortest_delay] = motors_[motor];
+  const auto& [table, from, to, shortest_delay, output] = motors_[motor];
   if (longest_ == 0) return from;
+  if (elementary_) {
+    const std::int64_t made = bushd_elementary_made(elementary_.get(), output, step);
+    return to < from ? from - made : from + made;
+  }
   bushd_line line;
   bushd_line_start(&line, increment(motor), longest_);
   bushd_line_go_to(&line, step);
@@ -64,6 +83,8 @@ LineShare Way::share(std::size_t motor, std::uint32_t from, std::uint32_t to) co
   return {.way = number_,
           .table = table_,
           .blocks = blocks_,
+          .elementary = elementary_,
+          .coordinate = motors_[motor].output,
           .increment = increment(motor),
           .longest = longest_,
           .direction = motors_[motor].to < motors_[motor].from ? -1 : 1,
@@ -79,10 +100,13 @@ void Way::set_shortest_delays(std::span<const bushd_delay> shortest_delays) {
 // With a shortest delay that this table's units would need more than 16 bits for they are longer.
 void Way::make_slower(double duration_ns) {
   const double delay_ns = duration_ns / longest_;
+  const std::vector<tables::LinePart> all = parts();
   for (std::size_t i = 0; i < motors_.size(); ++i) {
-    if (increment(i) != longest_) continue;
+    const bool tells_all = elementary_ ? all[i].increment != 0 : all[i].increment == longest_;
+    if (!tells_all) continue;
+    const double own_ns = delay_ns * std::max(all[i].apart, 1u);
     motors_[i].shortest_delay =
-        static_cast<bushd_delay>(std::ceil(delay_ns / motors_[i].table->time_unit_ns));
+        static_cast<bushd_delay>(std::ceil(own_ns / motors_[i].table->time_unit_ns));
     break;
   }
   table_ = std::make_shared<const tables::Envelope>(parts(), longest_);

@@ -22,17 +22,24 @@ class Way {
     std::int64_t from;
     std::int64_t to;  // |to - from| < 2^31
     bushd_delay shortest_delay;
+    std::uint8_t output = 0;  // of its MCU; by the elementary law all are of one
+  };
+  enum class Law {
+    kLeading,    // the motor with most steps leads, others step with it (engine/line.h)
+    kElementary  // one step of one motor at a time (engine/elementary.h)
   };
   Way() = default;
-  // At least one motor.
-  explicit Way(std::vector<Motor> motors);
+  // At least one motor. Precondition of the elementary law: the ways of all are below 2^31 together.
+  explicit Way(std::vector<Motor> motors, Law law = Law::kLeading);
 
   // A number for logs, which its shares have too.
   void set_number(std::uint64_t number) { number_ = number; }
 
   const std::vector<Motor>& motors() const { return motors_; }
   std::uint32_t increment(std::size_t motor) const;
-  // In steps of the motor with most of them; 0: none moves, and all else says nothing.
+  bool is_elementary() const { return elementary_ != nullptr; }
+  // Steps of its runs: those of the motor with most of them, or by the elementary law of all; 0:
+  // none moves, and all else says nothing.
   std::uint32_t longest() const { return longest_; }
   bushd_delay shortest_delay() const { return shortest_delay_; }  // of its runs
   const std::shared_ptr<const tables::Envelope>& table() const { return table_; }
@@ -58,6 +65,7 @@ class Way {
   std::vector<Motor> motors_;
   std::uint64_t number_ = 0;
   std::uint32_t longest_ = 0;
+  std::shared_ptr<const bushd_elementary> elementary_;  // none: by the other law
   std::shared_ptr<const tables::Envelope> table_;
   std::shared_ptr<RunBlocks> blocks_ = std::make_shared<RunBlocks>();
   bushd_delay shortest_delay_ = 0;

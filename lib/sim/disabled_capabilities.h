@@ -20,6 +20,7 @@ inline void disable_capabilities(std::uint32_t capabilities, bushd_mcu_config* c
   if ((capabilities & BUSHD_CAN_SCRATCH) != 0) config->scratch = nullptr;
   if ((capabilities & BUSHD_CAN_PROGRAM) != 0) config->program = nullptr;
   if ((capabilities & BUSHD_CAN_SLOW_RUNS) != 0) config->no_slow_runs = true;
+  if ((capabilities & BUSHD_CAN_ELEMENTARY) != 0) config->no_elementary = true;
 }
 
 }  // namespace bushd::sim

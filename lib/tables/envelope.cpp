@@ -19,8 +19,9 @@ class Scale {
 
   // Rounded up.
   std::uint64_t delay(const LinePart& part, bushd_delay code) const {
-    const Wide own = Wide{part.increment} * code * part.table->time_unit_ns;
-    const Wide unit = Wide{longest_} * unit_ns_;
+    const bool elementary = part.apart != 0;
+    const Wide own = Wide{elementary ? 1 : part.increment} * code * part.table->time_unit_ns;
+    const Wide unit = Wide{elementary ? part.apart : longest_} * unit_ns_;
     return static_cast<std::uint64_t>((own + unit - 1) / unit);
   }
 
@@ -58,7 +59,7 @@ class Term {
         scale_(scale),
         longest_(longest),
         ramp_(decel ? part.table->decel : part.table->accel),
-        late_(decel && part.increment != longest ? 1 : 0) {
+        late_(part.late + (decel && part.increment != longest ? 1u : 0u)) {
     delay_ = scale_.delay(part_, code());
   }
 

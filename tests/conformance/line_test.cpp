@@ -29,7 +29,7 @@ class LineScript : public Script, public testing::WithParamInterface<Target> {
   }
 
   void begin_line(std::uint32_t from = 0, std::uint16_t shortest_delay = 0) {
-    begin({0, shortest_delay, kLongest, from, kLongest - from, 0, nullptr}, kEntries);
+    begin({0, false, shortest_delay, kLongest, from, kLongest - from, 0, nullptr}, kEntries);
   }
   void begin(const bushd_line_part& line, const std::vector<bushd_line_entry>& entries) {
     tell_time();

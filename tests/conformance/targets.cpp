@@ -59,7 +59,7 @@ class Atmega2560 final : public Avr {
             .code_count = 952,
             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_CURRENTS |
                                      BUSHD_CAN_VELOCITY | BUSHD_CAN_SCRATCH | BUSHD_CAN_SLOW_RUNS |
-                                     BUSHD_CAN_PROGRAM};
+                                     BUSHD_CAN_PROGRAM | BUSHD_CAN_ELEMENTARY};
   }
 };
 
@@ -76,7 +76,8 @@ class Atmega1284p final : public Avr {
             .code_count = 1536,
             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN |
                                      BUSHD_CAN_COMMON_DIR | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH |
-                                     BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM,
+                                     BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM |
+                                     BUSHD_CAN_ELEMENTARY,
             .current_motors = 1,
             .velocity_motors = 2};
   }

@@ -46,6 +46,7 @@ const std::vector<Unsupported> kUnsupported = {
     {"MOTOR_INPUTS", BUSHD_CAN_MOTOR_INPUTS, kByCapability,
      "`inputs` of the bus names the modem lines that are switches; no request changes them"},
     {"LINE_RUN", BUSHD_CAN_LINE_RUN, kByCapability, "no tick is common to two ports"},
+    {"LINE_RUN_elementary", BUSHD_CAN_ELEMENTARY, kByCapability, "there is one motor"},
     {"TRAVEL", BUSHD_CAN_TRAVEL, kByCapability, "nothing runs without the daemon"},
     {"PROGRAM", BUSHD_CAN_PROGRAM, kByCapability, "nothing runs without the daemon"},
     {"CURRENTS", BUSHD_CAN_CURRENTS, kByCapability, "there is no chopper"},

@@ -200,7 +200,29 @@ bushd_status line_run_again(const Bytes& payload, Bytes* again) {
   return status;
 }
 
+// By the elementary law the increments are all of the line.
+Bytes any_elementary_line_run() {
+  const auto mask = between<uint16_t>(1, 0xFFFF);
+  Bytes payload = random_bytes(BUSHD_LINE_RUN_HEADER);
+  uint32_t sum = 0;
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((mask >> m & 1) == 0) continue;
+    const auto increment = between<uint32_t>(1, INT32_MAX / BUSHD_MOTORS_PER_MCU);
+    sum += increment;
+    Bytes entry(BUSHD_LINE_RUN_ENTRY);
+    entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 1) << 7);
+    bushd_put_u32(&entry[1], increment);
+    payload.insert(payload.end(), entry.begin(), entry.end());
+  }
+  payload[5] = static_cast<uint8_t>(0x80 | between<uint8_t>(0, 8));
+  bushd_put_u32(&payload[8], sum);
+  bushd_put_u32(&payload[12], 0);
+  bushd_put_u32(&payload[16], between<uint32_t>(1, sum));
+  return payload;
+}
+
 Bytes any_line_run() {
+  if (between(0, 2) == 0) return any_elementary_line_run();
   const auto mask = between<uint16_t>(1, 0xFFFF);
   const auto longest = between<uint32_t>(1, INT32_MAX);
   const auto from = between<uint32_t>(0, longest - 1);
@@ -373,6 +395,29 @@ Kinds motion_kinds() {
        {any_line_run,
         line_run_again,
         {{"no such bank", set8(5, 9)},
+         {"no such bank of the elementary law", set8(5, 0x89)},
+         {"an elementary line with another motor elsewhere",
+          [](Bytes* p) {
+            (*p)[5] |= 0x80;
+            bushd_put_u32(&(*p)[12], 0);
+            bushd_put_u32(&(*p)[16], 1);
+            uint32_t sum = 1;
+            for (size_t at = BUSHD_LINE_RUN_HEADER; at < p->size(); at += BUSHD_LINE_RUN_ENTRY) {
+              bushd_put_u32(&(*p)[at + 1], 100);
+              sum += 100;
+            }
+            bushd_put_u32(&(*p)[8], sum);
+          }},
+         {"a rest of an elementary line",
+          [](Bytes* p) {
+            p->resize(BUSHD_LINE_RUN_HEADER);
+            (*p)[5] = 0x80;
+            bushd_put_u32(&(*p)[8], 9);
+            bushd_put_u32(&(*p)[12], 1);
+            bushd_put_u32(&(*p)[16], 8);
+            const Bytes entry{3, 9, 0, 0, 0};
+            p->insert(p->end(), entry.begin(), entry.end());
+          }},
          {"no way", set32(8, 0)},
          {"too long a way", set32(8, 0x80000000)},
          {"a beginning at the end",

@@ -111,6 +111,7 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
       {"a motor that is not the program's", {1, 4, 0, 9, 0, 0, 0, 0, 0}},
       {"no point", {3, 1, 0, 0, 0, 0, 0, 0}},
       {"a line by a bank that there is not", {3, 1, 0, 9, 0, 0, 1, 0, 1, 0, 0, 0}},
+      {"an elementary line by such a bank", {3, 1, 0, 0x89, 0, 0, 1, 0, 1, 0, 0, 0}},
       {"no wait", {5, 0, 0, 0, 0}},
       {"too long a wait", {5, 1, 0xA4, 0x93, 0xD6}},
       {"input 20", {6, 20, 1, 0, 0, 0, 0}},
@@ -129,6 +130,8 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
   }
   EXPECT_EQ(check(program({3, 1, 0, 8, 0, 0, 1, 0, 1, 0, 0, 0, 0})), BUSHD_OK)
       << "a line by the volatile bank";
+  EXPECT_EQ(check(program({3, 1, 0, 0x88, 0, 0, 1, 0, 1, 0, 0, 0, 0})), BUSHD_OK)
+      << "an elementary one";
   EXPECT_EQ(check(program({5, 0, 0xA4, 0x93, 0xD6, 0})), BUSHD_OK) << "an hour";
   EXPECT_EQ(check(program({7, 0x40, 0x42, 0x0F, 0, 0})), BUSHD_OK) << "a second";
   EXPECT_EQ(check(program({8, 2, 0, 8, 2, 0, 8, 2, 0, 8, 2, 0, 9, 9, 9, 9, 0})), BUSHD_OK)

@@ -61,7 +61,7 @@ TEST(Boot, IdentitySaysWhatThePortGave) {
                 BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES | BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_TRAVEL |
                 BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH |
                 BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS | BUSHD_CAN_SLOW_RUNS |
-                BUSHD_CAN_PROGRAM);
+                BUSHD_CAN_PROGRAM | BUSHD_CAN_ELEMENTARY);
   EXPECT_TRUE(std::ranges::equal(identity.unique_id, Rig::unique_id()));
 }
 

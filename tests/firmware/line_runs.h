@@ -37,6 +37,28 @@ inline std::vector<Wide> times_of(const Reference& run, std::uint32_t increment,
   return times;
 }
 
+// By the elementary law: as many steps of each motor as F has asked for, F = a_k b - b_k a of it
+// and all behind it, in the order of their numbers.
+inline std::vector<std::vector<Wide>> elementary_times_of(const Reference& run,
+                                                          const std::vector<LineMotor>& motors) {
+  std::vector<std::vector<Wide>> times(motors.size());
+  for (std::size_t s = 0; s < run.steps(); ++s) {
+    std::size_t next = 0;
+    for (; next + 1 < motors.size(); ++next) {
+      Wide others = 0;
+      Wide others_made = 0;
+      for (std::size_t i = next + 1; i < motors.size(); ++i) {
+        others += length(motors[i].steps);
+        others_made += static_cast<Wide>(times[i].size());
+      }
+      const Wide own_made = static_cast<Wide>(times[next].size());
+      if (Wide{length(motors[next].steps)} * others_made - others * own_made >= 0) break;
+    }
+    times[next].push_back(run.step(s).end);
+  }
+  return times;
+}
+
 // Lines of an MCU with four motors; the run is of `law`, in bank 0, as are their tables.
 class OfLines : public Streams {
  protected:
@@ -51,6 +73,7 @@ class OfLines : public Streams {
     std::uint16_t shortest_delay = 0;
     std::uint8_t bank = 0;
     std::uint8_t epoch = 0;
+    bool elementary = false;
   };
   static Bytes frame(const Frame& of) {
     std::vector<bushd_line_entry> entries;
@@ -62,6 +85,7 @@ class OfLines : public Streams {
     message.epoch = of.epoch;
     message.first_tick = of.first;
     message.line = {.bank = of.bank,
+                    .elementary = of.elementary,
                     .shortest_delay = of.shortest_delay,
                     .longest = of.longest,
                     .from = of.from,
@@ -83,7 +107,9 @@ class OfLines : public Streams {
                            std::uint32_t late_ns = 0) {
     const std::uint16_t slots = of.options().slots;
     std::vector<std::vector<Wide>> times;
+    if (frame.elementary) times = elementary_times_of(run, frame.motors);
     for (const LineMotor& motor : frame.motors) {
+      if (frame.elementary) break;
       times.push_back(times_of(run, length(motor.steps), frame.longest, frame.from));
     }
     std::vector<std::size_t> made(frame.motors.size());

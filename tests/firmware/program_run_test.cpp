@@ -21,6 +21,10 @@ TEST_P(ProgramRun, EveryEdgeOfAScanIsWhereItsFramesPutIt) {
                                      .motors = {0, 1, 3},
                                      .to = {{100, 40, 7}, {100, 0, -90}, {0, 0, 0}},
                                      .shortest_delay = 30},
+                                    {.kind = Kind::kLineBy,
+                                     .motors = {0, 1, 3},
+                                     .to = {{30, -30, 0}, {-30, 12, -40}, {0, 18, 40}},
+                                     .elementary = true},
                                     {.kind = Kind::kPulse, .us = 5'000},
                                     wait_us(20'000),
                                     {.kind = Kind::kMoveBy, .motors = {1, 2}, .to = {{-9, 200}}},
@@ -36,7 +40,7 @@ TEST_P(ProgramRun, EveryEdgeOfAScanIsWhereItsFramesPutIt) {
   expect_ended(BUSHD_PROGRAM_DONE);
   EXPECT_EQ(made, walk.steps());
   EXPECT_EQ(state().repeats, 3u);
-  EXPECT_EQ(state().frame, 7);
+  EXPECT_EQ(state().frame, 8);
   for (std::uint8_t m = 0; m < 4; ++m) EXPECT_EQ(rig.pulses(m), walk.at[m]);
   ASSERT_EQ(rises.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -53,6 +57,7 @@ ProgramFrame any_frame(std::mt19937& random, bool line) {
   for (std::uint8_t m = 0; m < 4; ++m) {
     if ((mask >> m & 1u) != 0) frame.motors.push_back(m);
   }
+  frame.elementary = line && random() % 2 == 0;
   frame.to.resize(line ? 1 + random() % 4 : 1);
   for (auto& point : frame.to) {
     for (std::size_t i = 0; i < frame.motors.size(); ++i) {

@@ -75,6 +75,15 @@ TEST_P(Program, WhatIsNoProgramIsRefused) {
   EXPECT_EQ(start(rig.first_open()), BUSHD_E_STATE);
 }
 
+TEST_P(Program, AnElementaryLineIsRefusedWhereThatLawIsDenied) {
+  const ProgramText text{
+      .frames = {{.kind = Kind::kLineBy, .motors = {0, 1}, .to = {{9, 5}}, .elementary = true},
+                 kProgramEnd}};
+  EXPECT_EQ(load(text), BUSHD_OK);
+  rig.mutable_mcu()->config.no_elementary = true;
+  EXPECT_EQ(load(text), BUSHD_E_FORMAT);
+}
+
 TEST_P(Program, RunIsRefusedWithItsReason) {
   ProgramText text = endless();
   ASSERT_EQ(load(text), BUSHD_OK);

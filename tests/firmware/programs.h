@@ -36,6 +36,7 @@ struct ProgramFrame {
   std::uint8_t input = 0;
   bool level = true;
   std::uint16_t count = 0;
+  bool elementary = false;  // of a line
 };
 
 struct ProgramText {
@@ -76,7 +77,7 @@ inline Bytes bytes_of(const ProgramText& text) {
       case Kind::kLineBy:
         append(bytes, mask, 2);
         if (line) {
-          bytes.push_back(0);
+          bytes.push_back(frame.elementary ? 0x80 : 0);
           append(bytes, frame.shortest_delay, 2);
           append(bytes, frame.to.size(), 2);
         }
@@ -209,7 +210,25 @@ class ProgramWalk {
     }
     later(ticks);
   }
+  void elementary_line(const ProgramFrame& frame, const std::vector<std::int32_t>& to) {
+    std::vector<LineMotor> motors;
+    std::size_t sum = 0;
+    for (std::size_t i = 0; i < frame.motors.size(); ++i) {
+      const auto way = static_cast<std::int32_t>(way_of(frame, i, to));
+      if (way == 0) continue;
+      motors.push_back({frame.motors[i], way});
+      sum += length(way);
+    }
+    if (sum == 0) return;
+    const auto run = Reference::move(law_, sum, frame.shortest_delay);
+    const auto times = elementary_times_of(run, motors);
+    for (std::size_t i = 0; i < motors.size(); ++i) {
+      for (const Wide after : times[i]) make(motors[i].number, motors[i].steps > 0, after);
+    }
+    later(ticks_of(run));
+  }
   void line(const ProgramFrame& frame, const std::vector<std::int32_t>& to) {
+    if (frame.elementary) return elementary_line(frame, to);
     std::vector<std::int64_t> ways;
     std::int64_t longest = 0;
     for (std::size_t i = 0; i < frame.motors.size(); ++i) {

@@ -66,6 +66,7 @@ void CoreRig::boot() {
                              .keypad = true,
                              .keeps_programs = true,
                              .no_slow_runs = false,  // below
+                             .no_elementary = false,  // below
                              .queue = queue_.data(),
                              .queue_ticks = configuration_.queue_ticks,
                              .min_tick_ns = configuration_.min_tick_ns,

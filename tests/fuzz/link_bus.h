@@ -364,7 +364,8 @@ class Bus {
           .slots = 128,
           .queue_ticks = 64,
           .table_codes = 100,
-          .capabilities = UINT16_MAX | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_PROGRAM,
+          .capabilities = UINT16_MAX | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_PROGRAM |
+                          BUSHD_CAN_ELEMENTARY,
           .unique_id = {awaited_->addresses.front()}};
       return bushd_encode_identity(&identity, payload);
     }

@@ -263,11 +263,14 @@ void decode_lines(Bytes payload) {
     BUSHD_REQUIRE(line.bank <= BUSHD_SCRATCH_BANK && line.longest <= INT32_MAX && line.steps >= 1);
     BUSHD_REQUIRE(line.from <= line.longest && line.steps <= line.longest - line.from);
     const std::uint8_t* at = line.entries;
+    std::uint64_t sum = 0;
     for (std::uint8_t i = 0; i < line.count; ++i) {
       entries[i] = bushd_next_line_entry(&at);
+      sum += entries[i].increment;
       BUSHD_REQUIRE(entries[i].increment >= 1 && entries[i].increment <= line.longest);
       BUSHD_REQUIRE(i == 0 || entries[i].motor > entries[i - 1u].motor);
     }
+    BUSHD_REQUIRE(!line.elementary || (line.from == 0 && sum == line.longest));
   };
   bushd_line_run run;
   decoded(payload, &run, bushd_decode_line_run,

@@ -48,7 +48,7 @@ struct Line {
 Line any_line() {
   Line line;
   std::vector<tables::LinePart> parts;
-  const auto longest = between<std::uint32_t>(1, *rc::gen::element<std::uint32_t>(3, 20, 150));
+  auto longest = between<std::uint32_t>(1, *rc::gen::element<std::uint32_t>(3, 20, 150));
   const auto increment = between(0, 2) == 0 ? longest : between<std::uint32_t>(0, longest);
   Law first = any_law();
   for (const std::uint32_t steps : {longest, increment}) {
@@ -56,6 +56,22 @@ Line any_line() {
     law.unit_ns = first.unit_ns;
     line.tables.push_back(std::make_unique<TestTable>(law, true));
     parts.push_back({line.tables.back()->view(), steps});
+  }
+  const bool elementary = between(0, 1) == 0;
+  bushd_elementary printed;
+  bushd_elementary_clear(&printed);
+  const auto coordinate = between<std::uint8_t>(0, 15);
+  if (elementary) {
+    const std::uint8_t other = coordinate < 15 ? std::uint8_t{15} : std::uint8_t{2};
+    bushd_elementary_add(&printed, other, longest);
+    bushd_elementary_add(&printed, coordinate, increment);
+    longest = printed.sum;
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (parts[i].increment == 0) continue;
+      const std::uint8_t of = i == 0 ? other : coordinate;
+      parts[i].apart = bushd_elementary_apart(&printed, of);
+      parts[i].late = bushd_elementary_late(&printed, of);
+    }
   }
   line.envelope = std::make_shared<const tables::Envelope>(parts, longest);
   line.tick_ns = test::any_tick_ns(line.law());
@@ -72,6 +88,9 @@ Line any_line() {
   }
   line.share = {.table = line.envelope,
                 .blocks = std::make_shared<RunBlocks>(),
+                .elementary = elementary ? std::make_shared<const bushd_elementary>(printed)
+                                         : std::shared_ptr<const bushd_elementary>(),
+                .coordinate = coordinate,
                 .increment = increment,
                 .longest = longest,
                 .direction = between(0, 1) == 0 ? 1 : -1,
@@ -89,7 +108,25 @@ Tick run_begin(const Line& line, Tick start) {
   return start + (stands ? 1 : 0);
 }
 
+// Of two coordinates with F = a_k b - b_k a, step by step (tests/engine/elementary_test.cpp), of
+// this motor: after each elementary step.
+std::vector<std::int64_t> printed_steps(const LineShare& share) {
+  const bool is_alpha = share.coordinate < 15;
+  const std::int64_t own = share.increment;
+  const std::int64_t other = std::int64_t{share.longest} - own;
+  std::vector<std::int64_t> made{0};
+  std::int64_t others_made = 0;
+  while (made.size() <= share.longest) {
+    const std::int64_t f = own * others_made - other * made.back();
+    const bool steps = own != 0 && (is_alpha ? f >= 0 : f > 0);
+    if (!steps) ++others_made;
+    made.push_back(made.back() + (steps ? 1 : 0));
+  }
+  return made;
+}
+
 std::int64_t made_at(const LineShare& share, std::uint32_t step) {
+  if (share.elementary) return printed_steps(share)[step];
   bushd_line line;
   bushd_line_start(&line, share.increment, share.longest);
   bushd_line_go_to(&line, step);
@@ -101,6 +138,17 @@ std::int64_t place_at(const Line& line, std::int64_t run_256, std::int64_t rest_
   const Wide n = line.share.increment;
   const Wide l = line.share.longest;
   const Wide x = Wide{line.share.from} * 256 + run_256;
+  if (line.share.elementary) {
+    const std::vector<std::int64_t> made = printed_steps(line.share);
+    const auto s = static_cast<std::size_t>(x / 256);
+    const auto [before, after] = std::ranges::equal_range(made, made[s]);
+    const Wide since = x - 256 * (made[s] == 0 ? 0 : before - made.begin());
+    const Wide apart = after - before;
+    const std::int64_t place =
+        made[s] * 256 + (after == made.end() ? 0 : static_cast<std::int64_t>(since / apart));
+    const std::int64_t told = std::min(place, rest_256);
+    return line.format == BUSHD_FORMAT_FINE ? told : told / 256 * 256;
+  }
   const Wide ruled = (2 * n * x + 256 * (l - n)) / (2 * l);
   const Wide rising = 2 * n * x / l;
   const auto place = static_cast<std::int64_t>(std::min<Wide>({ruled, rising, Wide{rest_256}}));

@@ -6,7 +6,8 @@ namespace {
 
 constexpr std::uint32_t kAll =
     // Those that one can be without.
-    ((UINT32_C(2) * BUSHD_CAN_SCRATCH) - 1) | BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM;
+    ((UINT32_C(2) * BUSHD_CAN_SCRATCH) - 1) | BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM |
+    BUSHD_CAN_ELEMENTARY;
 
 class DisabledCapability : public McuAlone, public testing::WithParamInterface<std::uint32_t> {
  protected:
@@ -29,13 +30,17 @@ std::vector<std::uint32_t> every_one_none_and_all() {
   for (std::uint32_t bit = 1; bit <= BUSHD_CAN_SCRATCH; bit *= 2) disabled.push_back(bit);
   disabled.push_back(BUSHD_CAN_SLOW_RUNS);
   disabled.push_back(BUSHD_CAN_PROGRAM);
+  disabled.push_back(BUSHD_CAN_ELEMENTARY);
   return disabled;
 }
 INSTANTIATE_TEST_SUITE_P(Of, DisabledCapability, testing::ValuesIn(every_one_none_and_all()),
                          testing::PrintToStringParamName());
 
 TEST_P(DisabledCapability, IsTheOnlyOneThatIsNotInTheIdentity) {
-  EXPECT_EQ(capabilities(), (kAll & ~GetParam()) | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS);
+  // It is one of lines.
+  const bool no_lines = (GetParam() & BUSHD_CAN_LINE_RUN) != 0;
+  const std::uint32_t without = GetParam() | (no_lines ? BUSHD_CAN_ELEMENTARY : 0);
+  EXPECT_EQ(capabilities(), (kAll & ~without) | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS);
 }
 
 // The one that a port has or has not. Messages of the others are those of the core, whose tests

@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "engine/elementary.h"
 #include "engine/table.h"
 #include "engine/tables.h"
 
@@ -116,6 +117,80 @@ TEST(Envelope, NoMotorStepsFasterThanItsOwnTable) {
       }
     }
   });
+}
+
+// Motors of a line by the elementary law, and of each the steps of the run that are its own.
+struct ElementaryLine {
+  Line line;
+  std::vector<std::vector<std::size_t>> steps;
+};
+
+ElementaryLine any_elementary_line() {
+  ElementaryLine of{.line = any_line(), .steps = {}};
+  bushd_elementary printed;
+  bushd_elementary_clear(&printed);
+  for (std::size_t i = 0; i < of.line.parts.size(); ++i) {
+    bushd_elementary_add(&printed, static_cast<std::uint8_t>(i), of.line.parts[i].increment);
+  }
+  of.line.longest = printed.sum;
+  of.steps.resize(of.line.parts.size());
+  for (std::size_t i = 0; i < of.line.parts.size(); ++i) {
+    if (of.line.parts[i].increment == 0) continue;
+    of.line.parts[i].apart = bushd_elementary_apart(&printed, static_cast<std::uint8_t>(i));
+    of.line.parts[i].late = bushd_elementary_late(&printed, static_cast<std::uint8_t>(i));
+  }
+  for (std::size_t s = 1; s <= of.line.longest; ++s) {
+    of.steps[bushd_elementary_step(&printed)].push_back(s);
+  }
+  return of;
+}
+
+void judge_elementary(const LinePart& part, const std::vector<std::size_t>& steps,
+                      const std::vector<Wide>& delays, std::uint32_t unit_ns) {
+  std::vector<Wide> end{0};
+  for (const Wide delay : delays) end.push_back(end.back() + delay);
+  std::vector<Wide> times;
+  for (const std::size_t s : steps) {
+    if (s < end.size()) times.push_back(end[s]);
+  }
+  const auto made = static_cast<std::uint32_t>(times.size());
+  for (std::uint32_t j = 2; j <= made; ++j) {
+    const Wide allowed =
+        std::max<bushd_delay>(bushd_table_delay(part.table, j, made), part.shortest_delay);
+    RC_ASSERT((times[j - 1] - times[j - 2]) * unit_ns >= allowed * part.table->time_unit_ns);
+  }
+}
+
+TEST(Envelope, OfTheElementaryLawLetsNoMotorStepFasterThanItsOwnTable) {
+  holds("intervals of every motor, with and without a stop", [] {
+    const ElementaryLine of = any_elementary_line();
+    const Envelope envelope(of.line.parts, of.line.longest);
+    const bushd_table& table = envelope.view();
+    RC_ASSERT(bushd_table_check(&table, nullptr, nullptr) == BUSHD_OK);
+    const auto shortest_delay = static_cast<std::uint16_t>(envelope.shortest_delay());
+    const std::vector<Wide> whole = delays_of(table, of.line.longest, shortest_delay);
+    for (int stops = 0; stops < 8; ++stops) {
+      std::vector<Wide> delays = whole;
+      if (stops > 0) {
+        stop_at(delays, between<std::size_t>(0, delays.size() - 1), table, shortest_delay);
+      }
+      for (std::size_t i = 0; i < of.line.parts.size(); ++i) {
+        judge_elementary(of.line.parts[i], of.steps[i], delays, table.time_unit_ns);
+      }
+    }
+  });
+}
+
+// Two equal ways: each step of the run may be half as long as a motor's own.
+TEST(Envelope, OfTheElementaryLawHasTheDelaysOfElementarySteps) {
+  const TestTable table(
+      {.accel = {200, 100, 50}, .decel = {200, 100, 50}, .cruise = 50, .unit_ns = 1000}, false);
+  const std::vector<LinePart> parts{{table.view(), 1000, 0, 2, 0}, {table.view(), 1000, 0, 2, 0}};
+  const Envelope envelope(parts, 2000);
+  EXPECT_EQ(envelope.view().cruise, 25);
+  EXPECT_EQ(envelope.view().accel.code[0], 100);
+  EXPECT_EQ(envelope.view().accel.code[1], 100);
+  EXPECT_EQ(envelope.view().accel.code[2], 50);
 }
 
 TEST(Envelope, OfEqualMotorsAndWaysIsTheirTable) {

@@ -123,6 +123,9 @@ FRAMES = [
     # The rest of one after a pause, with a shortest delay.
     (1, 27, "line_run", {"epoch": 255, "first_tick": 4294967295, "bank": 7, "shortest_delay": 513, "longest": 2147483647,
                          "from": 2147483640, "steps": 7, "entries": [[15, -1, 1]]}),
+    # By the elementary law, which is bit 7 of the bank.
+    (1, 45, "line_run", {"epoch": 5, "first_tick": 2000, "bank": 131, "shortest_delay": 0, "longest": 911, "from": 0, "steps": 911,
+                         "entries": [[0, 1, 700], [2, -1, 211]]}),
     (1, 28, "line_trigger", {"number": 1, "edge": 2, "delay_us": 50, "bank": 3, "shortest_delay": 0, "longest": 700, "from": 0,
                              "steps": 700, "entries": [[0, 1, 700], [2, -1, 211]]}),
     (1, 29, "line_trigger", {"number": 255, "edge": 1, "delay_us": 1650000, "bank": 7, "shortest_delay": 513,

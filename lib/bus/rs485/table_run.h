@@ -19,6 +19,7 @@ struct TableRun {
 // line (engine/message_line.h).
 struct LineRun {
   std::uint8_t bank;           // of the run's table
+  bool elementary;             // by engine/elementary.h, not by engine/line.h
   bushd_delay shortest_delay;  // a code (engine/table.h)
   std::uint32_t longest;
   std::uint32_t from;
@@ -33,6 +34,7 @@ using McuRun = std::variant<TableRun, LineRun>;
 // What the motors of an MCU have in common of a line's run.
 inline bushd_line_part line_part_of(const LineRun& run) {
   return {.bank = run.bank,
+          .elementary = run.elementary,
           .shortest_delay = static_cast<std::uint16_t>(run.shortest_delay),
           .longest = run.longest,
           .from = run.from,

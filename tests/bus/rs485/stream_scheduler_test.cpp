@@ -342,6 +342,7 @@ class LineRuns : public Scheduling {
  protected:
   static link::LineRun part(std::uint32_t increment, int direction) {
     return {.bank = 3,
+            .elementary = false,
             .shortest_delay = 9,
             .longest = 700,
             .from = 100,
