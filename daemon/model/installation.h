@@ -123,6 +123,7 @@ class Mcu {
   bool makes_lines() const {
     return offers.line_runs != nullptr && offers.line_runs->makes_lines(on_bus_);
   }
+  bool makes_elementary_lines() const { return makes_lines() && can(BUSHD_CAN_ELEMENTARY); }
   bool keeps_up_with(const bushd_table& table, bushd_delay shortest_delay, bool alone) const {
     return offers.line_runs != nullptr &&
            offers.line_runs->keeps_up_with(on_bus_, table, shortest_delay, alone);

@@ -121,6 +121,12 @@ Result<ComingPaths::Incoming> ComingPaths::begin_points(const api::Asker& asker,
     incoming.low.push_back({0, begin.back()});
     incoming.high.push_back({0, begin.back()});
   }
+  if (request.feed) {
+    auto feed =
+        Feed::make(installation_, incoming.motors, *request.feed, motion::Way::Law::kLeading);
+    if (!feed) return fail(feed.error());
+    incoming.feed = std::move(*feed);
+  }
   const auto corners = request.corners == api::MovePath::Corners::kExact
                            ? motion::Path::Corners::kExact
                            : motion::Path::Corners::kContinuous;
@@ -164,17 +170,42 @@ Result<void> ComingPaths::add_points(Incoming& incoming, const api::MovePath& re
       if (*steps < incoming.low[m].steps) incoming.low[m] = {row, *steps};
       if (*steps > incoming.high[m].steps) incoming.high[m] = {row, *steps};
     }
+    shortest_delays.clear();
     if (!request.speeds.empty()) {
       auto shortest_delay = shortest_delay_to(incoming, point.front(), request.speeds[at]);
       if (!shortest_delay)
         return fail(fmt::format("point {}, {}", row, shortest_delay.error().text()));
       shortest_delays.assign(1, *shortest_delay);
     }
+    if (auto may = add_feed(incoming, point, shortest_delays); !may) {
+      return fail(fmt::format("point {}, {}", row, may.error().text()));
+    }
     path.add(point, shortest_delays);
   }
   if (path.steps() <= static_cast<std::uint64_t>(motion::Motor::kMaxPosition)) return {};
   return fail(fmt::format("the path has more than {} steps; make several paths of it",
                           motion::Motor::kMaxPosition));
+}
+
+Result<void> ComingPaths::add_feed(const Incoming& incoming, std::span<const std::int64_t> point,
+                                   std::vector<bushd_delay>& shortest_delays) const {
+  if (!incoming.feed) return {};
+  const motion::Path& path = *incoming.along.path;
+  std::vector<std::int64_t> before;
+  for (std::size_t m = 0; m < point.size(); ++m) {
+    before.push_back(path.point(path.segments(), m));
+  }
+  const double way_ns = incoming.feed->way_ns(before, point);
+  if (shortest_delays.empty()) shortest_delays = incoming.shortest_delays;
+  for (std::size_t m = 0; m < point.size(); ++m) {
+    const auto steps = static_cast<double>(std::abs(point[m] - before[m]));
+    if (steps == 0) continue;
+    const double step_ns = way_ns / steps;
+    if (auto may = incoming.feed->is_possible(step_ns); !may) return may;
+    const auto units = motion::Way::units_of(step_ns, path.motors()[m].table->time_unit_ns);
+    shortest_delays[m] = std::max(shortest_delays[m], units);
+  }
+  return {};
 }
 
 // The shortest delay on the way to a point of a motor with speeds.

@@ -6,11 +6,13 @@
 #include <list>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "daemon/model/interlocks.h"
 #include "daemon/model/precedence.h"
+#include "daemon/services/feed.h"
 #include "daemon/services/line.h"
 #include "daemon/services/moves.h"
 #include "daemon/services/open_moves.h"
@@ -57,6 +59,7 @@ class ComingPaths {
     std::uint64_t after_stops = 0;       // as Asker::after_stops, of the part asked for first
     std::int32_t rows = 0;
     int direction = 0;  // of a motor with speeds
+    std::optional<Feed> feed{};
   };
   // A path that is not planned yet.
   struct Coming {
@@ -73,6 +76,10 @@ class ComingPaths {
   Result<void> same_scales(const Incoming& incoming) const;
   Result<void> add_points(Incoming& incoming, const api::MovePath& request) const;
   Result<bushd_delay> shortest_delay_to(Incoming& incoming, std::int64_t point, double speed) const;
+  // Each motor's part of the feed on the way to the next point, unless it is to be slower. Error:
+  // slower than any delay.
+  Result<void> add_feed(const Incoming& incoming, std::span<const std::int64_t> point,
+                        std::vector<bushd_delay>& shortest_delays) const;
   Result<void> may_follow(const Incoming& incoming) const;
   Result<void> may_begin(const Incoming& incoming) const;
   Result<void> is_short_enough(const Incoming& incoming) const;

@@ -134,8 +134,9 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
   outputs_.move_log(json_text(line));
 }
 
-std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>& motors) {
-  nlohmann::json line = {{"event", "line"}, {"way", ++last_id_}, {"longest", longest}};
+std::uint64_t Journal::line_laid(const motion::Way& way, const std::vector<OnWay>& motors) {
+  nlohmann::json line = {{"event", "line"}, {"way", ++last_id_}, {"longest", way.longest()}};
+  if (way.is_elementary()) line["law"] = "elementary";
   for (const auto& [id, increment, shortest_delay, table] : motors) {
     tell_table(id, *table);
     line["motors"].push_back({{"motor", installation_[id].name()},
@@ -143,6 +144,9 @@ std::uint64_t Journal::line_laid(std::uint32_t longest, const std::vector<OnWay>
                               {"shortest_delay", shortest_delay},
                               {"table_file", table->path()},
                               {"table_sha256", table->content_hash()}});
+    if (way.is_elementary()) {
+      line["motors"].back()["output"] = installation_[id].output().value;
+    }
   }
   outputs_.move_log(json_text(line));
   return last_id_;

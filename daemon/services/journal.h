@@ -11,6 +11,7 @@
 #include "base/by_id.h"
 #include "daemon/model/outputs.h"
 #include "daemon/model/service.h"
+#include "motion/way.h"
 
 namespace bushd::daemon {
 
@@ -27,7 +28,7 @@ class Journal final : public Service {
     bushd_delay shortest_delay;
     tables::TablePtr table;
   };
-  std::uint64_t line_laid(std::uint32_t longest, const std::vector<OnWay>& motors);
+  std::uint64_t line_laid(const motion::Way& way, const std::vector<OnWay>& motors);
   std::uint64_t path_laid(const std::vector<MotorId>& motors, const motion::Path& path);
   // A trajectory in the log, and how many of its rows are there.
   struct LoggedTrajectory {

@@ -12,6 +12,7 @@
 #include "base/ids.h"
 #include "base/units/coordinates.h"
 #include "bus/rs485/line_pace.h"
+#include "daemon/services/feed.h"
 #include "motion/path.h"
 #include "motion/way.h"
 #include "tables/table.h"
@@ -39,7 +40,9 @@ struct Straight {
   };
   std::vector<Point> points{};  // the one that the way leads to, and those to come
   motion::Way way{};
-  tables::TablePtr by{};                   // what its one motor goes by, in place of its own table
+  tables::TablePtr by{};  // what its one motor goes by, in place of its own table
+  motion::Way::Law law = motion::Way::Law::kLeading;
+  std::optional<Feed> feed{};              // not to be exceeded on any of its ways
   std::shared_ptr<link::LinePace> pace{};  // of the run under way, where ports make it
   std::optional<Triggered> trigger{};
 

@@ -68,4 +68,24 @@ Result<void> on_one_bus(const Installation& installation, const std::vector<Moto
   return {};
 }
 
+Result<void> may_be_elementary(const Installation& installation,
+                               const std::vector<MotorId>& motors) {
+  const Mcu& mcu = installation.mcu_of(motors.front());
+  const auto elsewhere = std::ranges::find_if(
+      motors, [&](MotorId motor) { return installation.mcu_of(motor).id != mcu.id; });
+  if (elsewhere != motors.end()) {
+    return fail(fmt::format(
+        "{} is connected to MCU {} and {} to {}: by the elementary law one MCU makes each step of "
+        "the line; name motors of one MCU, or ask for the leading law",
+        installation[motors.front()].name(), mcu.name(), installation[*elsewhere].name(),
+        installation.mcu_of(*elsewhere).name()));
+  }
+  if (mcu.makes_elementary_lines()) return {};
+  return fail(
+      fmt::format("MCU {} makes no lines by the elementary law by itself: its firmware does not, "
+                  "or the bus has "
+                  "frames = \"ticks\"; ask for the leading law",
+                  mcu.name()));
+}
+
 }  // namespace bushd::daemon

@@ -16,4 +16,8 @@ Result<void> may_be_one_line(const Installation& installation, const std::vector
 // On one bus that has ticks: paths, too.
 Result<void> on_one_bus(const Installation& installation, const std::vector<MotorId>& motors);
 
+// On one MCU, which makes lines by the elementary law by itself.
+Result<void> may_be_elementary(const Installation& installation,
+                               const std::vector<MotorId>& motors);
+
 }  // namespace bushd::daemon

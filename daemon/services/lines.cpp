@@ -66,15 +66,15 @@ void Lines::plan_only(std::int64_t now_us, const api::Asker& asker, const Line& 
   std::vector<DryRun::Part> parts;
   std::vector<motion::Way> ways{straight.way};
   for (std::size_t p = 1; p < straight.points.size(); ++p) {
-    ways.push_back(lay(line.motors, straight.by, straight.points[p - 1].steps, straight.points[p]));
+    ways.push_back(lay(line.motors, straight, straight.points[p - 1].steps, straight.points[p]));
   }
   const bool by_mcus =
       straight.way.longest() != 0 && (in_mcus(0, line) || table_to_upload(line, false));
   // The ways of one motor stand together.
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     for (const motion::Way& one : ways) {
-      const auto& [table, from, to, shortest_delay] = one.motors()[i];
-      DryRun::Part part{line.motors[i], to - from, one.shortest_delay(), from};
+      const std::int64_t from = one.motors()[i].from;
+      DryRun::Part part{line.motors[i], one.motors()[i].to - from, one.shortest_delay(), from};
       if (one.longest() != 0) part.line = one.share(i, 0, one.longest());
       if (part.line) part.line->in_mcus = by_mcus;
       parts.push_back(std::move(part));
@@ -116,7 +116,7 @@ void Lines::log(Line& line) {
                         .shortest_delay = way.motors()[i].shortest_delay,
                         .table = table_of(line.motors[i], straight.by)});
     }
-    way.set_number(journal_.line_laid(way.longest(), motors));
+    way.set_number(journal_.line_laid(way, motors));
   };
   std::visit(Overloaded{path_laid, way_laid}, line.course);
 }
@@ -182,20 +182,18 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     pace = std::make_shared<link::LinePace>(static_cast<unsigned>(motors.size()), ahead_ns);
     straight->pace = pace;
   }
-  const bool by_mcus = pace || in_mcus(number, line);
   const bool anew = begins_anew(number, line);
+  const bool by_mcus =
+      pace || (in_mcus(number, line) && may_be_in_mcus(number, line, indices, anew));
   const std::map<BusId, motion::Tick> start = starts_of(now_us, line, motors, by_mcus);
   for (const std::size_t i : indices) {
     motion::Motor& motor = installation_[line.motors[i]];
-    const auto* before = motor.as<motion::OnLine>();
-    const bool same_way =
-        before != nullptr && before->line == number && line.is_of(*motor.axis().line());
     motion::OnLine on_line;
     on_line.line = number;
     on_line.target_steps = line.end_of(i);
     on_line.to_point = to == line.target;
     on_line.last_run = line.legs() == 1 && to == line.target;
-    const std::uint32_t from = same_way ? place_of(line.motors[i], anew) : 0;
+    const std::uint32_t from = from_of(number, line, i, anew);
     motion::LineShare share = line.share(i, from, to);
     share.line = number;
     share.in_mcus = by_mcus;
@@ -204,6 +202,27 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                      straight == nullptr ? 0 : straight->way.shortest_delay());
   }
   moves_.begin_on_line(motors, pace);
+}
+
+// Where the run of one of its motors begins, in steps of the line.
+std::uint32_t Lines::from_of(std::uint64_t number, const Line& line, std::size_t i,
+                             bool anew) const {
+  const motion::Motor& motor = installation_[line.motors[i]];
+  const auto* before = motor.as<motion::OnLine>();
+  const bool same_way =
+      before != nullptr && before->line == number && line.is_of(*motor.axis().line());
+  return same_way ? place_of(line.motors[i], anew) : 0;
+}
+
+// An MCU makes lines by the elementary law from their beginning, of all motors: the rest of one
+// that was paused is streamed.
+bool Lines::may_be_in_mcus(std::uint64_t number, const Line& line,
+                           const std::vector<std::size_t>& indices, bool anew) const {
+  const Straight* straight = line.straight();
+  if (straight == nullptr || !straight->way.is_elementary()) return true;
+  return indices.size() == line.motors.size() && std::ranges::all_of(indices, [&](std::size_t i) {
+           return from_of(number, line, i, anew) == 0;
+         });
 }
 
 std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us, const Line& line,
@@ -387,7 +406,7 @@ void Lines::go_on(std::int64_t now_us, std::uint64_t number, Line& line) {
   if (farthest == line.target) points.erase(points.begin());
   std::vector<std::int64_t> from;
   for (const MotorId id : line.motors) from.push_back(installation_[id].position_steps());
-  straight->way = lay(line.motors, straight->by, from, points.front());
+  straight->way = lay(line.motors, *straight, from, points.front());
   line.target = line.longest();
   log(line);
   begin_run(now_us, number, line, all, line.target);
@@ -425,14 +444,21 @@ std::string Lines::deviation(const Line& line) const {
     return share && line.is_of(*share);
   };
   std::vector<std::uint32_t> candidates;
+  std::int64_t elementary = 0;  // steps of all
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     if (!followed(i)) continue;
     candidates.push_back(installation_[line.motors[i]].axis().line_planned_end());
     // Where MCUs have ramped the run down by themselves nobody has planned it.
-    if (straight == nullptr || straight->way.increment(i) != line.longest()) continue;
+    if (straight == nullptr) continue;
     const std::int64_t made =
         std::abs(installation_[line.motors[i]].position_steps() - line.position_at(i, 0));
+    elementary += made;
+    if (straight->way.increment(i) != line.longest()) continue;
     candidates.push_back(static_cast<std::uint32_t>(std::min<std::int64_t>(made, line.longest())));
+  }
+  if (straight != nullptr && straight->way.is_elementary()) {
+    candidates.push_back(
+        static_cast<std::uint32_t>(std::min<std::int64_t>(elementary, line.longest())));
   }
   for (const std::uint32_t step : candidates) {
     std::int64_t most = 0;

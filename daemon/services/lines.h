@@ -88,8 +88,12 @@ class Lines final : public Service {
   tables::TablePtr table_of(MotorId motor, const tables::TablePtr& by) const;
   bushd_delay shortest_delay_by(const tables::TablePtr& by, MotorId motor,
                                 bushd_delay shortest_delay) const;
-  motion::Way lay(const std::vector<MotorId>& motors, const tables::TablePtr& by,
+  // As the line goes: by its law, with its feed.
+  motion::Way lay(const std::vector<MotorId>& motors, const Straight& straight,
                   const std::vector<std::int64_t>& from, const Straight::Point& to) const;
+  Result<void> may_be_laid(const std::vector<MotorId>& motors, const Straight& straight,
+                           const std::vector<std::int64_t>& from) const;
+  static Result<void> is_possible(const motion::Way& way, const std::optional<Feed>& feed);
   Result<void> fits_duration(const Line& line, motion::Way& way,
                              std::optional<double> duration_s) const;
 
@@ -114,6 +118,9 @@ class Lines final : public Service {
   std::optional<WantedTable> table_to_upload(const api::MoveLine& request, bool armed) const;
   std::optional<WantedTable> table_to_upload(const Line& line, bool armed) const;
   bool may_get_tables(const std::vector<MotorId>& motors, bool armed) const;
+  std::uint32_t from_of(std::uint64_t number, const Line& line, std::size_t i, bool anew) const;
+  bool may_be_in_mcus(std::uint64_t number, const Line& line,
+                      const std::vector<std::size_t>& indices, bool anew) const;
   // Begins the run of these of its motors, by place, from where their runs have led to this step.
   void begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
                  const std::vector<std::size_t>& indices, std::uint32_t to);

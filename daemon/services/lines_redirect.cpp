@@ -54,8 +54,10 @@ Result<std::uint32_t> Lines::step_of(const Line& line, const std::vector<MotorId
     const auto from = absolute ? Result<units::Steps>() : motor.reach().distance_from();
     if (!from) return fail(motor.name() + ": " + from.error().message);
     targets[at] = *steps + *from;
-    if (way.increment(at) != way.longest()) continue;
-    step = (targets[at].whole - ways[at].from) * (ways[at].to < ways[at].from ? -1 : 1);
+    if (!way.is_elementary() && way.increment(at) != way.longest()) continue;
+    const std::int64_t made =
+        (targets[at].whole - ways[at].from) * (ways[at].to < ways[at].from ? -1 : 1);
+    step = way.is_elementary() ? step.value_or(0) + made : made;
   }
   const std::uint32_t end = line.target;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
@@ -98,6 +100,18 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   if (straight->points.size() > 1) {
     return refuse("the line ends in a last approach for backlash; " + stop);
   }
+  if (request.law == api::MoveLine::Law::kElementary && !straight->way.is_elementary()) {
+    return refuse("the line under way is not by the elementary law, and a line keeps its law; " +
+                  stop);
+  }
+  std::optional<Feed> feed;
+  if (request.feed) {
+    auto asked = Feed::make(installation_, line.motors, *request.feed, straight->law);
+    if (!asked) return refuse(asked.error().text());
+    if (auto may = asked->is_possible(asked->step_ns(straight->way)); !may)
+      return refuse(may.error().text());
+    feed = std::move(*asked);
+  }
   std::vector<bushd_delay> shortest_delays;
   for (std::size_t i = 0; i < line.motors.size(); ++i) {
     const motion::Motor& motor = installation_[line.motors[i]];
@@ -113,6 +127,8 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
   if (!step) return refuse(step.error().text());
   motion::Way& way = straight->way;
   way.set_shortest_delays(shortest_delays);
+  if (feed) way.slow_down_to(feed->step_ns(way), true);
+  straight->feed = std::move(feed);
   asker.answer(api::Accepted{});
   moves_.take_over(line.motors, asker);
   line.target = *step;

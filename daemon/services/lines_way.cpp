@@ -17,7 +17,15 @@ Result<Line> Lines::line_of(const api::MoveLine& request, const tables::TablePtr
   std::vector<std::int64_t> from;
   for (const MotorId motor : line.motors) from.push_back(installation_[motor].position_steps());
   Straight straight{.points = std::move(*points), .way = {}, .by = by};
-  straight.way = lay(line.motors, by, from, straight.points.front());
+  if (request.law == api::MoveLine::Law::kElementary) straight.law = motion::Way::Law::kElementary;
+  if (request.feed) {
+    auto feed = Feed::make(installation_, line.motors, *request.feed, straight.law);
+    if (!feed) return fail(feed.error());
+    straight.feed = std::move(*feed);
+  }
+  if (const auto may = may_be_laid(line.motors, straight, from); !may) return fail(may.error());
+  straight.way = lay(line.motors, straight, from, straight.points.front());
+  if (const auto may = is_possible(straight.way, straight.feed); !may) return fail(may.error());
   line.target = straight.way.longest();
   if (auto fits = fits_duration(line, straight.way, request.duration_s); !fits) {
     return fail(fits.error());
@@ -78,16 +86,39 @@ bushd_delay Lines::shortest_delay_by(const tables::TablePtr& by, MotorId motor,
   return (shortest_delay * own_ns + unit_ns - 1) / unit_ns;
 }
 
-motion::Way Lines::lay(const std::vector<MotorId>& motors, const tables::TablePtr& by,
+Result<void> Lines::may_be_laid(const std::vector<MotorId>& motors, const Straight& straight,
+                                const std::vector<std::int64_t>& from) const {
+  if (straight.law == motion::Way::Law::kLeading) return {};
+  if (auto may = may_be_elementary(installation_, motors); !may) return may;
+  std::int64_t sum = 0;
+  for (std::size_t i = 0; i < motors.size(); ++i) {
+    sum += std::abs(straight.points.front().steps[i] - from[i]);
+  }
+  if (sum <= motion::Motor::kMaxPosition) return {};
+  return fail(fmt::format(
+      "the ways of all motors together are {} steps; by the elementary law a line has at most {}: "
+      "make several lines of it",
+      sum, motion::Motor::kMaxPosition));
+}
+
+Result<void> Lines::is_possible(const motion::Way& way, const std::optional<Feed>& feed) {
+  if (!feed || way.longest() == 0) return {};
+  return feed->is_possible(feed->step_ns(way));
+}
+
+motion::Way Lines::lay(const std::vector<MotorId>& motors, const Straight& straight,
                        const std::vector<std::int64_t>& from, const Straight::Point& to) const {
   std::vector<motion::Way::Motor> all;
   for (std::size_t i = 0; i < motors.size(); ++i) {
-    all.push_back({.table = &table_of(motors[i], by)->view(),
+    all.push_back({.table = &table_of(motors[i], straight.by)->view(),
                    .from = from[i],
                    .to = to.steps[i],
-                   .shortest_delay = to.shortest_delays[i]});
+                   .shortest_delay = to.shortest_delays[i],
+                   .output = installation_[motors[i]].output().value});
   }
-  return motion::Way(std::move(all));
+  motion::Way way(std::move(all), straight.law);
+  if (straight.feed) way.slow_down_to(straight.feed->step_ns(way));
+  return way;
 }
 
 Result<void> Lines::fits_duration(const Line& line, motion::Way& way,

@@ -66,7 +66,9 @@ bool bushd_mcu_makes_elementary(const bushd_mcu* mcu) {
   return !mcu->config.no_elementary && (disabled & BUSHD_CAN_LINE_RUN) == 0;
 }
 
-static bool is_elementary(const bushd_mcu* mcu) { return mcu->line.elementary.sum != 0; }
+static bool is_elementary(const bushd_mcu* mcu) {
+  return mcu->line.elementary.sum != 0;
+}
 #endif
 
 bool bushd_mcu_place_on_line(bushd_mcu* mcu) {

@@ -48,6 +48,13 @@ inline void speed_fields(auto& speed, auto& visit) {
   visit("speed_in_steps", told.in_steps);
   visit.set(speed, told.per_s == 0 ? std::optional<Speed>{} : told);
 }
+// Along the way of several motors, in the unit that they share.
+inline void feed_fields(auto& feed, auto& visit) {
+  Speed told = feed.value_or(Speed{});
+  visit("feed", told.per_s);
+  visit("feed_in_steps", told.in_steps);
+  visit.set(feed, told.per_s == 0 ? std::optional<Speed>{} : told);
+}
 inline constexpr fields::OneOf<2> kEdge{};  // RISING, FALLING
 inline constexpr fields::NoneIs<double> kNoDuration{0};
 
@@ -76,7 +83,8 @@ struct Move {
 };
 
 // Motors of one bus move along a straight line: at any moment each has made the same share of its
-// way, as nearly as steps allow, and no motor steps faster than its table allows. A motor with
+// way, as nearly as steps allow, and no motor steps faster than its table allows. By the elementary
+// law, of motors of one MCU, one motor makes one step at a time. A motor with
 // backlash that comes from the wrong side makes its last approach, on a line too, when all have
 // arrived. The same motors, while they move, may be given an end of the same line that is nearer,
 // or another speed. Stops, pauses and limits of one of them ramp all down along the line.
@@ -88,6 +96,14 @@ struct MoveLine {
   bool dry_run = false;                // from rest only: result kDone with a MovePlan
   std::optional<Speed> speed{};        // no motor exceeds it; none: as fast as tables allow
   std::optional<double> duration_s{};  // not shorter than this; refused if it cannot be so slow
+  enum class Law {
+    kLeading,    // the motor with most steps leads, and others step with it (engine/line.h)
+    kElementary  // an evaluation function as it is printed (engine/elementary.h)
+  };
+  Law law = Law::kLeading;
+  // Along the way, not to be exceeded; motors with one unit. By the elementary law that of
+  // elementary steps: all motors have the same steps per unit.
+  std::optional<Speed> feed{};
 
   static constexpr std::size_t kMostMotors = 127;
 
@@ -97,6 +113,8 @@ struct MoveLine {
     visit("dry_run", self.dry_run);
     speed_fields(self.speed, visit);
     visit("duration_s", self.duration_s, kNoDuration);
+    visit("law", self.law, fields::OneFrom0<2>{});
+    feed_fields(self.feed, visit);
     names_fields(self, visit);
   }
 };
@@ -123,6 +141,7 @@ struct MovePath {
   Corners corners = Corners::kContinuous;
   bool dry_run = false;          // result kDone with a MovePlan
   std::optional<Speed> speed{};  // no motor exceeds it; none: as fast as tables allow
+  std::optional<Speed> feed{};   // along the way, not to be exceeded; motors with one unit
 
   static constexpr std::int32_t kMostRows = 100'000;
   static constexpr std::size_t kMostValues = 4096;
@@ -134,6 +153,7 @@ struct MovePath {
     visit("corners", self.corners, fields::OneOf<2>{});
     visit("dry_run", self.dry_run);
     speed_fields(self.speed, visit);
+    feed_fields(self.feed, visit);
     names_fields(self, visit);
     visit.list("position_count", "positions", self.positions);
     visit.list("speed_count", "speeds", self.speeds);

@@ -127,6 +127,17 @@ struct OneOf {
   }
 };
 
+// The same, counted from 0: the first one is that of whoever does not know the field.
+template <int kCount>
+struct OneFrom0 {
+  static std::int8_t told(auto value) { return static_cast<std::int8_t>(value); }
+  template <class T>
+  static bool taken(std::int8_t told, T& value) {
+    value = static_cast<T>(told);
+    return told >= 0 && told < kCount;
+  }
+};
+
 // By its word: word(value), and back by `parse`.
 template <class Parse>
 struct Word {

@@ -24,8 +24,8 @@ typedef struct bushd_line_part {
                     // and `from` is 0
 #endif
   uint16_t shortest_delay;  // no delay of the run is shorter, time units of that table; 0: none
-  uint32_t longest;  // L, below 2^31
-  uint32_t from;     // steps of the line that are over when the run begins
+  uint32_t longest;         // L, below 2^31
+  uint32_t from;            // steps of the line that are over when the run begins
   uint32_t steps;           // of the run, >= 1, not beyond L
   uint8_t count;            // of entries, >= 1
   const uint8_t* entries;

@@ -3,10 +3,11 @@
 // another target. A target that the table cannot lead to in one go (too near, or behind) takes a
 // second run, from where the first has come to rest; whoever follows the axis starts it.
 //
-// The run may be that of a line (engine/line.h, engine/elementary.h), by the table of the line. Then every motor of the
-// line has a copy of it, and makes of it what its share says: as long as all copies are started,
-// changed and stopped at the same ticks, the motors stay on the line, and none need know of
-// another. The same is so of a path (motion/path_run.h), whose run they all follow.
+// The run may be that of a line (engine/line.h, engine/elementary.h), by the table of the line.
+// Then every motor of the line has a copy of it, and makes of it what its share says: as long as
+// all copies are started, changed and stopped at the same ticks, the motors stay on the line, and
+// none need know of another. The same is so of a path (motion/path_run.h), whose run they all
+// follow.
 //
 // In place of a run it may follow a trajectory (motion/trajectory.h), which may become longer
 // meanwhile. It ramps down from that by its table when it is stopped, and where the trajectory ends

@@ -98,19 +98,35 @@ void Way::set_shortest_delays(std::span<const bushd_delay> shortest_delays) {
 }
 
 // With a shortest delay that this table's units would need more than 16 bits for they are longer.
-void Way::make_slower(double duration_ns) {
-  const double delay_ns = duration_ns / longest_;
+void Way::make_slower(double step_ns) {
   const std::vector<tables::LinePart> all = parts();
   for (std::size_t i = 0; i < motors_.size(); ++i) {
     const bool tells_all = elementary_ ? all[i].increment != 0 : all[i].increment == longest_;
     if (!tells_all) continue;
-    const double own_ns = delay_ns * std::max(all[i].apart, 1u);
+    const double own_ns = step_ns * std::max(all[i].apart, 1u);
     motors_[i].shortest_delay =
         static_cast<bushd_delay>(std::ceil(own_ns / motors_[i].table->time_unit_ns));
     break;
   }
   table_ = std::make_shared<const tables::Envelope>(parts(), longest_);
   shortest_delay_ = table_->shortest_delay();
+}
+
+// Not one more for the last digit of a quotient.
+bushd_delay Way::units_of(double step_ns, std::uint32_t unit_ns) {
+  return static_cast<bushd_delay>(std::ceil(step_ns / unit_ns * (1 - 1e-12)));
+}
+
+void Way::slow_down_to(double step_ns, bool under_way) {
+  if (longest_ == 0) return;
+  const double asked_ns = std::min<double>(step_ns, BUSHD_LONGEST_DELAY_NS);
+  const bushd_delay units = units_of(asked_ns, table_->view().time_unit_ns);
+  if (units <= shortest_delay_) return;
+  if (under_way || bushd_delay_is_code(units)) {
+    shortest_delay_ = units;
+  } else {
+    make_slower(asked_ns);
+  }
 }
 
 Result<void> Way::take(double duration_s, double longest_ns) {
@@ -133,7 +149,7 @@ Result<void> Way::take(double duration_s, double longest_ns) {
                     duration_s, text_of_most(most_ns * 1e-9)));
   }
   if (wanted_ns > duration_ns(UINT16_MAX)) {
-    make_slower(wanted_ns);
+    make_slower(wanted_ns / longest_);
     return {};
   }
   // The least value by which it is so long: the longer the shortest delay, the longer the line.

@@ -29,7 +29,8 @@ class Way {
     kElementary  // one step of one motor at a time (engine/elementary.h)
   };
   Way() = default;
-  // At least one motor. Precondition of the elementary law: the ways of all are below 2^31 together.
+  // At least one motor. Precondition of the elementary law: the ways of all are below 2^31
+  // together.
   explicit Way(std::vector<Motor> motors, Law law = Law::kLeading);
 
   // A number for logs, which its shares have too.
@@ -54,13 +55,18 @@ class Way {
 
   // Other shortest delays of the motors.
   void set_shortest_delays(std::span<const bushd_delay> shortest_delays);
+  // No step of its runs is shorter than this, at most BUSHD_LONGEST_DELAY_NS. `under_way`: its
+  // table stays as it is.
+  void slow_down_to(double step_ns, bool under_way = false);
+  // A delay in time units, rounded up.
+  static bushd_delay units_of(double step_ns, std::uint32_t unit_ns);
   // Takes at least this long, and not much longer. Errors: more or less than what is possible.
   Result<void> take(double duration_s, double longest_ns);
 
  private:
   std::vector<tables::LinePart> parts() const;
   double duration_ns(bushd_delay shortest_delay) const;
-  void make_slower(double duration_ns);
+  void make_slower(double step_ns);
 
   std::vector<Motor> motors_;
   std::uint64_t number_ = 0;

@@ -76,8 +76,7 @@ class Atmega1284p final : public Avr {
             .code_count = 1536,
             .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_LINE_RUN |
                                      BUSHD_CAN_COMMON_DIR | BUSHD_CAN_KEYPAD | BUSHD_CAN_SCRATCH |
-                                     BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM |
-                                     BUSHD_CAN_ELEMENTARY,
+                                     BUSHD_CAN_SLOW_RUNS | BUSHD_CAN_PROGRAM | BUSHD_CAN_ELEMENTARY,
             .current_motors = 1,
             .velocity_motors = 2};
   }

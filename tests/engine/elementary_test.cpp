@@ -159,8 +159,7 @@ TEST(Elementary, PositionsRiseEvenlyFromStepToStep) {
       RC_ASSERT(bushd_elementary_position(&line, i, s, 0) / 256 ==
                 bushd_elementary_made(&line, i, s));
       for (unsigned fraction = 0; fraction < 256; fraction += 15) {
-        const uint64_t at =
-            bushd_elementary_position(&line, i, s, static_cast<uint8_t>(fraction));
+        const uint64_t at = bushd_elementary_position(&line, i, s, static_cast<uint8_t>(fraction));
         RC_ASSERT(at >= before);
         RC_ASSERT(at / 256 == bushd_elementary_made(&line, i, s));  // none within a step of the run
         before = at;

@@ -188,7 +188,9 @@ void put(const bushd_table_run& m, Fields& f) {
   put_entries(m.entries, m.count, f);
 }
 void put_line(const bushd_line_part& line, Fields& f) {
-  f.add("bank", line.bank | (line.elementary ? 0x80 : 0)).add("shortest_delay", line.shortest_delay).add("longest", line.longest);
+  f.add("bank", line.bank | (line.elementary ? 0x80 : 0))
+      .add("shortest_delay", line.shortest_delay)
+      .add("longest", line.longest);
   f.add("from", line.from).add("steps", line.steps);
   std::string text;
   const uint8_t* at = line.entries;

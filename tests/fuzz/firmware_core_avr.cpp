@@ -27,8 +27,8 @@ class AvrRig final : public CoreRig {
                  .codes = 952,
                  .min_tick_ns = 900'000,
                  .pulse_ns = 2500,
-                 .disabled_capabilities = BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_PROGRAM |
-                                          BUSHD_CAN_ELEMENTARY,
+                 .disabled_capabilities =
+                     BUSHD_CAN_TABLE_TICKS | BUSHD_CAN_PROGRAM | BUSHD_CAN_ELEMENTARY,
                  .in_pieces = true}) {
     host_blank_eeprom();
     host_reset();

@@ -356,17 +356,16 @@ class Bus {
 
   std::size_t fit(std::uint8_t* payload) const {
     if (awaited_->type == BUSHD_MSG_IDENTIFY) {
-      const bushd_identity identity = {
-          .protocol_version = BUSHD_PROTOCOL_VERSION,
-          .motors = kMotors,
-          .firmware_version = 1,
-          .boot_number = kBootNumber,
-          .slots = 128,
-          .queue_ticks = 64,
-          .table_codes = 100,
-          .capabilities = UINT16_MAX | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_PROGRAM |
-                          BUSHD_CAN_ELEMENTARY,
-          .unique_id = {awaited_->addresses.front()}};
+      const bushd_identity identity = {.protocol_version = BUSHD_PROTOCOL_VERSION,
+                                       .motors = kMotors,
+                                       .firmware_version = 1,
+                                       .boot_number = kBootNumber,
+                                       .slots = 128,
+                                       .queue_ticks = 64,
+                                       .table_codes = 100,
+                                       .capabilities = UINT16_MAX | BUSHD_CAN_CLEAR_NAMED |
+                                                       BUSHD_CAN_PROGRAM | BUSHD_CAN_ELEMENTARY,
+                                       .unique_id = {awaited_->addresses.front()}};
       return bushd_encode_identity(&identity, payload);
     }
     if (awaited_->type == BUSHD_MSG_POLL) {

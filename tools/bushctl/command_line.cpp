@@ -93,6 +93,13 @@ Command& Command::choice(const std::string& name, std::string* value,
   return *this;
 }
 
+Command& Command::choice_with(const std::string& with, const std::string& name, std::string* value,
+                              const std::vector<std::string>& allowed, const std::string& text) {
+  choice(name, value, allowed, text);
+  app_->get_option(name)->needs(app_->get_option(with));
+  return *this;
+}
+
 namespace {
 
 // The check of a range lets NaN through: it is neither too small nor too large.

@@ -49,6 +49,9 @@ class Command {
   Command& file(const std::string& name, std::string* value, const std::string& text);
   Command& choice(const std::string& name, std::string* value,
                   const std::vector<std::string>& allowed, const std::string& text);
+  // The same, of what only an option or a flag makes sense of.
+  Command& choice_with(const std::string& with, const std::string& name, std::string* value,
+                       const std::vector<std::string>& allowed, const std::string& text);
   enum class Needed { kNo, kYes };
   template <class Number>
   Command& number(const std::string& name, Number* value, Number least, Number most,

@@ -53,7 +53,7 @@ void add_move(CommandLine& commands) {
     bool json = false;
     bool line = false;
     std::string speed;
-    std::string duration;
+    LineOptions along;
     std::vector<std::string> words;
   };
   const auto options = std::make_shared<Options>();
@@ -74,7 +74,9 @@ void add_move(CommandLine& commands) {
           "the exit code is 0 only if every motor reached "
           "its target.\n"
           "With --line motors of one bus move along a straight line: at any moment each of them "
-          "has made the same share of its way. Stops, pauses and limits of one act on all.\n"
+          "has made the same share of its way. Stops, pauses and limits of one act on all. By the "
+          "elementary law, of motors of one MCU, one motor makes one step at a time, and --feed is "
+          "that of these steps.\n"
           "NAME --to POSITION --speed-at AT:SPEED [--speed-at AT:SPEED...] moves one motor, from "
           "each of these positions on not faster than that, until the next one; it makes no last "
           "approach for backlash.")
@@ -82,8 +84,13 @@ void add_move(CommandLine& commands) {
             "Along a straight line; all motors on one bus, or each at a serial port of its own")
       .flag("--wait", &options->wait, "Wait for the result")
       .option("--speed", &options->speed, kSpeed)
-      .option_with("--line", "--duration", &options->duration,
+      .option_with("--line", "--duration", &options->along.duration,
                    "With --line: take at least so many seconds")
+      .choice_with("--line", "--law", &options->along.law, kLaws,
+                   "With --line: the motor with most steps leads, or one motor steps at a time")
+      .option_with("--line", "--feed", &options->along.feed,
+                   "With --line: not faster along the way than this, per second, in the unit that "
+                   "the motors share")
       .flag("--steps", &options->steps, kSteps)
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
@@ -103,7 +110,7 @@ void add_move(CommandLine& commands) {
           return send_parts(commands.connection(), *profile, until(options->wait), {});
         }
         if (options->line) {
-          auto move = parse_move_line(options->words, as, options->duration);
+          auto move = parse_move_line(options->words, as, options->along);
           return move ? carry_out(std::move(*move)) : wrong_usage(move.error());
         }
         auto move = parse_move(options->words, as);

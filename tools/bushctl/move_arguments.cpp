@@ -98,14 +98,28 @@ Result<api::Move> parse_move(const std::vector<std::string>& words, Numbers numb
 }
 
 Result<api::MoveLine> parse_move_line(const std::vector<std::string>& words, Numbers numbers,
-                                      const std::string& duration) {
+                                      const LineOptions& options) {
   auto move = parse_move(words, numbers);
   if (!move) return fail(move.error());
   api::MoveLine line{.kind = move->kind, .motors = std::move(move->motors)};
-  if (duration.empty()) return line;
-  line.duration_s = number(duration);
+  if (options.law == "elementary") line.law = api::MoveLine::Law::kElementary;
+  const auto feed = parse_feed(options.feed, numbers);
+  if (!feed) return fail(feed.error());
+  line.feed = *feed;
+  if (options.duration.empty()) return line;
+  line.duration_s = number(options.duration);
   if (line.duration_s && *line.duration_s > 0) return line;
-  return fail(fmt::format("--duration: \"{}\" is not a number of seconds above 0", duration));
+  return fail(
+      fmt::format("--duration: \"{}\" is not a number of seconds above 0", options.duration));
+}
+
+Result<std::optional<api::Speed>> parse_feed(const std::string& word, Numbers numbers) {
+  if (word.empty()) return std::optional<api::Speed>{};
+  const auto per_s = number(word);
+  if (per_s && *per_s > 0) {
+    return std::optional(api::Speed{.per_s = *per_s, .in_steps = numbers == Numbers::kSteps});
+  }
+  return fail(fmt::format("--feed: \"{}\" is not a number above 0", word));
 }
 
 namespace {
@@ -119,7 +133,7 @@ api::Edge edge_of(const std::string& word) {
 Result<api::ArmLine> parse_arm_line(const std::vector<std::string>& words, Numbers numbers,
                                     const std::string& edge, std::int64_t delay_us,
                                     const std::string& duration) {
-  auto line = parse_move_line(words, numbers, duration);
+  auto line = parse_move_line(words, numbers, {.duration = duration});
   if (!line) return fail(line.error());
   return api::ArmLine{.edge = edge_of(edge),
                       .delay_us = delay_us,

@@ -22,9 +22,19 @@ bushd::Result<std::optional<bushd::api::Speed>> parse_speed(const std::string& w
 // case all motors as one group. A mixture is refused: one command is relative or absolute.
 bushd::Result<bushd::api::Move> parse_move(const std::vector<std::string>& words, Numbers numbers);
 
-// The same along a straight line; `duration` in seconds, "" is none.
+// How motors move along a straight line.
+struct LineOptions {
+  std::string duration;  // in seconds, "" is none
+  std::string law = "leading";
+  std::string feed;  // "2.5", per second, "" is none
+};
+inline const std::vector<std::string> kLaws{"leading", "elementary"};
 bushd::Result<bushd::api::MoveLine> parse_move_line(const std::vector<std::string>& words,
-                                                    Numbers numbers, const std::string& duration);
+                                                    Numbers numbers, const LineOptions& options);
+
+// "2.5": along the way of several motors, per second. "" is none.
+bushd::Result<std::optional<bushd::api::Speed>> parse_feed(const std::string& word,
+                                                           Numbers numbers);
 
 // "theta 400 chi -20": the same by so much, when the trigger comes.
 bushd::Result<bushd::api::Arm> parse_arm(const std::vector<std::string>& words, Numbers numbers,

@@ -19,6 +19,7 @@ struct PathOptions {
   std::string file;
   std::string corners = "continuous";
   std::string speed;
+  std::string feed;
   bool wait = false;
   bool dry_run = false;
   bool json = false;
@@ -27,7 +28,7 @@ struct PathOptions {
 bushd::Result<PathFile> read_path(const PathOptions& options) {
   const auto text = bushd::tables::read_text(options.file, bushd::tables::kNumbersLimit);
   if (!text) return bushd::fail(text.error());
-  return parse_path(*text, options.file, options.corners, options.speed);
+  return parse_path(*text, options.file, options.corners, options.speed, options.feed);
 }
 
 int check(const Connection& connection, const PathOptions& options) {
@@ -62,7 +63,9 @@ Command& describe(Command& command, const std::shared_ptr<PathOptions>& options)
           "--corners", &options->corners, {"continuous", "exact"},
           "Pass the points at speeds at which no motor jumps by more than it starts with, or rest "
           "at each")
-      .option("--speed", &options->speed, "Not faster than this, in each motor's unit per second");
+      .option("--speed", &options->speed, "Not faster than this, in each motor's unit per second")
+      .option("--feed", &options->feed,
+              "Not faster along the way than this, per second, in the unit that the motors share");
 }
 
 }  // namespace

@@ -79,9 +79,12 @@ std::string PathFile::located(const std::string& reason) const {
 }
 
 Result<PathFile> parse_path(std::string_view text, const std::string& file,
-                            const std::string& corners, const std::string& speed) {
+                            const std::string& corners, const std::string& speed,
+                            const std::string& feed) {
   auto table = bushd::csv::parse_numbers(text, file, api::MovePath::kMostRows);
   if (!table) return fail(table.error());
+  const auto along = parse_feed(feed, Numbers::kUser);
+  if (!along) return fail(along.error());
   const auto not_faster = parse_speed(speed, Numbers::kUser);
   if (!not_faster) return fail(not_faster.error());
   const std::size_t width = table->columns.size();
@@ -93,7 +96,8 @@ Result<PathFile> parse_path(std::string_view text, const std::string& file,
                       .rows = static_cast<std::int32_t>(table->rows()),
                       .corners = corners == "exact" ? api::MovePath::Corners::kExact
                                                     : api::MovePath::Corners::kContinuous,
-                      .speed = *not_faster};
+                      .speed = *not_faster,
+                      .feed = *along};
   for (const auto& column : table->columns) whole.motors.push_back(column.name);
   whole.positions.reserve(table->rows() * width);
   for (std::size_t row = 0; row < table->rows(); ++row) {

@@ -22,7 +22,8 @@ struct PathFile {
 
 // Reads a file's text: a header of motors' names, and rows of positions in their units.
 bushd::Result<PathFile> parse_path(std::string_view text, const std::string& file,
-                                   const std::string& corners, const std::string& speed);
+                                   const std::string& corners, const std::string& speed,
+                                   const std::string& feed = "");
 
 // "theta --to 400" with "--speed-at 100:2.5 --speed-at=300:5" among its words: 2.5 units/s from
 // position 100 on, 5 from 300 on, and until 100 as fast as `speed` allows. Nothing: no such words.

@@ -5,6 +5,7 @@ import math
 from collections import defaultdict
 
 from check_trace.trajectories import Trajectory, TrajectoryMove
+from check_trace.elementary import ElementaryMove, ElementaryPart, Order
 from check_trace.lines import Envelope, LineMove, Part
 from check_trace.motion import ENDINGS, Move
 from check_trace.problems import InputError
@@ -88,6 +89,7 @@ class MoveLog:
         self._at_steps = {}  # by motor name: where the last result or "set" leaves it
         self._tables = Tables()
         self._ways = {}  # by number: the tables of lines
+        self._orders = {}  # by number: of lines by the elementary law
         self._trajectories = {}  # by number
         self._ticks = set()  # (bus, tick_ns)
         self.paths = {}  # by number of the way: shortest delays by motor's name
@@ -166,6 +168,9 @@ class MoveLog:
         table = self._tables.of(event)
         if "path" in event:
             move = PathMove(event, table)
+        elif "line" in event and event["line"]["way"] in self._orders:
+            way = event["line"]["way"]
+            move = ElementaryMove(event, table, self._ways[way], self._orders[way])
         elif "line" in event:
             move = LineMove(event, table, self._ways[event["line"]["way"]])
         elif "trajectory" in event:
@@ -178,6 +183,15 @@ class MoveLog:
     def _line(self, event):
         """A way of a line: the table of its runs."""
         longest = event["longest"]
+        if event.get("law") == "elementary":
+            order = Order({motor["output"]: motor["increment"] for motor in event["motors"]})
+            self._orders[event["way"]] = order
+            parts = [
+                ElementaryPart(self._tables.of(motor), motor["increment"], longest, motor["shortest_delay"], order, motor["output"])
+                for motor in event["motors"]
+            ]
+            self._ways[event["way"]] = Envelope(parts)
+            return
         parts = [Part(self._tables.of(motor), motor["increment"], longest, motor["shortest_delay"]) for motor in event["motors"]]
         self._ways[event["way"]] = Envelope(parts)
 

@@ -9,7 +9,7 @@ from . import arguments, model, requests
 from .arguments import Amount
 from .asking import Asking
 from .motion import Jog, Motion
-from .requests import Fields, Names, Rows, ask, motor_amounts, trigger, way, with_duration, with_speed
+from .requests import Fields, Names, Rows, ask, line, motor_amounts, trigger, way, with_duration, with_speed
 
 
 class Moving(Asking):
@@ -67,12 +67,13 @@ class Moving(Asking):
     @overload
     async def move_line(self, motors: Mapping[str, float] | None = None, *, to: Mapping[str, float] | None = None,
                         by: Mapping[str, float] | None = None, unit: str | None = None, speed: float | None = None,
-                        duration_s: float | None = None, wait: Literal[True] = True,
-                        check: bool = True) -> model.MoveResult: ...
+                        duration_s: float | None = None, law: str = "leading", feed: float | None = None,
+                        wait: Literal[True] = True, check: bool = True) -> model.MoveResult: ...
     @overload
     async def move_line(self, motors: Mapping[str, float] | None = None, *, to: Mapping[str, float] | None = None,
                         by: Mapping[str, float] | None = None, unit: str | None = None, speed: float | None = None,
-                        duration_s: float | None = None, wait: Literal[False], check: bool = True) -> Motion: ...
+                        duration_s: float | None = None, law: str = "leading", feed: float | None = None,
+                        wait: Literal[False], check: bool = True) -> Motion: ...
     async def move_line(
         self,
         motors: Mapping[str, float] | None = None,
@@ -82,6 +83,8 @@ class Moving(Asking):
         unit: str | None = None,
         speed: float | None = None,
         duration_s: float | None = None,
+        law: str = "leading",
+        feed: float | None = None,
         wait: bool = True,
         check: bool = True,
     ) -> model.MoveResult | Motion:
@@ -92,10 +95,14 @@ class Moving(Asking):
 
         speed: no motor exceeds it, each in its own unit.
         duration_s: not shorter than this; refused where the motors cannot be so slow, or so quick.
+        law: "elementary", of motors of one MCU: one motor makes one step at a time. Otherwise the motor with most
+            steps leads, and the others step with it.
+        feed: along the way, not to be exceeded, per second in the unit that the motors share; by the elementary law
+            that of elementary steps.
         All else as of `move()`.
         """
         wanted = await self._amounts(motors, to, by, unit)
-        request = ask("MOVE_LINE", **way(**wanted.how, speed=speed), **with_duration(duration_s))
+        request = ask("MOVE_LINE", **line(**wanted.how, speed=speed, duration_s=duration_s, law=law, feed=feed))
         return await self._moved([request], list(wanted.values), wait, check)
 
     async def plan_line(
@@ -107,20 +114,21 @@ class Moving(Asking):
         unit: str | None = None,
         speed: float | None = None,
         duration_s: float | None = None,
+        law: str = "leading",
+        feed: float | None = None,
     ) -> model.MovePlan:
         """What such a `move_line()` would be. Nothing moves; of motors at rest."""
         wanted = await self._amounts(motors, to, by, unit)
-        how = {**way(**wanted.how, speed=speed), **with_duration(duration_s)}
-        return await self._planned([ask("MOVE_LINE", **how, dry_run=True)])
+        return await self._planned([ask("MOVE_LINE", **line(**wanted.how, speed=speed, duration_s=duration_s, law=law, feed=feed), dry_run=True)])
 
     @overload
     async def move_path(self, motors: Names, points: Rows, *, exact: bool = False, speed: float | None = None,
-                        speeds: Iterable[float] = (), in_steps: bool = False, wait: Literal[True] = True,
-                        check: bool = True) -> model.MoveResult: ...
+                        speeds: Iterable[float] = (), feed: float | None = None, in_steps: bool = False,
+                        wait: Literal[True] = True, check: bool = True) -> model.MoveResult: ...
     @overload
     async def move_path(self, motors: Names, points: Rows, *, exact: bool = False, speed: float | None = None,
-                        speeds: Iterable[float] = (), in_steps: bool = False, wait: Literal[False],
-                        check: bool = True) -> Motion: ...
+                        speeds: Iterable[float] = (), feed: float | None = None, in_steps: bool = False,
+                        wait: Literal[False], check: bool = True) -> Motion: ...
     async def move_path(
         self,
         motors: Names,
@@ -129,6 +137,7 @@ class Moving(Asking):
         exact: bool = False,
         speed: float | None = None,
         speeds: Iterable[float] = (),
+        feed: float | None = None,
         in_steps: bool = False,
         wait: bool = True,
         check: bool = True,
@@ -142,10 +151,12 @@ class Moving(Asking):
             starts with from rest.
         speed: no motor exceeds it, per second, each in its own unit, with `in_steps` in steps.
         speeds: of a single motor: not exceeded on the way to that point; 0: none. As many as points, or none.
+        feed: along the way, not to be exceeded, per second in the unit that the motors share, with `in_steps` in steps.
         All else as of `move()`. A part that the daemon refuses raises Refused, and nothing has moved.
         """
         names = list(motors)
-        parts = requests.move_path(names, points, exact=exact, speed=speed, speeds=speeds, in_steps=in_steps)
+        how: Fields = {"exact": exact, "speed": speed, "speeds": speeds, "feed": feed, "in_steps": in_steps}
+        parts = requests.move_path(names, points, **how)
         return await self._moved(parts, names, wait, check)
 
     async def plan_path(
@@ -156,11 +167,12 @@ class Moving(Asking):
         exact: bool = False,
         speed: float | None = None,
         speeds: Iterable[float] = (),
+        feed: float | None = None,
         in_steps: bool = False,
     ) -> model.MovePlan:
         """What such a `move_path()` would be, with the time at which each point is reached. Nothing moves."""
         how: Fields = {"exact": exact, "in_steps": in_steps, "dry_run": True}
-        return await self._planned(requests.move_path(motors, points, speed=speed, speeds=speeds, **how))
+        return await self._planned(requests.move_path(motors, points, speed=speed, speeds=speeds, feed=feed, **how))
 
     @overload
     async def follow(self, motors: Names, time_s: Iterable[float], positions: Rows, *, cubic: bool = False,

@@ -40,6 +40,7 @@ def move_path(
     in_steps: bool = False,
     speed: float | None = None,
     speeds: Iterable[float] = (),
+    feed: float | None = None,
     dry_run: bool = False,
 ) -> list[Request]:
     """The last of them begins the motion; those before it carry points only."""
@@ -48,6 +49,7 @@ def move_path(
         raise ValueError(f"{len(limits)} speeds for {len(rows)} points")
     corners = "EXACT" if exact else "CONTINUOUS"
     how: Fields = {"motors": named(names), "corners": corners, "dry_run": dry_run, **with_speed(speed, in_steps)}
+    how |= with_feed(feed, in_steps)
     return [
         ask(
             "MOVE_PATH",
@@ -153,6 +155,20 @@ def way(amounts: Amounts, absolute: bool, in_steps: bool, speed: float | None = 
     return {"motors": motor_amounts(amounts, in_steps), "kind": kind, **with_speed(speed, in_steps)}
 
 
+def line(
+    amounts: Amounts,
+    absolute: bool,
+    in_steps: bool,
+    *,
+    speed: float | None,
+    duration_s: float | None,
+    law: str,
+    feed: float | None,
+) -> Fields:
+    how = {**way(amounts, absolute, in_steps, speed), **with_duration(duration_s), **with_feed(feed, in_steps)}
+    return how if law == "leading" else {**how, **with_law(law)}
+
+
 def motor_amounts(amounts: Amounts, in_steps: bool) -> list[Any]:
     if not amounts:
         raise ValueError("no motor is named")
@@ -178,6 +194,23 @@ def with_speed(speed: float | None, in_steps: bool) -> Fields:
     if finite(float(speed)) <= 0:
         raise ValueError(f"a speed of {speed:g}: it is to be above 0")
     return {"speed": speed, "speed_in_steps": in_steps}
+
+
+def with_feed(feed: float | None, in_steps: bool) -> Fields:
+    if feed is None:
+        return {}
+    if finite(float(feed)) <= 0:
+        raise ValueError(f"a feed of {feed:g}: it is to be above 0")
+    return {"feed": feed, "feed_in_steps": in_steps}
+
+
+LAWS = {"leading": "LEADING", "elementary": "ELEMENTARY"}
+
+
+def with_law(law: str) -> Fields:
+    if law not in LAWS:
+        raise ValueError(f'law "{law}": it is "leading" or "elementary"')
+    return {"law": LAWS[law]}
 
 
 def with_duration(duration_s: float | None) -> Fields:

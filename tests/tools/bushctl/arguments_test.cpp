@@ -43,16 +43,16 @@ TEST(MoveArguments, InUnitsOrInSteps) {
 }
 
 TEST(MoveArguments, AlongALineAreThoseOfAMove) {
-  const auto line = parse_move_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, "");
+  const auto line = parse_move_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, {});
   ASSERT_TRUE(line) << line.error().message;
   EXPECT_EQ(line->kind, api::Move::Kind::kAbsolute);
   EXPECT_EQ(line->motors, (Motors{{"a", User{10}}, {"b", User{-3.5}}}));
   EXPECT_FALSE(line->duration_s);
-  EXPECT_EQ(parse_move_line({"a", "4"}, kUser, "12.5")->duration_s, 12.5);
+  EXPECT_EQ(parse_move_line({"a", "4"}, kUser, {.duration = "12.5"})->duration_s, 12.5);
   for (const char* wrong : {"0", "-1", "soon", "inf"}) {
-    EXPECT_FALSE(parse_move_line({"a", "4"}, kUser, wrong)) << wrong;
+    EXPECT_FALSE(parse_move_line({"a", "4"}, kUser, {.duration = wrong})) << wrong;
   }
-  EXPECT_FALSE(parse_move_line({}, kUser, ""));
+  EXPECT_FALSE(parse_move_line({}, kUser, {}));
 }
 
 TEST(MoveArguments, WhatIsNoNumberIsRefused) {
