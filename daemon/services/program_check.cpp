@@ -19,6 +19,19 @@ bool has_lines(const programs::Program& text) {
   });
 }
 
+// Motors of the line with most of them that is by the elementary law.
+unsigned most_elementary(const programs::Program& text) {
+  unsigned most = 0;
+  for (const programs::Frame& frame : text.frames) {
+    const auto* line = std::get_if<programs::Line>(&frame.what);
+    if (line == nullptr || !line->elementary) continue;
+    const auto motors =
+        std::ranges::count_if(line->points.front(), [](const auto& at) { return at.has_value(); });
+    most = std::max(most, static_cast<unsigned>(motors));
+  }
+  return most;
+}
+
 Result<McuId> mcu_of(const Installation& installation, const std::vector<MotorId>& motors) {
   const std::vector<McuId> mcus = installation.mcus_of(motors);
   if (mcus.size() > 1) {
@@ -63,7 +76,8 @@ Result<void> find_line_table(const Installation& installation, const Mcu& mcu,
     const bushd_table* table = &installation.table_of(motor)->view();
     if (std::ranges::find(tables, table) == tables.end()) tables.push_back(table);
   }
-  auto made = tables::any_line_table(tables, "lines of " + program.name);
+  auto made =
+      tables::any_line_table(tables, "lines of " + program.name, most_elementary(program.text));
   if (!made) return fail(made.error());
   const bushd_table& table = (*made)->view();
   const auto bank = mcu.bank_of(table);
@@ -102,7 +116,8 @@ Result<CheckedProgram> compile_and_walk(const Installation& installation, const 
   programs::McuPlace place{.name = "MCU " + mcu.name(),
                            .memory = mcu.offers.programs->program(mcu.on_bus()).state.memory,
                            .tick_ns = installation.bus_of(mcu).config.tick_ns(),
-                           .lines = mcu.makes_lines()};
+                           .lines = mcu.makes_lines(),
+                           .elementary = mcu.makes_elementary_lines()};
   std::vector<programs::MotorPlace> places;
   for (const MotorId motor : program.motors) {
     auto its = place_of(installation, motor);

@@ -140,12 +140,45 @@ class Compiler {
     return {};
   }
 
+  // Of elementary steps, which all have the same length.
+  Result<std::uint16_t> delay_of_feed(const Line& line) const {
+    const MotorPlace* first = nullptr;
+    for (const std::size_t i : by_output_) {
+      if (!line.points.front()[i]) continue;
+      const MotorPlace& motor = motors_[i];
+      if (first == nullptr) first = &motor;
+      const units::Scale& scale = motor.coordinates.scale();
+      const units::Scale& of_first = first->coordinates.scale();
+      if (program_.steps ||
+          (scale.unit == of_first.unit && scale.steps_per_unit == of_first.steps_per_unit)) {
+        continue;
+      }
+      return fail("a feed is that of steps which are " + to_text(of_first.steps_per_unit) +
+                  " per " + of_first.unit + " for motor \"" + first->name + "\" and " +
+                  to_text(scale.steps_per_unit) + " per " + scale.unit + " for motor \"" +
+                  motor.name + "\": use speed, or unit = \"steps\"");
+    }
+    const units::Coordinates plain;
+    const auto delay = (program_.steps ? plain : first->coordinates)
+                           .delay_at(*line.feed, mcu_.line_table->time_unit_ns);
+    if (!delay) return fail("feed: " + delay.error().message);
+    if (*delay <= UINT16_MAX) return static_cast<std::uint16_t>(*delay);
+    return fail(
+        "a step at this feed has " + std::to_string(*delay) +
+        " time units of the lines' table, but a program has delays up to 65535: use a higher "
+        "feed");
+  }
+
   Result<void> put_line(const Line& line) {
     if (!mcu_.lines) {
       return fail(mcu_.name + " makes no lines by itself: use moves, or another MCU");
     }
     if (mcu_.line_table == nullptr) {
       return fail(mcu_.name + " has no table bank left for lines: let more motors share a table");
+    }
+    if (line.elementary && !mcu_.elementary) {
+      return fail(mcu_.name +
+                  " makes no lines by the elementary law: leave out `law`, or use another MCU");
     }
     std::uint16_t shortest_delay = 0;
     for (const std::size_t i : by_output_) {
@@ -154,9 +187,14 @@ class Compiler {
       if (!delay) return fail(delay.error());
       shortest_delay = std::max(shortest_delay, *delay);
     }
+    if (line.feed) {
+      const auto delay = delay_of_feed(line);
+      if (!delay) return fail(delay.error());
+      shortest_delay = std::max(shortest_delay, *delay);
+    }
     out_.put(line.relative ? BUSHD_PROGRAM_LINE_BY : BUSHD_PROGRAM_LINE_TO, 1);
     out_.put(mask_of(line.points.front()), 2);
-    out_.put(mcu_.line_bank, 1);
+    out_.put(mcu_.line_bank | (line.elementary ? 0x80u : 0u), 1);
     out_.put(shortest_delay, 2);
     out_.put(line.points.size(), 2);
     for (const Point& point : line.points) {

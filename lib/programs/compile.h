@@ -31,6 +31,7 @@ struct McuPlace {
   std::size_t memory = 0;  // bytes for a program
   std::uint32_t tick_ns = 0;
   bool lines = true;           // BUSHD_CAN_LINE_RUN
+  bool elementary = true;      // BUSHD_CAN_ELEMENTARY
   std::uint8_t line_bank = 0;  // of the table for lines
   const bushd_table* line_table =
       nullptr;  // any_line_table() of these motors; null: no bank is free

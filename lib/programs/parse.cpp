@@ -77,12 +77,31 @@ class FrameReader {
   }
 
   Result<Line> line(const char* key, bool relative) const {
-    if (auto only = toml_.only({key, "speed"}); !only) return fail(only.error());
+    if (auto only = toml_.only({key, "speed", "law", "feed"}); !only) return fail(only.error());
     auto points = toml_.is_string(key) ? points_of_file(key) : points_of_text(key);
     if (!points) return fail(points.error());
     auto given = speed();
     if (!given) return fail(given.error());
-    return Line{relative, std::move(*points), *given};
+    Line line{relative, std::move(*points), *given};
+    if (toml_.has("law")) {
+      const auto law = toml_.string("law", "\"leading\" or \"elementary\"");
+      if (!law) return fail(law.error());
+      if (*law != "leading" && *law != "elementary") {
+        return fail(toml_.error("law", "\"" + *law + "\"; allowed: \"leading\", \"elementary\""));
+      }
+      line.elementary = *law == "elementary";
+    }
+    if (toml_.has("feed")) {
+      const auto feed = toml_.number("feed", "a feed above 0");
+      if (!feed) return fail(feed.error());
+      if (*feed <= 0) return fail(toml_.error("feed", "not above 0; allowed: a feed above 0"));
+      if (!line.elementary) {
+        return fail(
+            toml_.error("feed", "is of lines with law = \"elementary\"; allowed here: speed"));
+      }
+      line.feed = *feed;
+    }
+    return line;
   }
 
   Result<std::optional<double>> speed() const {

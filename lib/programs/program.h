@@ -14,6 +14,8 @@
 //     repeat = 3                     # the frames until next; 0: without end
 //     [[frame]]
 //     line_by = [[1, 0], [0, 1]]     # points; or a file of columns: line_to = "points.csv"
+//     law = "elementary"             # one motor makes one step at a time; left out: "leading"
+//     feed = 2                       # of that law: along the way, in place of speed or beside it
 //     [[frame]]
 //     pulse_us = 50                  # at the position compare output
 //     [[frame]]
@@ -52,6 +54,8 @@ struct Line {
   bool relative = false;
   std::vector<Point> points;
   std::optional<double> speed = {};
+  bool elementary = false;  // by engine/elementary.h
+  std::optional<double> feed = {};
 };
 struct Wait {
   std::uint32_t us = 0;

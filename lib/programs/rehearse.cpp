@@ -185,9 +185,14 @@ class Walk {
       if (point != 0) begin();
       std::uint64_t longest = 0;
       auto gone = for_motors(frame, point, [&](std::uint64_t steps, std::uint8_t, std::size_t) {
-        longest = std::max(longest, steps);
+        longest = frame.elementary ? longest + steps : std::max(longest, steps);
       });
       if (!gone) return gone;
+      if (longest > INT32_MAX) {
+        return fail(text_.frames[frame_ - 1].place + ", point " + std::to_string(point + 1) +
+                    ": the ways of all motors together are more than 2^31 - 1 steps; make several "
+                    "lines of it, or leave out `law`");
+      }
       if (longest != 0) later(ticks_of(*mcu_.line_table, longest, frame.shortest_delay));
     }
     return {};

@@ -63,6 +63,34 @@ TEST(Programs, DoWhatTheirTextSays) {
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).result, "reached") << "it is free";
 }
 
+// One motor after the other, as the printed function says, and no faster than their tables.
+TEST(Programs, AnElementaryLineIsMadeStepByStep) {
+  ProgramLab lab;
+  const Answer put = lab.put("fine", "\"m01\", \"m02\"",
+                             "[[frame]]\nline_by = [[300, 300], [-7, 3]]\nlaw = \"elementary\"\n");
+  ASSERT_EQ(put.result, "done") << put.reason;
+  EXPECT_EQ(lab.wait(lab.run({"fine"})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("m01"), 293);
+  EXPECT_EQ(lab.shaft_steps("m02"), 303);
+  const auto first = lab.steps.of(0, 0);
+  const auto second = lab.steps.of(0, 1);
+  ASSERT_THAT(first, SizeIs(307));
+  ASSERT_THAT(second, SizeIs(303));
+  for (std::size_t i = 0; i < 300; ++i) {
+    ASSERT_LT(first[i], second[i]);
+    ASSERT_LT(second[i], first[i + 1]);
+  }
+  // F = 0, -3, 4, 1, -2, 5, 2, -1, 6, 3: of 7 and 3 steps.
+  const std::vector<std::size_t> order{0, 1, 0, 0, 1, 0, 0, 1, 0, 0};
+  std::array<std::size_t, 2> next{300, 300};
+  sim::TimeNs before = second[299];
+  for (const std::size_t motor : order) {
+    const sim::TimeNs at = motor == 0 ? first[next[0]++] : second[next[1]++];
+    ASSERT_GT(at, before);
+    before = at;
+  }
+}
+
 TEST(Programs, ADryRunLeavesTheMcuAlone) {
   ProgramLab lab;
   api::PutProgram put = ProgramLab::put_of("square", "\"m01\", \"m02\"", kSquare);

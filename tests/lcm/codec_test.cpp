@@ -142,7 +142,12 @@ TEST(Codec, OtherRequestsDoToo) {
                     .motors = {{"a", std::int64_t{4}}, {"b", api::UserUnits{-0.5}}},
                     .dry_run = true,
                     .speed = api::Speed{.per_s = 2.5},
-                    .duration_s = 12.5});
+                    .duration_s = 12.5,
+                    .law = api::MoveLine::Law::kElementary,
+                    .feed = api::Speed{.per_s = 7, .in_steps = true}});
+  EXPECT_EQ(line.law, api::MoveLine::Law::kElementary);
+  EXPECT_EQ(line.feed, (api::Speed{.per_s = 7, .in_steps = true}));
+  EXPECT_FALSE(request_over_the_wire(api::MoveLine{}).feed);
   EXPECT_EQ(line.kind, api::Move::Kind::kAbsolute);
   EXPECT_EQ(line.motors,
             (std::vector<api::MotorAmount>{{"a", std::int64_t{4}}, {"b", api::UserUnits{-0.5}}}));

@@ -91,7 +91,13 @@ TEST(FieldNames, Moves) {
   const auto line = heard<move_line_t>(api::MoveLine{.kind = api::Move::Kind::kAbsolute,
                                                      .motors = motors,
                                                      .speed = api::Speed{.per_s = 2},
-                                                     .duration_s = 3});
+                                                     .duration_s = 3,
+                                                     .law = api::MoveLine::Law::kElementary,
+                                                     .feed = api::Speed{4, true}});
+  EXPECT_EQ(line.law, move_line_t::ELEMENTARY);
+  EXPECT_EQ(line.feed, 4);
+  EXPECT_EQ(line.feed_in_steps, 1);
+  EXPECT_EQ(heard<move_line_t>(api::MoveLine{}).law, move_line_t::LEADING);
   EXPECT_EQ(line.kind, move_line_t::ABSOLUTE);
   EXPECT_EQ(line.speed, 2);
   EXPECT_EQ(line.speed_in_steps, 0);
@@ -101,7 +107,10 @@ TEST(FieldNames, Moves) {
                                                      .first_row = 4,
                                                      .positions = {1, 2},
                                                      .speeds = {3},
-                                                     .corners = api::MovePath::Corners::kExact});
+                                                     .corners = api::MovePath::Corners::kExact,
+                                                     .feed = api::Speed{5}});
+  EXPECT_EQ(path.feed, 5);
+  EXPECT_EQ(path.feed_in_steps, 0);
   EXPECT_EQ(path.rows, 9);
   EXPECT_EQ(path.first_row, 4);
   EXPECT_EQ(path.corners, move_path_t::EXACT);

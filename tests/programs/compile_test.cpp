@@ -45,6 +45,32 @@ next = true
   EXPECT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
 }
 
+TEST_F(CompiledPrograms, TellTheLawOfALineAndItsFeed) {
+  const std::string line = "[[frame]]\nline_by = [[3, 1]]\nlaw = \"elementary\"\n";
+  const std::size_t at = 4 + 18 + 3;
+  auto bytes = compile(parsed(line));
+  ASSERT_TRUE(bytes);
+  EXPECT_EQ((*bytes)[at], 0x87);
+  EXPECT_EQ((*bytes)[at + 1], 0);
+  programs::Program in_steps = parsed(line + "feed = 100\n");
+  in_steps.steps = true;
+  bytes = compile(in_steps);
+  ASSERT_TRUE(bytes);
+  EXPECT_EQ((*bytes)[at + 1], 250) << "10 ms are so many units of 40 us";
+  EXPECT_NE(compile(parsed(line + "feed = 1\n"))
+                .error()
+                .text()
+                .find("400 per deg for motor \"theta\" and 1 per steps for motor \"x\": use speed"),
+            std::string::npos);
+  motors_[0].coordinates = motors_[1].coordinates;
+  bytes = compile(parsed(line + "feed = 1\n"));
+  ASSERT_TRUE(bytes);
+  EXPECT_EQ((*bytes)[at + 1], 63) << "400 steps/s";
+  mcu_.elementary = false;
+  EXPECT_NE(compile(parsed(line)).error().text().find("MCU 3 makes no lines by the elementary law"),
+            std::string::npos);
+}
+
 TEST_F(CompiledPrograms, KeepTheSpeedLimitsOfTheirMotors) {
   motors_[0].shortest_delay_ns = 5'000'001;  // 125 units, and a bit
   const auto bytes =

@@ -95,8 +95,11 @@ TEST(ProgramsPage, TheKeysBesideAnotherAreTakenWithItAlone) {
       {"wait_s", "1"},         {"wait_input", "\"trigger\""},
       {"pulse_us", "5"},       {"repeat", "2"},
       {"next", "true"}};
-  const std::map<std::string, std::string> beside{
-      {"speed", "2.5"}, {"active", "false"}, {"longest_s", "9"}};
+  const std::map<std::string, std::string> beside{{"speed", "2.5"},
+                                                  {"law", "\"elementary\""},
+                                                  {"feed", "2\nlaw = \"elementary\""},
+                                                  {"active", "false"},
+                                                  {"longest_s", "9"}};
   const Rows told = rows_under(kBesideRow);
   for (const auto& [key, value] : beside) EXPECT_EQ(told.count(key), 1u) << key;
   EXPECT_EQ(told.size(), beside.size());

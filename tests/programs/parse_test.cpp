@@ -109,6 +109,13 @@ TEST_F(ProgramFiles, AreRefusedWithPlaceAndRemedy) {
       {"repeat without next", head + "[[frame]]\nrepeat = 2\n", "has no `next`"},
       {"not next", head + "[[frame]]\nnext = false\n", "allowed: true"},
       {"no TOML", head + "[[frame]\n", "p.toml:2"},
+      {"no such law", head + "[[frame]]\nline_by = [[1, 1]]\nlaw = \"printed\"\n",
+       "allowed: \"leading\", \"elementary\""},
+      {"a feed of the other law", head + "[[frame]]\nline_by = [[1, 1]]\nfeed = 2\n",
+       "is of lines with law = \"elementary\""},
+      {"no feed", head + "[[frame]]\nline_by = [[1, 1]]\nlaw = \"elementary\"\nfeed = 0\n",
+       "allowed: a feed above 0"},
+      {"a law of a move", head + "[[frame]]\nmove_by = [1, 1]\nlaw = \"leading\"\n", "law"},
       {"a file that is away", head + "[[frame]]\nline_to = \"a.csv\"\n", "no file"},
   };
   for (const auto& one : kCases) {

@@ -68,6 +68,14 @@ next = true
   EXPECT_EQ(told->motors[0].end_steps, 10);
 }
 
+TEST_F(Rehearsals, AnElementaryLineHasTheStepsOfAll) {
+  const auto told = rehearse("[[frame]]\nline_by = [[500, 1]]\nlaw = \"elementary\"\n");
+  ASSERT_TRUE(told) << told.error().text();
+  EXPECT_EQ(told->ticks, ticks_of(900));
+  EXPECT_EQ(told->motors[0].edges, 500u);
+  EXPECT_EQ(told->motors[1].edges, 400u);
+}
+
 TEST_F(Rehearsals, FindThePassThatLeadsBeyondALimit) {
   const std::string frames = R"(
 [[frame]]

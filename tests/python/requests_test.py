@@ -95,11 +95,14 @@ ASKED = [
      {"kind": MOVE.RELATIVE, "motors": way(m=3), "speed": 9.0, "speed_in_steps": True, "dry_run": True}),
     (lambda c: c.move_line({"m": 1.0, "n": 2.0}, duration_s=3), "MOVE_LINE",
      {"kind": messages.move_line_t.ABSOLUTE, "motors": way(m=1.0, n=2.0), "duration_s": 3.0}),
+    (lambda c: c.move_line(by={"m": 4, "n": 3}, unit="steps", law="elementary", feed=9.0), "MOVE_LINE",
+     {"kind": messages.move_line_t.RELATIVE, "motors": way(m=4, n=3), "law": messages.move_line_t.ELEMENTARY, "feed": 9.0,
+      "feed_in_steps": True}),
     (lambda c: c.plan_line(by={"m": 1.0}), "MOVE_LINE", {"kind": messages.move_line_t.RELATIVE, "motors": way(m=1.0), "dry_run": True}),
     (lambda c: c.move_path(["m", "n"], [(1, 2), (3, 4)], exact=True, speed=5.0, in_steps=True), "MOVE_PATH",
      {"rows": 2, "corners": messages.move_path_t.EXACT, "speed": 5.0, "speed_in_steps": True, "motors": ["m", "n"], "positions": [1, 2, 3, 4]}),
-    (lambda c: c.plan_path(["m"], [(1,)], speeds=[2.0]), "MOVE_PATH",
-     {"rows": 1, "corners": messages.move_path_t.CONTINUOUS, "dry_run": True, "motors": ["m"], "positions": [1], "speeds": [2.0]}),
+    (lambda c: c.plan_path(["m"], [(1,)], speeds=[2.0], feed=4.0), "MOVE_PATH",
+     {"rows": 1, "corners": messages.move_path_t.CONTINUOUS, "feed": 4.0, "dry_run": True, "motors": ["m"], "positions": [1], "speeds": [2.0]}),
     (lambda c: c.home("m", speed=2.0), "HOME", {"motors": ["m"], "speed": 2.0}),
     (lambda c: c.home(all=True), "HOME", {"all": True}),
     (lambda c: c.arm({"m": 1.5}, edge="falling", delay_us=60, speed=2.0, while_connected=True), "ARM",
@@ -170,7 +173,8 @@ class Requests(unittest.TestCase):
 
     def test_what_cannot_be_asked_for(self):
         for call in (lambda c: c.arm({"m": 1.0}, edge="up"), lambda c: c.move("m", to=1, speed=0), lambda c: c.move({}),
-                     lambda c: c.move_line({"m": 1.0}, duration_s=0), lambda c: c.move("m", by=0.5, unit="steps")):
+                     lambda c: c.move_line({"m": 1.0}, duration_s=0), lambda c: c.move_line({"m": 1.0}, law="printed"),
+                     lambda c: c.move_path(["m"], [(1,)], feed=0), lambda c: c.plan_line({"m": 1.0}, feed=-1), lambda c: c.move("m", by=0.5, unit="steps")):
             with self.assertRaises(ValueError):
                 asked(call)
         for call in (lambda c: c.home(), lambda c: c.home("m", all=True), lambda c: c.config(local=True), lambda c: c.stop(5),

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "engine/elementary.h"
 #include "engine/tables.h"
 #include "tables/envelope.h"
 
@@ -46,6 +47,46 @@ TEST(AnyLine, NoEnvelopeIsAboveIt) {
       parts.push_back({views[static_cast<std::size_t>(i)], increment});
     }
     const Envelope envelope(parts, longest);
+    RC_ASSERT(envelope.view().time_unit_ns == table.time_unit_ns);
+    const std::uint32_t codes = 2u + std::max(envelope.view().accel.count, table.accel.count) +
+                                std::max(envelope.view().decel.count, table.decel.count);
+    for (std::uint32_t k = 0; k < codes; ++k) {
+      RC_ASSERT(accel_ns(table, k) >= accel_ns(envelope.view(), k));
+      RC_ASSERT(decel_ns(table, k) >= decel_ns(envelope.view(), k));
+    }
+  });
+  EXPECT_TRUE(holds);
+}
+
+TEST(AnyLine, NoEnvelopeOfTheElementaryLawIsAboveIt) {
+  const bool holds = rc::check("any motors, any ways", [] {
+    std::vector<std::unique_ptr<TestTable>> tables;
+    std::vector<const bushd_table*> views;
+    const auto motors = between<std::uint8_t>(2, 5);
+    const std::uint32_t unit_ns = any_law().unit_ns;
+    for (int i = 0; i < motors; ++i) {
+      Law law = any_law();
+      law.unit_ns = unit_ns;
+      tables.push_back(std::make_unique<TestTable>(law, false));
+      views.push_back(tables.back()->view());
+    }
+    const auto any = tables::any_line_table(views, "any", motors);
+    if (!any) return;
+    const bushd_table& table = (*any)->view();
+    const auto most = *rc::gen::element<std::uint32_t>(2, 10, 60, 400, 100'000);
+    bushd_elementary line;
+    bushd_elementary_clear(&line);
+    std::vector<LinePart> parts;
+    for (std::uint8_t i = 0; i < motors; ++i) {
+      parts.push_back({views[i], between<std::uint32_t>(i == 0 ? 1 : 0, most)});
+      bushd_elementary_add(&line, i, parts.back().increment);
+    }
+    for (std::uint8_t i = 0; i < motors; ++i) {
+      if (parts[i].increment == 0) continue;
+      parts[i].apart = bushd_elementary_apart(&line, i);
+      parts[i].late = bushd_elementary_late(&line, i);
+    }
+    const Envelope envelope(parts, line.sum);
     RC_ASSERT(envelope.view().time_unit_ns == table.time_unit_ns);
     const std::uint32_t codes = 2u + std::max(envelope.view().accel.count, table.accel.count) +
                                 std::max(envelope.view().decel.count, table.decel.count);

@@ -24,9 +24,9 @@ bushd::Result<bushd::api::Move> parse_move(const std::vector<std::string>& words
 
 // How motors move along a straight line.
 struct LineOptions {
-  std::string duration;  // in seconds, "" is none
+  std::string duration{};  // in seconds, "" is none
   std::string law = "leading";
-  std::string feed;  // "2.5", per second, "" is none
+  std::string feed{};  // "2.5", per second, "" is none
 };
 inline const std::vector<std::string> kLaws{"leading", "elementary"};
 bushd::Result<bushd::api::MoveLine> parse_move_line(const std::vector<std::string>& words,

@@ -53,6 +53,13 @@ TEST(MoveArguments, AlongALineAreThoseOfAMove) {
     EXPECT_FALSE(parse_move_line({"a", "4"}, kUser, {.duration = wrong})) << wrong;
   }
   EXPECT_FALSE(parse_move_line({}, kUser, {}));
+  EXPECT_EQ(line->law, api::MoveLine::Law::kLeading);
+  EXPECT_FALSE(line->feed);
+  const auto elementary = parse_move_line({"a", "4"}, kSteps, {.law = "elementary", .feed = "2.5"});
+  EXPECT_EQ(elementary->law, api::MoveLine::Law::kElementary);
+  EXPECT_EQ(elementary->feed, (api::Speed{.per_s = 2.5, .in_steps = true}));
+  EXPECT_EQ(parse_move_line({"a", "4"}, kUser, {.feed = "0"}).error().message,
+            "--feed: \"0\" is not a number above 0");
 }
 
 TEST(MoveArguments, WhatIsNoNumberIsRefused) {

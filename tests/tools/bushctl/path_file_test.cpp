@@ -53,6 +53,10 @@ TEST(PathFile, SaysWhereItIsWrong) {
   EXPECT_THAT(why("x,y\n1,2\n1,z\n"), HasSubstr("3"));
   EXPECT_THAT(why("x,y\n"), HasSubstr("p.csv"));
   EXPECT_THAT(why("x\n1\n", "-1"), HasSubstr("--speed"));
+  EXPECT_EQ(parse_path("x\n1\n", "p.csv", "exact", "", "2.5")->parts[0].feed,
+            (api::Speed{.per_s = 2.5}));
+  EXPECT_THAT(parse_path("x\n1\n", "p.csv", "exact", "", "-1").error().message,
+              HasSubstr("--feed"));
 }
 
 TEST(SpeedProfile, IsAPathOfOneMotor) {
