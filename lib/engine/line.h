@@ -14,7 +14,7 @@
 // begins each frame at F = 0, makes a step of one coordinate in each interrupt, and has no leading
 // coordinate, so that its speed is that of single steps along the way and its path lies on one side
 // of the line. Begun at the difference of the increments, it would give this order of steps, ties
-// aside.
+// aside. As printed it is the second law of lines: engine/elementary.h.
 //
 // Between two steps of the run the same rule holds for a broken s, as displacements in 1/256 step
 // need it. Before its first step a motor's position rises twice as fast from 0 as the rule says

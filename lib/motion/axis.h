@@ -57,7 +57,7 @@ struct LineShare {
   std::shared_ptr<RunBlocks> blocks = {};              // of the run of a line, for all its motors
   std::shared_ptr<const PathTrack> track = {};         // of a path, with the motor's place in it
   std::size_t motor = 0;
-  // Of a line by the elementary law, and which of its coordinates the motor is.
+  // By the elementary law: the line, and which of its coordinates the motor is.
   std::shared_ptr<const bushd_elementary> elementary = {};
   std::uint8_t coordinate = 0;
   // |N|; of 0 the motor only waits for the others. Of a path as far as that.

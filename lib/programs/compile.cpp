@@ -140,7 +140,7 @@ class Compiler {
     return {};
   }
 
-  // Of elementary steps, which all have the same length.
+  // The feed is that of elementary steps, which all have the same length.
   Result<std::uint16_t> delay_of_feed(const Line& line) const {
     const MotorPlace* first = nullptr;
     for (const std::size_t i : by_output_) {

@@ -27,7 +27,7 @@ class AnyTerm {
   }
 
  private:
-  // Of a motor whose steps are `apart` steps of an elementary line from each other.
+  // The most that any motor asks for whose steps are `apart` steps of an elementary line apart.
   std::uint64_t elementary_code() const {
     if (elementary_ < 2) return 0;
     std::uint64_t most = 0;

@@ -10,7 +10,7 @@
 // down, unless that shortens a run that ramps down already. So a slow start or a low top speed of
 // one motor costs only where it acts. Of motors with one table and equal ways it is that table.
 //
-// Of a line by the elementary law (engine/elementary.h) L is the sum of all N. Steps of a motor lie
+// By the elementary law (engine/elementary.h) L is the sum of all N. Steps of a motor lie
 // a whole number of those of the run apart, at least a(i), so 1 / a(i) stands in place of r(i)
 // before a delay; and some steps of the run may have e(i) steps of the motor less than floor(r(i)
 // k), so much lower is the index of A_i and D_i.
@@ -29,7 +29,8 @@ struct LinePart {
   const bushd_table* table;        // passed bushd_table_check
   std::uint32_t increment;         // |N|
   bushd_delay shortest_delay = 0;  // none of its steps has a shorter delay; 0: none
-  // Of the elementary law: bushd_elementary_apart, 0 of the other law, and bushd_elementary_late.
+  // By the elementary law: bushd_elementary_apart, which is 0 by the other one, and
+  // bushd_elementary_late.
   std::uint32_t apart = 0;
   std::uint8_t late = 0;
 };

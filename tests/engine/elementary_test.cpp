@@ -132,7 +132,7 @@ TEST(Elementary, OneCoordinateMakesAStepAtATimeOfAnyNumberOfThem) {
   });
 }
 
-// Of increments as long as there are.
+// Increments are as long as there may be.
 TEST(Elementary, FindsAnyPlaceOfALongLine) {
   holds("a step is where it is found", [] {
     const bushd_elementary line = line_of(any_increments(134'217'727));

@@ -108,8 +108,8 @@ Tick run_begin(const Line& line, Tick start) {
   return start + (stands ? 1 : 0);
 }
 
-// Of two coordinates with F = a_k b - b_k a, step by step (tests/engine/elementary_test.cpp), of
-// this motor: after each elementary step.
+// The printed function of two coordinates, F = a_k b - b_k a: what this motor has made after each
+// elementary step.
 std::vector<std::int64_t> printed_steps(const LineShare& share) {
   const bool is_alpha = share.coordinate < 15;
   const std::int64_t own = share.increment;
