@@ -31,6 +31,11 @@ class LineScript : public Script, public testing::WithParamInterface<Target> {
   void begin_line(std::uint32_t from = 0, std::uint16_t shortest_delay = 0) {
     begin({0, false, shortest_delay, kLongest, from, kLongest - from, 0, nullptr}, kEntries);
   }
+  void begin_elementary() {
+    std::uint32_t sum = 0;
+    for (const bushd_line_entry& entry : kEntries) sum += entry.increment;
+    begin({0, true, 0, sum, 0, sum, 0, nullptr}, kEntries);
+  }
   void begin(const bushd_line_part& line, const std::vector<bushd_line_entry>& entries) {
     tell_time();
     bushd_line_run message{};
@@ -57,6 +62,12 @@ BUSHD_FOR_TARGETS(LineScript, targets_with(BUSHD_CAN_LINE_RUN));
 
 class DeniedLine : public LineScript {};
 BUSHD_FOR_TARGETS(DeniedLine, targets_without(BUSHD_CAN_LINE_RUN));
+
+class ElementaryLine : public LineScript {};
+BUSHD_FOR_TARGETS(ElementaryLine, targets_with(BUSHD_CAN_ELEMENTARY));
+
+class DeniedElementaryLine : public LineScript {};
+BUSHD_FOR_TARGETS(DeniedElementaryLine, targets_without(BUSHD_CAN_ELEMENTARY));
 
 class LineByScratchTable : public LineScript {};
 BUSHD_FOR_TARGETS(LineByScratchTable, targets_with(BUSHD_CAN_LINE_RUN | BUSHD_CAN_SCRATCH));
@@ -90,6 +101,33 @@ TEST_P(LineScript, EveryStepIsInTheSlotOfTheTwins) {
   }
 }
 
+// Each step of the run is one of one motor: as the twin makes it, which tests of its core hold to
+// the printed function.
+TEST_P(ElementaryLine, EveryStepIsInTheSlotOfTheTwins) {
+  for (const bushd_format format : {BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE}) {
+    ASSERT_NO_FATAL_FAILURE(make_ready(format, motors_));
+    const std::size_t before = steps(0, 1).size();
+    begin_elementary();
+    pass_ticks(60);
+    EXPECT_EQ(master_.poll(kReal).running, 1u << 1 | 1u << 6 | 1u << 9 | 1u << 15);
+    pass_ticks(400);
+    EXPECT_EQ(steps(0, 1).size(), before + 400);
+    EXPECT_EQ(steps(0, 15).size() % 3, 0u);
+    expect_alike();
+  }
+}
+
+TEST_P(DeniedElementaryLine, IsRefusedAndNothingMoves) {
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
+  const std::size_t before = steps(1, 1).size();
+  begin_elementary();
+  pass_ticks(60);
+  const bool no_lines = (real_->twin().disabled_capabilities & BUSHD_CAN_LINE_RUN) != 0;
+  EXPECT_EQ(master_.poll(kReal).last_rejection,
+            no_lines ? BUSHD_E_UNKNOWN_MESSAGE : BUSHD_E_FORMAT);
+  EXPECT_EQ(steps(1, 1).size(), before);
+}
+
 // By a table that is not kept, between lines by the one that is.
 TEST_P(LineByScratchTable, MakesTheSameSteps) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
@@ -100,7 +138,7 @@ TEST_P(LineByScratchTable, MakesTheSameSteps) {
       ASSERT_NO_FATAL_FAILURE(
           master_.upload_table(address, BUSHD_SCRATCH_BANK, kUnitNs, slower, kCruise + 9));
     }
-    begin({BUSHD_SCRATCH_BANK, 0, kLongest, 0, kLongest, 0, nullptr}, kEntries);
+    begin({BUSHD_SCRATCH_BANK, false, 0, kLongest, 0, kLongest, 0, nullptr}, kEntries);
     pass_ticks(300);
     begin_line();
     pass_ticks(230);
@@ -127,7 +165,7 @@ TEST_P(LineScript, IsTheSameFarAlongALongLine) {
     for (std::size_t i = 0; i < entries.size(); ++i) entries[i].increment = line.increments[i];
     // The clocks need not be as far apart as in the line before.
     recorder_.edges.clear();
-    begin({0, 0, line.longest, line.from, 400, 0, nullptr}, entries);
+    begin({0, false, 0, line.longest, line.from, 400, 0, nullptr}, entries);
     pass_ticks(240);
     EXPECT_EQ(master_.poll(kReal).moving, 0);
     EXPECT_GT(steps(0, 6).size(), 190u);
@@ -195,7 +233,7 @@ TEST_P(LineScript, TriggeredEveryStepIsWithinASlotOfItsTime) {
     const bushd_line_trigger message{number,
                                      BUSHD_EDGE_RISING,
                                      delay_us,
-                                     {0, shortest_delay, kLongest, 0, kLongest, 0, nullptr}};
+                                     {0, false, shortest_delay, kLongest, 0, kLongest, 0, nullptr}};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(bushd_encode_line_trigger(
         &message, kEntries.data(), static_cast<std::uint8_t>(kEntries.size()), payload.data()));

@@ -76,7 +76,7 @@ class AvrLineRuns : public AvrAlone, public testing::WithParamInterface<LineLoad
     }
     bushd_line_run message{};
     message.first_tick = first;
-    message.line = {0, 0, kLongest, 0, kLongest, 0, nullptr};
+    message.line = {0, false, 0, kLongest, 0, kLongest, 0, nullptr};
     Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     payload.resize(
         bushd_encode_line_run(&message, entries.data(), GetParam().motors, payload.data()));
