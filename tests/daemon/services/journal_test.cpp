@@ -45,7 +45,8 @@ TEST(Journal, APathThatIsNoUtf8IsLogged) {
   bench.installation.put_in_service({0}, *table);
   bench.installation[MotorId{0}].start(40, 100);
   journal.started({0}, 40, 100, 0, false);
-  journal.line_laid(10, {{.motor = {0}, .increment = 1, .shortest_delay = 0, .table = *table}});
+  const motion::Way way({{&(*table)->view(), 0, 10, 0}});
+  journal.line_laid(way, {{.motor = {0}, .increment = 1, .shortest_delay = 0, .table = *table}});
   ASSERT_EQ(bench.lines.size(), 2u);
   const auto replaced = (directory.path() / "h\uFFFDll.toml").string();
   EXPECT_EQ(nlohmann::json::parse(bench.lines[0])["table_file"], replaced);
