@@ -14,6 +14,7 @@
 #include "firmware/core/owner.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stream.h"
+#include "firmware/core/stream_stop.h"
 #include "firmware/core/table_run.h"
 #include "firmware/core/tables.h"
 
@@ -30,7 +31,9 @@ bushd_status bushd_mcu_check_line_table(const bushd_mcu* mcu, uint8_t bank,
       !bushd_run_is_slow(table, shortest_delay, mcu->tick_ns, BUSHD_SLOW_LINE_DELAY_NS)) {
     return BUSHD_E_CAPACITY;
   }
-  const uint32_t most = bushd_table_max_steps_per_tick(table, mcu->tick_ns);
+  const uint32_t most = bushd_mcu_is_written(mcu->config.scratch, bank)
+                            ? bushd_written_max_steps_per_tick(table, mcu->tick_ns)
+                            : bushd_table_max_steps_per_tick(table, mcu->tick_ns);
   return most > mcu->emission.grid.max_steps ? BUSHD_E_CAPACITY : BUSHD_OK;
 }
 
@@ -93,6 +96,22 @@ static void place_all(bushd_mcu* mcu) {
   }
 }
 
+// Codes as they are written are the whole run of one motor.
+static bool start(bushd_mcu* mcu, const bushd_line_part* part) {
+  const bushd_table* table = bushd_mcu_checked_table(mcu, part->bank);
+  if (!bushd_mcu_is_written(mcu->config.scratch, part->bank)) {
+    bushd_run_start(&mcu->line.run, table, part->steps, 1, part->shortest_delay);
+    return true;
+  }
+  const uint32_t codes = (uint32_t)table->accel.count + table->decel.count;
+  if (part->count != 1 || part->from != 0 || part->steps != part->longest || part->steps < codes ||
+      part->shortest_delay != 0) {
+    return false;
+  }
+  bushd_run_start_as_written(&mcu->line.run, table, part->steps, 1);
+  return true;
+}
+
 // The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
 #if BUSHD_ELEMENTARY
 static void lay_elementary(bushd_mcu* mcu, const bushd_line_part* part) {
@@ -108,8 +127,7 @@ static void lay_elementary(bushd_mcu* mcu, const bushd_line_part* part) {
 #endif
 
 static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
-  bushd_run_start(&mcu->line.run, bushd_mcu_checked_table(mcu, part->bank), part->steps, 1,
-                  part->shortest_delay);
+  if (!start(mcu, part)) return false;
   if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;
   mcu->line.bank = part->bank & 0xFu;
   mcu->line.longest = part->longest;
@@ -316,6 +334,14 @@ uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu) {
     concerned |= motor_bit(m);
   }
   if (concerned == 0) return 0;
+#if BUSHD_PROGRAMS
+  if (bushd_mcu_is_written(mcu->config.scratch, mcu->line.bank)) {
+    for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+      if ((concerned & motor_bit(m)) != 0) bushd_mcu_ramp_down_from_line(mcu, m);
+    }
+    return concerned;
+  }
+#endif
   bushd_run_ramp_down_once(&mcu->line.run);
   mcu->line.last = mcu->line.step - 1u + bushd_run_steps_left(&mcu->line.run);
   return concerned;
@@ -377,6 +403,13 @@ void bushd_mcu_leave_line(bushd_mcu* mcu, uint8_t m) {
   const uint8_t fraction = fraction_of(mcu, m);
   motor->remainder = motor->on_line.direction < 0 ? (int16_t)-fraction : (int16_t)fraction;
   note_speed(mcu, motor);
+}
+
+void bushd_mcu_ramp_down_from_line(bushd_mcu* mcu, uint8_t m) {
+  const uint16_t delay = bushd_mcu_line_delay(mcu, m);
+  bushd_mcu_leave_line(mcu, m);
+  bushd_mcu_give_to_queue(mcu, m);
+  if (delay != 0) bushd_mcu_ramp_down_stream(mcu, m, delay);
 }
 
 void bushd_mcu_line_begins(bushd_mcu* mcu, uint32_t tick) {

@@ -48,9 +48,12 @@ void bushd_mcu_begin_held_line(bushd_mcu* mcu, uint16_t motors, uint32_t first_t
 bool bushd_mcu_place_on_line(bushd_mcu* mcu);
 // The next tick of the run, and what these motors make of it.
 void bushd_mcu_emit_line(bushd_mcu* mcu, bushd_slot_buffer* slot_buffer, uint16_t motors);
-// All that are on the line and have begun it ramp down along it. Returns those that were to go on.
+// All that are on the line and have begun it ramp down along it; one that goes by codes as they are
+// written, by its own table. Returns those that were to go on.
 // Their queues are still to be cut.
 uint16_t bushd_mcu_ramp_down_line(bushd_mcu* mcu);
+// One of them leaves the line and ramps down by its own table; the others do not wait for it.
+void bushd_mcu_ramp_down_from_line(bushd_mcu* mcu, uint8_t m);
 // A motor leaves the line where it is, as a stream would have left it there. No division of more
 // than 32 bits.
 void bushd_mcu_leave_line(bushd_mcu* mcu, uint8_t m);

@@ -79,15 +79,6 @@ void bushd_mcu_ramp_down_own_motion(bushd_mcu* mcu, uint8_t m) {
   }
 }
 
-// It leaves the line, and the others do not wait for it.
-static void ramp_down_from_line(bushd_mcu* mcu, uint8_t m) {
-  if (mcu->motor[m].mode == BUSHD_MCU_RAMP_DOWN) return;  // all do, along the line
-  const uint16_t delay = bushd_mcu_line_delay(mcu, m);
-  bushd_mcu_leave_line(mcu, m);
-  bushd_mcu_give_to_queue(mcu, m);
-  if (delay != 0) bushd_mcu_ramp_down_stream(mcu, m, delay);
-}
-
 static void ramp_down(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stream_motion* queued) {
   switch (bushd_mcu_owner_of_motor(mcu, m)) {
     case BUSHD_MCU_OWNER_QUEUE:
@@ -96,7 +87,8 @@ static void ramp_down(bushd_mcu* mcu, uint8_t m, const bushd_mcu_stream_motion* 
       if (queued->moves) bushd_mcu_ramp_down_stream(mcu, m, queued->delay);
       break;
     case BUSHD_MCU_OWNER_LINE:
-      ramp_down_from_line(mcu, m);
+      // Else all do, along the line.
+      if (mcu->motor[m].mode != BUSHD_MCU_RAMP_DOWN) bushd_mcu_ramp_down_from_line(mcu, m);
       break;
     default:
       bushd_mcu_ramp_down_own_motion(mcu, m);

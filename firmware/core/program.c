@@ -9,6 +9,7 @@
 #include "firmware/core/line_run.h"
 #include "firmware/core/program_run.h"
 #include "firmware/core/state.h"
+#include "firmware/core/tables.h"
 
 #if BUSHD_PROGRAMS
 
@@ -81,6 +82,8 @@ static bushd_status check_kinds(const bushd_mcu* mcu, const bushd_program* progr
     const bool line = bushd_program_is_line(frame.kind);
     if (line && (disabled & BUSHD_CAN_LINE_RUN) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
     if (frame.elementary && !bushd_mcu_makes_elementary(mcu)) return BUSHD_E_FORMAT;
+    const bool travel = frame.kind == BUSHD_PROGRAM_TRAVEL;
+    if (travel && (disabled & BUSHD_CAN_TRAVEL) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
     const bool pulse = frame.kind == BUSHD_PROGRAM_PULSE;
     if (pulse && (disabled & BUSHD_CAN_POSITION_COMPARE) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
     const bool waits = frame.kind == BUSHD_PROGRAM_WAIT_INPUT;
@@ -109,11 +112,23 @@ static bushd_status commit(bushd_mcu* mcu, uint32_t crc) {
   return BUSHD_OK;
 }
 
+// Codes as they are written are all codes of a run.
+static bushd_status check_written(const bushd_mcu* mcu, const bushd_program_frame* travel) {
+  if (!bushd_mcu_is_written(mcu->config.scratch, travel->bank)) return BUSHD_E_NO_TABLE;
+  const bushd_table* table = bushd_mcu_checked_table(mcu, travel->bank);
+  const int64_t steps = bushd_program_entry_of(travel, 0, 0).steps;
+  const int64_t codes = (int64_t)table->accel.count + table->decel.count;
+  return (steps < 0 ? -steps : steps) < codes ? BUSHD_E_FORMAT : BUSHD_OK;
+}
+
 static bushd_status check_tables(const bushd_mcu* mcu, const bushd_program* program) {
   for (const uint8_t* at = program->frames; at != program->end;) {
     const bushd_program_frame frame = bushd_next_program_frame(program, &at);
-    if (!bushd_program_is_line(frame.kind)) continue;
-    const bushd_status status = bushd_mcu_check_line_table(mcu, frame.bank, frame.shortest_delay);
+    const bool travel = frame.kind == BUSHD_PROGRAM_TRAVEL;
+    if (travel && frame.bank != BUSHD_SCRATCH_BANK) continue;  // its motor's own
+    if (!travel && !bushd_program_is_line(frame.kind)) continue;
+    bushd_status status = bushd_mcu_check_line_table(mcu, frame.bank, frame.shortest_delay);
+    if (status == BUSHD_OK && travel) status = check_written(mcu, &frame);
     if (status != BUSHD_OK) return status;
   }
   return BUSHD_OK;
@@ -221,6 +236,8 @@ static bushd_status pause(bushd_mcu* mcu) {
   bushd_mcu_program* p = mcu->config.program;
   if (p->stage == BUSHD_PROGRAM_PAUSES || p->stage == BUSHD_PROGRAM_PAUSED) return BUSHD_OK;
   if (p->stage != BUSHD_PROGRAM_RUNS) return BUSHD_E_STATE;
+  // A travel cannot go on from where it was.
+  if (p->has_frame && p->frame.kind == BUSHD_PROGRAM_TRAVEL) return BUSHD_E_STATE;
   if (is_waiting(p)) p->until -= mcu->uptime;
   bushd_mcu_stop_program_motors(mcu, BUSHD_STOP_RAMP, bushd_mcu_first_open(mcu));
   p->stage = BUSHD_PROGRAM_PAUSES;

@@ -8,7 +8,7 @@
 #include "engine/message.h"
 #include "engine/program.h"
 
-// 0: a small MCU has no room for any of it.
+// 0: a small MCU has no room for any of it, nor for codes as they are written.
 #ifndef BUSHD_PROGRAMS
 #define BUSHD_PROGRAMS 1
 #endif

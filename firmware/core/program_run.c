@@ -17,6 +17,8 @@
 #include "firmware/core/position_compare.h"
 #include "firmware/core/state.h"
 #include "firmware/core/table_run.h"
+#include "firmware/core/tables.h"
+#include "firmware/core/travel.h"
 
 #if BUSHD_PROGRAMS
 
@@ -37,6 +39,7 @@ void bushd_mcu_stop_program_motors(bushd_mcu* mcu, bushd_stop_mode mode, uint32_
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((p->motors & motor_bit(m)) != 0) bushd_mcu_stop_motor(mcu, m, mode, next);
   }
+  if ((p->motors & motor_bit(mcu->travel.motor)) != 0) bushd_mcu_give_up_travel(mcu);
   p->moving = 0;
 }
 
@@ -152,6 +155,36 @@ static void begin_motion(bushd_mcu* mcu) {
   if (!made) end_now(mcu, BUSHD_PROGRAM_REFUSED);
 }
 
+static void begin_travel(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  const int32_t steps = bushd_program_entry_of(&p->frame, 0, 0).steps;
+  bushd_travel travel = {.kind = BUSHD_TRAVEL_LIMITS,
+                         .direction = steps < 0 ? -1 : 1,
+                         .edge = (bushd_edge)p->frame.edge,
+                         .steps = length_of(steps),
+                         .delay_us = p->frame.delay_us,
+                         .wait_us = p->frame.us};
+  while ((p->frame.motors & motor_bit(travel.motor)) == 0) ++travel.motor;
+  const bushd_program_motor part = bushd_mcu_program_part_of(p, travel.motor);
+  const int64_t target = (int64_t)bushd_mcu_position_at_rest(mcu, travel.motor) + steps;
+  if (target < part.least_steps || target > part.most_steps) {
+    end_now(mcu, BUSHD_PROGRAM_RANGE);
+    return;
+  }
+  const bushd_status status = bushd_mcu_begin_travel(mcu, &travel);
+  if (status == BUSHD_OK) return;
+  end_now(mcu, status == BUSHD_E_FORBIDDEN ? BUSHD_PROGRAM_LIMIT : BUSHD_PROGRAM_REFUSED);
+}
+
+// Whether it is, as it should; otherwise the program ends.
+static bool has_travelled(bushd_mcu* mcu) {
+  if (bushd_mcu_travels(&mcu->travel)) return false;
+  if (mcu->travel.stage == BUSHD_TRAVEL_DONE) return true;
+  const bool met = mcu->travel.stage == BUSHD_TRAVEL_EARLY;
+  end_now(mcu, met ? BUSHD_PROGRAM_LIMIT : BUSHD_PROGRAM_TRAVELLED);
+  return false;
+}
+
 // Where the frame, or this point of it, leads; false: farther than the motor may go.
 static bool set_targets(bushd_mcu* mcu) {
   bushd_mcu_program* p = mcu->config.program;
@@ -236,6 +269,8 @@ static bool is_over(bushd_mcu* mcu) {
       if (shows_level(mcu)) return true;
       if (p->frame.us != 0 && time_is_over(mcu)) end_now(mcu, BUSHD_PROGRAM_NO_INPUT);
       return false;
+    case BUSHD_PROGRAM_TRAVEL:
+      return has_travelled(mcu);
     case BUSHD_PROGRAM_PULSE:
       if (!p->pulsed) p->pulsed = bushd_mcu_pulse_now(mcu, p->frame.us);
       return p->pulsed;
@@ -290,6 +325,9 @@ static void begin_frame(bushd_mcu* mcu) {
       p->until = mcu->uptime + bushd_mcu_program_ticks(mcu, p->frame.us);
       break;
     case BUSHD_PROGRAM_PULSE:
+      break;
+    case BUSHD_PROGRAM_TRAVEL:
+      begin_travel(mcu);
       break;
     default:
       begin_point(mcu);

@@ -5,6 +5,7 @@
 #include "firmware/core/limits.h"
 #include "firmware/core/owner.h"
 #include "firmware/core/stream.h"
+#include "firmware/core/tables.h"
 
 bool bushd_mcu_ticks_of_run(const bushd_run* run, uint32_t tick_ns, uint32_t* ticks,
                             uint32_t* spare_ns) {
@@ -145,11 +146,37 @@ bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* mes
   return BUSHD_OK;
 }
 
+#if BUSHD_PROGRAMS
+// Codes as they are written say nothing of how to come to rest: by the motor's own table, from the
+// share of the running step that is over.
+static void take_own_table(const bushd_mcu* mcu, bushd_mcu_motor* motor) {
+  bushd_run* run = &motor->made.run;
+  const bushd_mcu_scratch* scratch = mcu->config.scratch;
+  if (!bushd_mcu_is_written(scratch, BUSHD_SCRATCH_BANK) || run->table != &scratch->entry.table) {
+    return;
+  }
+  const bushd_table* own = bushd_mcu_table_of(mcu, motor);
+  const int8_t direction = run->direction;
+  uint64_t delay = 0;
+  if (!bushd_run_begins_later(run)) {
+    const uint64_t ns = (uint64_t)bushd_run_delay(run) * run->table->time_unit_ns;
+    delay = (ns + own->time_unit_ns - 1u) / own->time_unit_ns;
+    if (delay > UINT16_MAX) delay = UINT16_MAX;
+    if (delay != 0 && delay < own->cruise) delay = own->cruise;
+    bushd_run_note_fraction(run);
+  }
+  bushd_run_start_ramp_down(run, own, (bushd_delay)delay, run->fraction, direction);
+}
+#endif
+
 void bushd_mcu_ramp_down_run(bushd_mcu* mcu, uint8_t m) {
   bushd_mcu_motor* motor = &mcu->motor[m];
   // It was cut, or does so already.
   if (motor->mode == BUSHD_MCU_STREAM || motor->mode == BUSHD_MCU_RAMP_DOWN) return;
   const bool begun = (mcu->stream.begun & motor_bit(m)) != 0;
+#if BUSHD_PROGRAMS
+  if (begun) take_own_table(mcu, motor);
+#endif
   if (begun) bushd_run_ramp_down(&motor->made.run);
   if (begun && !bushd_run_done(&motor->made.run)) {
     bushd_mcu_give_motor(mcu, m, BUSHD_MCU_RAMP_DOWN);

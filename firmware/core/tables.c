@@ -114,7 +114,14 @@ bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message)
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   const uint32_t crc = bushd_table_crc32(&entry->table);
   if (crc != message->crc) return BUSHD_E_CRC;
-  const bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
+  bushd_status status = bushd_table_check(&entry->table, NULL, NULL);
+#if BUSHD_PROGRAMS
+  const bool unsorted = status == BUSHD_E_TABLE_UNSORTED;
+  if (unsorted && message->bank == BUSHD_SCRATCH_BANK) {
+    status = bushd_table_check_written(&entry->table);
+    mcu->config.scratch->written = true;
+  }
+#endif
   if (status != BUSHD_OK) return status;
   entry->crc = crc;
   if (message->bank == BUSHD_SCRATCH_BANK) {

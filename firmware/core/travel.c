@@ -47,6 +47,16 @@ static void wait_for_edge(bushd_mcu* mcu) {
                         bushd_mcu_edge_of_pin(mcu, (bushd_edge)mcu->travel.edge));
 }
 
+static void start_run(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction) {
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  if (bushd_mcu_travels_as_written(mcu, m)) {
+    bushd_run_start_as_written(&motor->made.run, &mcu->config.scratch->entry.table, steps,
+                               direction);
+  } else {
+    bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction, 0);
+  }
+}
+
 static void begin(bushd_mcu* mcu, bushd_travel_stage stage) {
   bushd_mcu_travel* travel = &mcu->travel;
   bushd_mcu_motor* motor = &mcu->motor[travel->motor];
@@ -57,8 +67,7 @@ static void begin(bushd_mcu* mcu, bushd_travel_stage stage) {
   }
   set_stage(mcu, stage);
   travel->readings = (uint16_t)(2u * mcu->inputs.debounce_ticks + 2u);
-  bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), travel->steps,
-                  travel->direction, 0);
+  start_run(mcu, travel->motor, travel->steps, travel->direction);
   if (travel->due_ns != 0) bushd_run_begin_late(&motor->made.run, travel->due_ns);
   mcu->trigger.state = BUSHD_TRIGGER_STARTED;
   mcu->trigger.start_tick = travel->due_tick;
@@ -148,14 +157,19 @@ static void go_on(bushd_mcu* mcu, uint16_t active_inputs) {
   }
 }
 
-void bushd_mcu_go_travel(bushd_mcu* mcu, uint16_t active_inputs) {
+static void end_by_faults(bushd_mcu* mcu) {
   bushd_mcu_travel* travel = &mcu->travel;
-  if (!bushd_mcu_travels(travel)) return;
   if (mcu->reception.silent_ticks >= mcu->reception.comm_timeout_ticks) {
     mcu->faults |= BUSHD_FAULT_LINK;
     if (is_run(travel)) bushd_mcu_count_ramp_down(mcu);
   }
   if (mcu->faults != 0) bushd_mcu_ramp_down_run(mcu, travel->motor);
+}
+
+void bushd_mcu_go_travel(bushd_mcu* mcu, uint16_t active_inputs) {
+  bushd_mcu_travel* travel = &mcu->travel;
+  if (!bushd_mcu_travels(travel)) return;
+  if ((bushd_mcu_program_motors(mcu) & motor_bit(travel->motor)) == 0) end_by_faults(mcu);
   if (bushd_mcu_owner_of_motor(mcu, travel->motor) == BUSHD_MCU_OWNER_TRAVEL) {
     go_on(mcu, active_inputs);
   } else {
@@ -183,15 +197,11 @@ static bool has_both_limits(const bushd_mcu* mcu, uint16_t bit) {
   return (both & (uint16_t)~mcu->limits.both_ends & bit) != 0;
 }
 
-static bushd_status check(bushd_mcu* mcu, const bushd_travel* message) {
+static bushd_status check(const bushd_mcu* mcu, const bushd_travel* message) {
   const uint16_t bit = motor_bit(message->motor);
   const bool at_edges = message->edge != BUSHD_EDGE_NONE;
   const uint64_t delay_ns = (uint64_t)message->delay_us * 1000u;
-  bushd_mcu_update_state(mcu);
-  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
-  if (mcu->motor[message->motor].table < 0) return BUSHD_E_NO_TABLE;
-  if (bushd_mcu_travels(&mcu->travel) || bushd_mcu_homing_in_use(mcu) || mcu->trigger.armed != 0 ||
-      (bushd_mcu_engaged(mcu) & bit) != 0) {
+  if (bushd_mcu_travels(&mcu->travel) || bushd_mcu_homing_in_use(mcu) || mcu->trigger.armed != 0) {
     return BUSHD_E_STATE;
   }
   if (message->steps > bushd_mcu_steps_counted(mcu, message->motor, message->direction)) {
@@ -206,7 +216,8 @@ static bushd_status check(bushd_mcu* mcu, const bushd_travel* message) {
   return (bushd_mcu_forbidden(mcu, message->direction) & bit) != 0 ? BUSHD_E_FORBIDDEN : BUSHD_OK;
 }
 
-static void take(bushd_mcu* mcu, const bushd_travel* message, uint32_t ticks, uint32_t spare_ns) {
+static void take(bushd_mcu* mcu, const bushd_travel* message, uint32_t due, uint32_t ticks,
+                 uint32_t spare_ns) {
   bushd_mcu_travel* travel = &mcu->travel;
   memset(travel, 0, sizeof *travel);
   travel->motor = message->motor;
@@ -218,7 +229,7 @@ static void take(bushd_mcu* mcu, const bushd_travel* message, uint32_t ticks, ui
   travel->wait_ns = message->wait_us * 1000u;
   travel->run_ticks = spare_ns == 0 ? ticks : ticks - 1u;
   travel->run_ns = spare_ns == 0 ? 0 : mcu->tick_ns - spare_ns;
-  travel->due_tick = bushd_mcu_first_open(mcu);
+  travel->due_tick = due;
   mcu->trigger.number = message->number;
   mcu->trigger.state = BUSHD_TRIGGER_STARTED;
   mcu->trigger.start_tick = travel->due_tick;
@@ -226,25 +237,19 @@ static void take(bushd_mcu* mcu, const bushd_travel* message, uint32_t ticks, ui
   mcu->local.held &= (uint16_t)~motor_bit(message->motor);
 }
 
-bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message) {
-  bushd_mcu_travel* travel = &mcu->travel;
-  if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
-  if (message->kind == BUSHD_TRAVEL_NONE) {
-    if (bushd_mcu_owner_of_motor(mcu, message->motor) == BUSHD_MCU_OWNER_TRAVEL) {
-      bushd_mcu_ramp_down_run(mcu, message->motor);
-      end(mcu, BUSHD_TRAVEL_STOPPED);
-    }
-    return BUSHD_OK;
-  }
-  // Its acknowledgement was lost.
-  if (message->number == mcu->trigger.number) return BUSHD_OK;
+// `due`: the first tick in which it may begin.
+static bushd_status begin_first(bushd_mcu* mcu, const bushd_travel* message, uint32_t due) {
   const bushd_status status = check(mcu, message);
   if (status != BUSHD_OK) return status;
-  const bushd_table_run_entry run = {message->motor, (uint8_t)mcu->motor[message->motor].table,
-                                     message->direction, message->steps, 0};
+  bushd_mcu_motor* motor = &mcu->motor[message->motor];
+  uint32_t ticks;
   uint32_t spare_ns;
-  if (!bushd_mcu_make_run(mcu, &run, &spare_ns)) return BUSHD_E_CAPACITY;
-  take(mcu, message, mcu->motor[message->motor].made.until, spare_ns);
+  start_run(mcu, message->motor, message->steps, message->direction);
+  if (!bushd_mcu_ticks_of_run(&motor->made.run, mcu->tick_ns, &ticks, &spare_ns)) {
+    return BUSHD_E_CAPACITY;
+  }
+  take(mcu, message, due, ticks, spare_ns);
+  bushd_mcu_travel* travel = &mcu->travel;
   const bool steps = message->kind == BUSHD_TRAVEL_STEP;
   bushd_mcu_begin_by_itself(mcu, message->motor, steps ? 1 : 0, message->direction, 0,
                             BUSHD_MCU_TRAVEL);
@@ -258,3 +263,33 @@ bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message) 
   }
   return BUSHD_OK;
 }
+
+bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message) {
+  if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
+  if (message->kind == BUSHD_TRAVEL_NONE) {
+    if (bushd_mcu_owner_of_motor(mcu, message->motor) == BUSHD_MCU_OWNER_TRAVEL) {
+      bushd_mcu_ramp_down_run(mcu, message->motor);
+      end(mcu, BUSHD_TRAVEL_STOPPED);
+    }
+    return BUSHD_OK;
+  }
+  // Its acknowledgement was lost.
+  if (message->number == mcu->trigger.number) return BUSHD_OK;
+  bushd_mcu_update_state(mcu);
+  if (mcu->state != BUSHD_STATE_READY && mcu->state != BUSHD_STATE_RUN) return BUSHD_E_STATE;
+  if (mcu->motor[message->motor].table < 0) return BUSHD_E_NO_TABLE;
+  if ((bushd_mcu_engaged(mcu) & motor_bit(message->motor)) != 0) return BUSHD_E_STATE;
+  return begin_first(mcu, message, bushd_mcu_first_open(mcu));
+}
+
+#if BUSHD_PROGRAMS
+bushd_status bushd_mcu_begin_travel(bushd_mcu* mcu, const bushd_travel* message) {
+  const bushd_status status = begin_first(mcu, message, mcu->tick + 1u);
+  if (mcu->travel.stage == BUSHD_TRAVEL_DELAY) begin(mcu, BUSHD_TRAVEL_RUN);
+  return status;
+}
+
+void bushd_mcu_give_up_travel(bushd_mcu* mcu) {
+  if (bushd_mcu_travels(&mcu->travel)) end(mcu, BUSHD_TRAVEL_STOPPED);
+}
+#endif

@@ -30,6 +30,11 @@ typedef struct bushd_mcu_travel {
 } bushd_mcu_travel;
 
 bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message);
+// The same for a program, from the tick on that is prepared next. What silence and faults end is
+// the program's affair. Precondition: its number is 0, and the motor is the program's, and rests.
+bushd_status bushd_mcu_begin_travel(bushd_mcu* mcu, const bushd_travel* message);
+// Its motor has been stopped, or does not wait any longer.
+void bushd_mcu_give_up_travel(bushd_mcu* mcu);
 // Before every tick is prepared.
 void bushd_mcu_go_travel(bushd_mcu* mcu, uint16_t active_inputs);
 // The edge that it waits for (bushd_mcu_trigger).

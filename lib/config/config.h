@@ -202,6 +202,7 @@ struct CamacModule {
   Type type = Type::kBushd2;
   int f_start_hz = 40;                                          // of kBushd2: code 250
   AdjustableDelay adjustable_delay = AdjustableDelay::kReturn;  // of kBushd1
+  bool without_computer = false;  // its motions go on when no daemon is heard
   std::vector<MotorId> motors{};  // by their numbers in the module; kBushd1 has one
 };
 struct Crate {

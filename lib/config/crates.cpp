@@ -93,7 +93,9 @@ Result<void> read_motors(const TomlReader& reader, const std::string& where, con
 
 Result<void> read_bushd2(const TomlReader& reader, const std::string& where, const Config& config,
                          CamacModule* module, Places* places) {
-  if (auto known = reader.only({"station", "type", "f_start_hz", "motors"}); !known) return known;
+  if (auto known = reader.only({"station", "type", "without_computer", "f_start_hz", "motors"});
+      !known)
+    return known;
   if (reader.has("f_start_hz")) {
     const auto f_start = reader.integer("f_start_hz", kLeastStartHz, kMostStartHz, "Hz");
     if (!f_start) return fail(f_start.error());
@@ -104,7 +106,9 @@ Result<void> read_bushd2(const TomlReader& reader, const std::string& where, con
 
 Result<void> read_bushd1(const TomlReader& reader, const std::string& where, const Config& config,
                          CamacModule* module, Places* places) {
-  if (auto known = reader.only({"station", "type", "adjustable_delay", "motor"}); !known) {
+  if (auto known =
+          reader.only({"station", "type", "without_computer", "adjustable_delay", "motor"});
+      !known) {
     return known;
   }
   if (reader.has("adjustable_delay")) {
@@ -136,6 +140,11 @@ Result<void> read_module(const TomlReader& reader, const Config& config, Crate* 
   if (!type) return fail(type.error());
   CamacModule module{.station = number,
                      .type = *type == 0 ? CamacModule::Type::kBushd1 : CamacModule::Type::kBushd2};
+  if (reader.has("without_computer")) {
+    const auto alone = reader.boolean("without_computer");
+    if (!alone) return fail(alone.error());
+    module.without_computer = *alone;
+  }
   const std::string where = fmt::format("station {} of crate {}", number, crate->number);
   const auto read = module.type == CamacModule::Type::kBushd1 ? read_bushd1 : read_bushd2;
   if (auto good = read(reader, where, config, &module, places); !good) return good;

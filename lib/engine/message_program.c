@@ -87,5 +87,6 @@ bushd_status bushd_decode_program_state(const uint8_t* payload, size_t size,
   message->start_tick = get32(&r);
   message->tick = get32(&r);
   return finish(&r, message->stage <= BUSHD_PROGRAM_ENDED &&
-                        message->reason <= BUSHD_PROGRAM_LATE && message->size <= message->memory);
+                        message->reason <= BUSHD_PROGRAM_TRAVELLED &&
+                        message->size <= message->memory);
 }

@@ -52,16 +52,17 @@ typedef enum bushd_program_stage {
 
 typedef enum bushd_program_reason {
   BUSHD_PROGRAM_NO_REASON = 0,
-  BUSHD_PROGRAM_DONE = 1,      // END was reached
-  BUSHD_PROGRAM_STOPPED = 2,   // on request
-  BUSHD_PROGRAM_FAULT = 3,     // emergency, overcurrent, lost step with the bus
-  BUSHD_PROGRAM_SILENCE = 4,   // no master was heard
-  BUSHD_PROGRAM_LIMIT = 5,     // a limit inhibits the direction of a motor
-  BUSHD_PROGRAM_RANGE = 6,     // a frame leads beyond what its motor's part allows
-  BUSHD_PROGRAM_NO_INPUT = 7,  // WAIT_INPUT has waited for its longest
-  BUSHD_PROGRAM_REFUSED = 8,   // a motion that the MCU cannot make: another line is under way
-  BUSHD_PROGRAM_DISABLED = 9,  // the drivers are disabled
-  BUSHD_PROGRAM_LATE = 10      // the ticks of the bus have changed before its first tick
+  BUSHD_PROGRAM_DONE = 1,       // END was reached
+  BUSHD_PROGRAM_STOPPED = 2,    // on request
+  BUSHD_PROGRAM_FAULT = 3,      // emergency, overcurrent, lost step with the bus
+  BUSHD_PROGRAM_SILENCE = 4,    // no master was heard
+  BUSHD_PROGRAM_LIMIT = 5,      // a limit inhibits the direction of a motor
+  BUSHD_PROGRAM_RANGE = 6,      // a frame leads beyond what its motor's part allows
+  BUSHD_PROGRAM_NO_INPUT = 7,   // WAIT_INPUT has waited for its longest
+  BUSHD_PROGRAM_REFUSED = 8,    // a motion that the MCU cannot make: another line is under way
+  BUSHD_PROGRAM_DISABLED = 9,   // the drivers are disabled
+  BUSHD_PROGRAM_LATE = 10,      // the ticks of the bus have changed before its first tick
+  BUSHD_PROGRAM_TRAVELLED = 11  // a travel has failed; the report has its bushd_travel_stage
 } bushd_program_reason;
 
 // A bit of bushd_program_state.flags: a reset leaves the program as it is now, or none if there is

@@ -1,6 +1,7 @@
 #include "engine/program.h"
 
 #include "engine/cursor.h"
+#include "engine/message_motion.h"
 
 #define BANK_ELEMENTARY 0x80u  // as in LINE_RUN
 
@@ -31,9 +32,16 @@ static void get_line(reader* r, bushd_program_frame* frame) {
   frame->points = get16(r);
 }
 
+static void get_travel(reader* r, bushd_program_frame* frame) {
+  frame->bank = get8(r);
+  frame->edge = get8(r);
+  frame->delay_us = get32(r);
+  frame->us = get32(r);
+}
+
 // Its fields as they come; `entries` are skipped.
 static bushd_program_frame get_frame(reader* r) {
-  bushd_program_frame frame = {get8(r), 0, 0, 0, false, 0, 0, 0, 0, false, 0, NULL};
+  bushd_program_frame frame = {.kind = get8(r)};
   const uint8_t size = entry_size(frame.kind);
   if (size != 0) {
     frame.motors = get16(r);
@@ -44,6 +52,9 @@ static bushd_program_frame get_frame(reader* r) {
     case BUSHD_PROGRAM_LINE_TO:
     case BUSHD_PROGRAM_LINE_BY:
       get_line(r, &frame);
+      break;
+    case BUSHD_PROGRAM_TRAVEL:
+      get_travel(r, &frame);
       break;
     case BUSHD_PROGRAM_WAIT:
     case BUSHD_PROGRAM_PULSE:
@@ -64,6 +75,19 @@ static bushd_program_frame get_frame(reader* r) {
   return frame;
 }
 
+// As of TRAVEL, the message.
+static bool travel_in_range(const bushd_program_frame* frame) {
+  const bool at_edges = frame->edge != BUSHD_EDGE_NONE;
+  const uint32_t least_us = at_edges ? BUSHD_TRIGGER_MIN_DELAY_US : 0;
+  const uint32_t most_us = at_edges ? BUSHD_TRIGGER_MAX_DELAY_US : 0;
+  if (frame->motor_count != 1) return false;
+  const int32_t steps = bushd_program_entry_of(frame, 0, 0).steps;
+  return steps != 0 && steps != INT32_MIN && frame->bank <= BUSHD_SCRATCH_BANK &&
+         frame->edge <= BUSHD_EDGE_FALLING && frame->delay_us >= least_us &&
+         frame->delay_us <= most_us && frame->us >= BUSHD_TRAVEL_MIN_WAIT_US &&
+         frame->us <= BUSHD_TRAVEL_MAX_WAIT_US;
+}
+
 // `at`: where it begins. A level of 2 is the same as 1 to who reads it, and is refused here.
 static bool in_range(const bushd_program_frame* frame, const uint8_t* at, uint16_t motors) {
   switch (frame->kind) {
@@ -74,6 +98,8 @@ static bool in_range(const bushd_program_frame* frame, const uint8_t* at, uint16
     case BUSHD_PROGRAM_LINE_BY:
       return frame->motors != 0 && (frame->motors & ~motors) == 0 &&
              frame->bank <= BUSHD_SCRATCH_BANK && frame->points != 0;
+    case BUSHD_PROGRAM_TRAVEL:
+      return (frame->motors & ~motors) == 0 && travel_in_range(frame);
     case BUSHD_PROGRAM_WAIT:
       return frame->us >= 1 && frame->us <= BUSHD_PROGRAM_MOST_WAIT_US;
     case BUSHD_PROGRAM_WAIT_INPUT:

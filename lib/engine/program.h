@@ -50,11 +50,12 @@ enum {
   FRAME(WAIT_INPUT, 6, 6, 0)        \
   FRAME(PULSE, 7, 4, 0)             \
   FRAME(REPEAT, 8, 2, 0)            \
-  FRAME(NEXT, 9, 0, 0)
+  FRAME(NEXT, 9, 0, 0)              \
+  FRAME(TRAVEL, 10, 12, 4)
 
 #define BUSHD_PROGRAM_KIND(name, code, own, motor) BUSHD_PROGRAM_##name = (code),
 typedef enum bushd_program_kind {
-  BUSHD_PROGRAM_FRAMES(BUSHD_PROGRAM_KIND) BUSHD_PROGRAM_KINDS = 10
+  BUSHD_PROGRAM_FRAMES(BUSHD_PROGRAM_KIND) BUSHD_PROGRAM_KINDS = 11
 } bushd_program_kind;
 #undef BUSHD_PROGRAM_KIND
 
@@ -78,11 +79,14 @@ typedef struct bushd_program_frame {
   uint8_t kind;  // bushd_program_kind
   uint16_t motors;
   uint8_t motor_count;
-  uint8_t bank;             // of a line
+  uint8_t bank;             // of a line, or of TRAVEL
   bool elementary;          // a line by engine/elementary.h, not by engine/line.h
   uint16_t shortest_delay;  // of a line; of moves each motor has its own
-  uint16_t points;          // of a line; 1 of a move
-  uint32_t us;              // WAIT; the longest one of WAIT_INPUT, 0: for ever; PULSE
+  uint16_t points;          // of a line; 1 of a move and of TRAVEL
+  uint32_t us;              // WAIT; the longest one of WAIT_INPUT, 0: for ever; PULSE; until the
+                            // return of TRAVEL
+  uint32_t delay_us;        // from the edge to the first run of TRAVEL
+  uint8_t edge;             // bushd_edge of TRAVEL
   uint8_t input;
   bool level;
   uint16_t count;          // of REPEAT, 0: without end
@@ -90,7 +94,7 @@ typedef struct bushd_program_frame {
 } bushd_program_frame;
 
 typedef struct bushd_program_entry {
-  int32_t steps;            // a position, or a distance
+  int32_t steps;            // a position, or a distance; the first run of TRAVEL
   uint16_t shortest_delay;  // of moves
 } bushd_program_entry;
 

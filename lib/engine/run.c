@@ -85,6 +85,14 @@ void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, i
   cut(run, 0, steps);
 }
 
+void bushd_run_start_as_written(bushd_run* run, const bushd_table* table, uint32_t steps,
+                                int direction) {
+  clear(run, table, direction);
+  run->accel_end = table->accel.count;
+  run->decel_left = table->decel.count;
+  run->cruise_left = steps - table->accel.count - table->decel.count;
+}
+
 void bushd_run_begin_late(bushd_run* run, uint32_t ns) {
   const uint32_t unit_ns = run->table->time_unit_ns;
   const uint32_t units = ns / unit_ns + (ns % unit_ns != 0);

@@ -65,6 +65,13 @@ typedef struct bushd_run {
 void bushd_run_start(bushd_run* run, const bushd_table* table, uint32_t steps, int direction,
                      bushd_delay shortest_delay);
 
+// A run of all codes of both sides as they stand, in any order: A(0) .. A(last), then c so often
+// that it has `steps`, then the decelerating side down to D(0). Such a run can neither ramp down
+// nor be retargeted. Precondition: the table passed bushd_table_check_written; steps >= the codes
+// of both sides. O(1).
+void bushd_run_start_as_written(bushd_run* run, const bushd_table* table, uint32_t steps,
+                                int direction);
+
 // Puts the beginning of a run that has just been started `ns` after the beginning of its first
 // tick. Precondition: ns <= length of the ticks that it will be expanded in. O(1).
 void bushd_run_begin_late(bushd_run* run, uint32_t ns);

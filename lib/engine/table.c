@@ -4,14 +4,14 @@
 
 #include "engine/frame.h"
 
-static bushd_status check_ramp(const bushd_ramp* ramp, uint32_t* bad_index) {
+static bushd_status check_ramp(const bushd_ramp* ramp, bool sorted, uint32_t* bad_index) {
   uint32_t sum = 0;
   *bad_index = 0;
   if (ramp->code == NULL || ramp->count == 0) return BUSHD_E_TABLE_EMPTY;
   for (uint32_t i = 0; i < ramp->count; ++i) {
     *bad_index = i;
     if (ramp->code[i] == 0) return BUSHD_E_TABLE_ZERO;
-    if (i > 0 && ramp->code[i] > ramp->code[i - 1]) return BUSHD_E_TABLE_UNSORTED;
+    if (sorted && i > 0 && ramp->code[i] > ramp->code[i - 1]) return BUSHD_E_TABLE_UNSORTED;
     // A run adds a tick (at most 127 delays of 16 bits) to such a sum: keep clear of 2^32.
     if (sum > UINT32_MAX / 2 - ramp->code[i]) return BUSHD_E_TABLE_TOO_LONG;
     sum += ramp->code[i];
@@ -22,10 +22,10 @@ static bushd_status check_ramp(const bushd_ramp* ramp, uint32_t* bad_index) {
 bushd_status bushd_table_check(const bushd_table* table, uint32_t* bad_index, bool* bad_decel) {
   uint32_t index = 0;
   bool decel = false;
-  bushd_status status = check_ramp(&table->accel, &index);
+  bushd_status status = check_ramp(&table->accel, true, &index);
   if (status == BUSHD_OK) {
     decel = true;
-    status = check_ramp(&table->decel, &index);
+    status = check_ramp(&table->decel, true, &index);
   }
   if (status == BUSHD_OK && (table->cruise == 0 || table->time_unit_ns == 0)) {
     status = BUSHD_E_TABLE_ZERO;
@@ -33,6 +33,29 @@ bushd_status bushd_table_check(const bushd_table* table, uint32_t* bad_index, bo
   if (bad_index != NULL) *bad_index = index;
   if (bad_decel != NULL) *bad_decel = decel;
   return status;
+}
+
+bushd_status bushd_table_check_written(const bushd_table* table) {
+  uint32_t index;
+  bushd_status status = check_ramp(&table->accel, false, &index);
+  if (status == BUSHD_OK) status = check_ramp(&table->decel, false, &index);
+  if (status != BUSHD_OK) return status;
+  return table->cruise == 0 || table->time_unit_ns == 0 ? BUSHD_E_TABLE_ZERO : BUSHD_OK;
+}
+
+bool bushd_table_is_written(const bushd_table* table) {
+  return bushd_table_check(table, NULL, NULL) == BUSHD_E_TABLE_UNSORTED;
+}
+
+static uint16_t shortest(const bushd_ramp* ramp, uint16_t delay) {
+  for (uint16_t i = 0; i < ramp->count; ++i) {
+    if (ramp->code[i] < delay) delay = ramp->code[i];
+  }
+  return delay;
+}
+
+uint16_t bushd_written_fastest(const bushd_table* table) {
+  return shortest(&table->decel, shortest(&table->accel, table->cruise));
 }
 
 uint16_t bushd_table_accel(const bushd_table* table, uint32_t i) {
@@ -74,11 +97,19 @@ uint16_t bushd_table_fastest(const bushd_table* table) {
   return table->cruise;
 }
 
-uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_ns) {
-  // Steps at the shortest delay x: a stretch of length T holds at most floor(T / x) + 1 of them.
-  const uint64_t shortest_ns = (uint64_t)bushd_table_fastest(table) * table->time_unit_ns;
+// Steps at the shortest delay x: a stretch of length T holds at most floor(T / x) + 1 of them.
+static uint32_t steps_at(uint16_t delay, const bushd_table* table, uint32_t tick_ns) {
+  const uint64_t shortest_ns = (uint64_t)delay * table->time_unit_ns;
   const uint64_t steps = tick_ns / shortest_ns + 1;
   return steps > UINT32_MAX ? UINT32_MAX : (uint32_t)steps;
+}
+
+uint32_t bushd_table_max_steps_per_tick(const bushd_table* table, uint32_t tick_ns) {
+  return steps_at(bushd_table_fastest(table), table, tick_ns);
+}
+
+uint32_t bushd_written_max_steps_per_tick(const bushd_table* table, uint32_t tick_ns) {
+  return steps_at(bushd_written_fastest(table), table, tick_ns);
 }
 
 static uint32_t crc32_u16(uint32_t crc, uint16_t value) {

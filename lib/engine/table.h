@@ -60,7 +60,7 @@ static inline bool bushd_delay_is_code(bushd_delay delay) {
 // The index is optional (all set or all NULL): with it a run finds its place in a ramp in constant
 // time (bushd_ramp_index makes it); without, it walks the codes. Results agree.
 typedef struct bushd_ramp {
-  const uint16_t* code;  // `count` delays in time units, 1..65535, never rising
+  const uint16_t* code;  // `count` delays in time units, 1..65535, never rising but as written
   uint16_t count;        // >= 1
 #if BUSHD_RAMP_INDEX
   const uint32_t* sum;     // count + 1 entries: sum[i] = code[0] + ... + code[i-1]
@@ -82,6 +82,15 @@ typedef struct bushd_table {
 // On error *bad_index (may be NULL) is the index, from slow to fast, of the offending code and
 // *bad_decel (may be NULL) tells its side. O(count).
 bushd_status bushd_table_check(const bushd_table* table, uint32_t* bad_index, bool* bad_decel);
+
+// Codes as they are written: both sides may rise and fall. Nothing but bushd_run_start_as_written
+// may be made of them, and no ramp-down. The same checks but for the order. O(count).
+bushd_status bushd_table_check_written(const bushd_table* table);
+// Whether a table with these checks is not one that bushd_table_check lets pass. O(count).
+bool bushd_table_is_written(const bushd_table* table);
+// The shortest of all its codes, and bushd_table_max_steps_per_tick of it. O(count).
+uint16_t bushd_written_fastest(const bushd_table* table);
+uint32_t bushd_written_max_steps_per_tick(const bushd_table* table, uint32_t tick_ns);
 
 // A(i), D(i) and the delay before step j of N (1 <= j <= N), in time units. O(1).
 uint16_t bushd_table_accel(const bushd_table* table, uint32_t i);

@@ -70,7 +70,7 @@ Kinds program_kinds() {
                        }),
             codec(bushd_decode_program_state, bushd_encode_program_state),
             {{"stage 9", set8(0, 9)},
-             {"reason 11", set8(1, 11)},
+             {"reason 12", set8(1, 12)},
              {"more than it has memory", [](Bytes* p) {
                 bushd_put_u16(&(*p)[6], 7);
                 bushd_put_u16(&(*p)[8], 8);

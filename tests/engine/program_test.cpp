@@ -106,7 +106,16 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
   EXPECT_EQ(check(program({0}), 1), BUSHD_E_FORMAT) << "the MCU has one motor";
   EXPECT_EQ(check({1, 0, 0, 0, 0}), BUSHD_E_FORMAT) << "no motor";
   const std::map<std::string, Bytes> frames = {
-      {"no such frame", {10}},
+      {"no such frame", {11}},
+      {"a travel of two motors", {10, 3, 0, 0, 0, 0, 0, 0, 0, 50, 0, 0, 0, 9, 0, 0, 0, 9, 0, 0, 0}},
+      {"a travel of a motor that is not the program's",
+       {10, 4, 0, 0, 0, 0, 0, 0, 0, 50, 0, 0, 0, 9, 0, 0, 0}},
+      {"a travel of no step", {10, 1, 0, 0, 0, 0, 0, 0, 0, 50, 0, 0, 0, 0, 0, 0, 0}},
+      {"a travel by a bank that there is not",
+       {10, 1, 0, 9, 0, 0, 0, 0, 0, 50, 0, 0, 0, 9, 0, 0, 0}},
+      {"a travel at a third edge", {10, 1, 0, 0, 3, 50, 0, 0, 0, 50, 0, 0, 0, 9, 0, 0, 0}},
+      {"a travel that returns too soon", {10, 1, 0, 0, 0, 0, 0, 0, 0, 49, 0, 0, 0, 9, 0, 0, 0}},
+      {"a delay from no edge", {10, 1, 0, 0, 0, 50, 0, 0, 0, 50, 0, 0, 0, 9, 0, 0, 0}},
       {"no motor", {1, 0, 0}},
       {"a motor that is not the program's", {1, 4, 0, 9, 0, 0, 0, 0, 0}},
       {"no point", {3, 1, 0, 0, 0, 0, 0, 0}},
@@ -132,6 +141,9 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
       << "a line by the volatile bank";
   EXPECT_EQ(check(program({3, 1, 0, 0x88, 0, 0, 1, 0, 1, 0, 0, 0, 0})), BUSHD_OK)
       << "an elementary one";
+  EXPECT_EQ(check(program({10, 2, 0, 8, 1, 50, 0, 0, 0, 50, 0, 0, 0, 0xF7, 0xFF, 0xFF, 0xFF, 0})),
+            BUSHD_OK)
+      << "a travel by the volatile bank";
   EXPECT_EQ(check(program({5, 0, 0xA4, 0x93, 0xD6, 0})), BUSHD_OK) << "an hour";
   EXPECT_EQ(check(program({7, 0x40, 0x42, 0x0F, 0, 0})), BUSHD_OK) << "a second";
   EXPECT_EQ(check(program({8, 2, 0, 8, 2, 0, 8, 2, 0, 8, 2, 0, 9, 9, 9, 9, 0})), BUSHD_OK)

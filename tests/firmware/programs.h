@@ -24,7 +24,8 @@ enum class Kind : std::uint8_t {
   kWaitInput = 6,
   kPulse = 7,
   kRepeat = 8,
-  kNext = 9
+  kNext = 9,
+  kTravel = 10
 };
 
 struct ProgramFrame {
@@ -37,6 +38,9 @@ struct ProgramFrame {
   bool level = true;
   std::uint16_t count = 0;
   bool elementary = false;  // of a line
+  std::uint8_t bank = 0;
+  std::uint8_t edge = 0;
+  std::uint32_t delay_us = 0;
 };
 
 struct ProgramText {
@@ -77,7 +81,7 @@ inline Bytes bytes_of(const ProgramText& text) {
       case Kind::kLineBy:
         append(bytes, mask, 2);
         if (line) {
-          bytes.push_back(frame.elementary ? 0x80 : 0);
+          bytes.push_back(static_cast<std::uint8_t>(frame.bank | (frame.elementary ? 0x80 : 0)));
           append(bytes, frame.shortest_delay, 2);
           append(bytes, frame.to.size(), 2);
         }
@@ -87,6 +91,14 @@ inline Bytes bytes_of(const ProgramText& text) {
             if (!line) append(bytes, frame.shortest_delay, 2);
           }
         }
+        break;
+      case Kind::kTravel:
+        append(bytes, mask, 2);
+        bytes.push_back(frame.bank);
+        bytes.push_back(frame.edge);
+        append(bytes, frame.delay_us, 4);
+        append(bytes, frame.us, 4);
+        append(bytes, static_cast<std::uint32_t>(frame.to.at(0).at(0)), 4);
         break;
       case Kind::kWait:
       case Kind::kPulse:
