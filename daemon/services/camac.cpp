@@ -74,6 +74,7 @@ class Camac::Station {
   // Whether its memory has changed for good, by a motion that has ended.
   virtual bool step(std::int64_t now_us) = 0;
   virtual void end_overtaken() = 0;
+  virtual std::string take_note() = 0;
 
   const std::string kept_as;
 };
@@ -91,6 +92,7 @@ class Camac::Bushd1Station final : public Station {
     return false;
   }
   void end_overtaken() override { shutter_.end_overtaken(); }
+  std::string take_note() override { return shutter_.take_note(); }
 
  private:
   CamacShutter shutter_;
@@ -110,6 +112,7 @@ class Camac::Bushd2Station final : public Station {
     return moved && !module_.is_moving();
   }
   void end_overtaken() override { motors_.end_overtaken(); }
+  std::string take_note() override { return motors_.take_note(); }
 
  private:
   CamacMotors motors_;
@@ -128,9 +131,9 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
           "camac/" + std::to_string(configured.number) + "/" + std::to_string(module.station);
       std::unique_ptr<Station> station;
       if (module.type == config::CamacModule::Type::kBushd1) {
-        station = std::make_unique<Bushd1Station>(
-            kept_as, adjusts(module), name, module.motors.front(), installation, interlocks,
-            open_moves.precedence(), turn_, tables, travels, outputs, ask);
+        station = std::make_unique<Bushd1Station>(kept_as, adjusts(module), name, module,
+                                                  installation, interlocks, open_moves.precedence(),
+                                                  turn_, tables, travels, outputs, ask);
       } else {
         station = std::make_unique<Bushd2Station>(kept_as, name, module, installation, interlocks,
                                                   open_moves.precedence(), turn_, tables, lines,
@@ -159,13 +162,16 @@ void Camac::request(const api::Asker& asker, const api::Camac& request) {
   api::CamacResult result{.block = camac::transfer(crate->crate, request.block)};
   result.requests = crate->crate.requests();
   crate->told &= result.requests;  // what is raised again before the next step is told again
-  for (const auto& station : crate->stations) station->end_overtaken();
+  std::string reason = std::to_string(result.block.tally) + " words";
+  for (const auto& station : crate->stations) {
+    station->end_overtaken();
+    if (const std::string note = station->take_note(); !note.empty()) reason += "; " + note;
+  }
   // Positions that a motion counts are kept when it ends: each look at them would be a sync of the
   // disk.
   if (writes(request.block)) keep_memories(*crate);
-  asker.answer(api::Completed{.outcome = api::Outcome::kDone,
-                              .reason = std::to_string(result.block.tally) + " words",
-                              .detail = std::move(result)});
+  asker.answer(api::Completed{
+      .outcome = api::Outcome::kDone, .reason = std::move(reason), .detail = std::move(result)});
 }
 
 void Camac::keep_memories(const Crate& crate) {

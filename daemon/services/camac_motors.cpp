@@ -11,13 +11,6 @@ using camac::Bushd2;
 using camac::MotorStatus;
 using camac::Program;
 
-constexpr std::int64_t kNsPerS = 1'000'000'000;
-
-// Before the step in the middle stands the last code that is used.
-std::size_t codes_used(const Program& program) {
-  return std::min<std::size_t>((program.steps + 1) / 2, program.codes.size());
-}
-
 std::optional<api::Outcome> outcome_of(const api::Reply& reply) {
   const auto* completed = std::get_if<api::Completed>(&reply);
   if (completed == nullptr) return std::nullopt;
@@ -29,15 +22,7 @@ std::optional<api::Outcome> outcome_of(const api::Reply& reply) {
 Result<tables::TablePtr> table_of_program(const Program& program, int f_start_hz,
                                           const std::string& module) {
   const auto rise = std::ranges::is_sorted_until(program.codes, std::greater<>());
-  const auto falling = static_cast<std::size_t>(rise - program.codes.begin());
-  if (falling < codes_used(program)) {
-    return fail("code " + std::to_string(falling) + " of program " + std::to_string(program.page) +
-                " rises from " + std::to_string(*(rise - 1)) + " to " + std::to_string(*rise) +
-                "; codes must fall, or stay, from the start to the middle of a motion");
-  }
-  tables::TableContent content{.name = module,
-                               .time_unit_ns = static_cast<std::uint32_t>(
-                                   kNsPerS / (Bushd2::kCodesPerStartPeriod * f_start_hz))};
+  tables::TableContent content{.name = module, .time_unit_ns = code_unit_ns(f_start_hz)};
   content.accel.assign(program.codes.begin(), rise);
   content.name += "-" + std::to_string(program.page) + "-" +
                   tables::content_hash(content).substr(0, tables::kShortHashLength);
@@ -54,6 +39,17 @@ MotorStatus limits_of(const Installation& installation, MotorId motor) {
 
 void CamacMotors::warn(MotorId motor, const std::string& why) {
   outputs_.log(LogLevel::kWarning, motor, name_ + ": " + why);
+}
+
+void CamacMotors::note(std::int64_t of_fastest_ns) {
+  note_ = as_written_note(installation_, motion_->motor, of_fastest_ns);
+  warn(motion_->motor, note_);
+}
+
+std::int64_t CamacMotors::fastest_ns(const Program& program) const {
+  const auto used = static_cast<std::ptrdiff_t>(camac::codes_used(program));
+  const auto code = *std::min_element(program.codes.begin(), program.codes.begin() + used);
+  return code * std::int64_t{code_unit_ns(config_.f_start_hz)};
 }
 
 MotorStatus CamacMotors::status(int number) {
@@ -82,16 +78,27 @@ bool CamacMotors::move(const Program& program) {
   const motion::Motor& motor = installation_[id];
   Result<void> may = motor.reach().may_be_used();
   if (may && motor.has_plan()) may = fail("moves, by another's request");
-  const auto table = table_of_program(program, config_.f_start_hz, name_);
-  if (may && !table) may = fail(table.error());
+  const bool as_written = !falls_to_the_middle(program);
+  const bool alone = as_written || config_.without_computer;
+  if (may && alone) may = may_have_program(installation_.mcu_of(id), as_written);
+  tables::TablePtr by;
+  if (may && !as_written) {
+    auto table = table_of_program(program, config_.f_start_hz, name_);
+    if (table) by = std::move(*table);
+    if (!table) may = fail(table.error());
+  }
   const std::int64_t steps = program.left ? -std::int64_t{program.steps} : program.steps;
   if (may) may = motor.reach().may_move_to(motor.position_steps() + steps);
   if (!may) {
     warn(id, motor.name() + ": " + may.error().text());
     return false;
   }
-  motion_ =
-      Motion{.motor = id, .program = program, .table = *table, .after_stops = turn_.after_stops};
+  motion_ = Motion{.motor = id,
+                   .program = program,
+                   .table = std::move(by),
+                   .alone = alone,
+                   .after_stops = turn_.after_stops};
+  if (as_written) note(fastest_ns(program));
   return true;
 }
 
@@ -117,6 +124,9 @@ void CamacMotors::step(std::int64_t now_us, Bushd2& module) {
 }
 
 void CamacMotors::begin(std::int64_t now_us, Bushd2& module) {
+  // Its MCU takes codes at rest only.
+  if (!motion_->table && !installation_.rests(installation_.mcu_of(motion_->motor))) return;
+  if (!motion_->table) return move(now_us, module, {});
   const GroupId group = installation_.config()[motion_->motor].group;
   if (streams()) return move(now_us, module, motion_->table);
   motion_->stage = Motion::Stage::kGetsTable;
@@ -132,13 +142,14 @@ void CamacMotors::begin(std::int64_t now_us, Bushd2& module) {
 bool CamacMotors::streams() const {
   const GroupId group = installation_.config()[motion_->motor].group;
   const tables::Table& in_mcu = *installation_.tables()[group];
+  if (motion_->alone) return false;  // a stream needs the daemon
   if (in_mcu.content_hash() == motion_->table->content_hash()) return false;
   if (!installation_.mcu_of(motion_->motor).offers.streams || !tables_.waits_for_motors(group)) {
     return false;
   }
   const std::int64_t fastest_ns =
       std::int64_t{bushd_table_fastest(&in_mcu.view())} * in_mcu.view().time_unit_ns;
-  const std::uint8_t fastest_code = motion_->program.codes[codes_used(motion_->program) - 1];
+  const std::uint8_t fastest_code = motion_->program.codes[camac::codes_used(motion_->program) - 1];
   return fastest_code * std::int64_t{motion_->table->view().time_unit_ns} >= fastest_ns;
 }
 
@@ -165,6 +176,12 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   motion_->stage = Motion::Stage::kMoves;
   motion_->from_steps = motor.position_steps();
   const std::int64_t steps = motion_->program.steps;
+  if (motion_->alone) {
+    return program_.begin(now_us,
+                          text_of(motion_->program, motor.name(), config_.without_computer,
+                                  motion_->table == nullptr, config_.f_start_hz),
+                          motion_->after_stops);
+  }
   const std::vector<api::MotorAmount> motors{
       {motor.name(), motion_->program.left ? -steps : steps}};
   const api::Asker who = asker();
@@ -196,7 +213,9 @@ void CamacMotors::follow_move(std::int64_t now_us, Bushd2& module) {
          api::Stop{{installation_[motion_->motor].name()}});
   }
   tell_steps(module);
-  if (const auto reply = session_->last_answer()) end(module, *reply);
+  const std::optional<api::Reply> reply =
+      motion_->alone ? program_.follow(now_us) : session_->last_answer();
+  if (reply) end(module, *reply);
 }
 
 void CamacMotors::end(Bushd2& module, const api::Reply& reply) {

@@ -14,14 +14,14 @@
 #include "daemon/model/outputs.h"
 #include "daemon/model/precedence.h"
 #include "daemon/services/camac_asker.h"
+#include "daemon/services/camac_program.h"
 #include "daemon/services/lines.h"
 #include "daemon/services/tables_in_service.h"
 #include "heritage/camac/bushd2.h"
 
 namespace bushd::daemon {
 
-// The table of a program: as many of its codes, from the first one on, as never rise. Error: the
-// program needs more of them.
+// The table of a program: as many of its codes, from the first one on, as never rise.
 Result<tables::TablePtr> table_of_program(const camac::Program& program, int f_start_hz,
                                           const std::string& module);
 
@@ -44,7 +44,8 @@ class CamacMotors final : public camac::Motors {
         lines_(lines),
         outputs_(outputs),
         ask_(std::move(ask)),
-        session_(std::make_shared<CamacSession>(name_)) {}
+        session_(std::make_shared<CamacSession>(name_)),
+        program_(name_, session_, ask_) {}
 
   camac::MotorStatus status(int motor) override;
   bool move(const camac::Program& program) override;
@@ -54,6 +55,9 @@ class CamacMotors final : public camac::Motors {
   // begin.
   void end_overtaken();
 
+  // What people are told of the motion that was permitted last; empty: nothing.
+  std::string take_note() { return std::exchange(note_, {}); }
+
   // Does what is due, and tells the module what has become of its motion.
   void step(std::int64_t now_us, camac::Bushd2& module);
 
@@ -62,7 +66,8 @@ class CamacMotors final : public camac::Motors {
     enum class Stage { kBegins, kGetsTable, kMoves };
     MotorId motor;
     camac::Program program;
-    tables::TablePtr table;
+    tables::TablePtr table;  // null: it goes by its codes as they are written
+    bool alone = false;      // by a program of the MCU
     Stage stage = Stage::kBegins;
     std::int64_t from_steps = 0;
     std::uint32_t told = 0;  // of its steps
@@ -86,6 +91,8 @@ class CamacMotors final : public camac::Motors {
   void tell_steps(camac::Bushd2& module);
   void end(camac::Bushd2& module, const api::Reply& reply);
   void warn(MotorId motor, const std::string& why);
+  void note(std::int64_t of_fastest_ns);
+  std::int64_t fastest_ns(const camac::Program& program) const;
 
   const std::string name_;
   const config::CamacModule& config_;
@@ -98,6 +105,8 @@ class CamacMotors final : public camac::Motors {
   Outputs& outputs_;
   AskCore ask_;
   std::shared_ptr<CamacSession> session_;
+  CamacProgram program_;
+  std::string note_;
   std::shared_ptr<CamacSession> stops_ = std::make_shared<CamacSession>(name_);
   std::optional<Motion> motion_;
 };

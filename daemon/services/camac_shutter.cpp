@@ -103,11 +103,26 @@ bool CamacShutter::travel(const camac::Travel& travel) {
                   std::to_string((least_us + camac::Travel::kUnitUs - 1) / camac::Travel::kUnitUs) +
                   " or more there");
   }
-  const auto table = table_of_travel(travel, name_);
-  if (!table) return refuse(table.error().text());
+  const bool as_written = !camac::rise_and_fall_once(travel.codes);
+  const bool alone = as_written || without_computer_;
+  if (const auto may = may_have_program(mcu, as_written); alone && !may) {
+    return refuse(may.error().text());
+  }
+  tables::TablePtr by;
+  if (!as_written) {
+    auto table = table_of_travel(travel, name_);
+    if (!table) return refuse(table.error().text());
+    by = std::move(*table);
+  }
   const auto steps = static_cast<std::int64_t>(travel.codes.size());
-  return takes({.kind = Motion::Kind::kTravel, .travel = travel, .table = *table},
-               may_begin(travel.left ? -steps : steps));
+  const bool taken = takes(
+      {.kind = Motion::Kind::kTravel, .travel = travel, .table = std::move(by), .alone = alone},
+      may_begin(travel.left ? -steps : steps));
+  if (!taken || !as_written) return taken;
+  const std::int64_t fastest_ns = std::ranges::min(travel.codes) * std::int64_t{kTravelUnitNs};
+  note_ = as_written_note(installation_, motor_, fastest_ns);
+  warn(note_);
+  return true;
 }
 
 void CamacShutter::stop() {
@@ -123,15 +138,17 @@ void CamacShutter::end_overtaken() {
 void CamacShutter::follow(std::int64_t now_us, camac::Bushd1& module) {
   tell_limits(module);
   if (!motion_) return;
-  if (motion_->stage == Motion::Stage::kBegins && motion_->begins_no_more) {
+  const bool waits_for_rest = motion_->kind == Motion::Kind::kTravel && !motion_->table;
+  if (motion_->stage == Motion::Stage::kBegins &&
+      (motion_->begins_no_more || (motion_->to_stop && waits_for_rest))) {
     refuse("stopped before it began");
     motion_.reset();
     return module.stands();
   }
   if (motion_->stage == Motion::Stage::kBegins) begin(now_us);
   if (motion_->stage == Motion::Stage::kGetsTable) {
-    follow_table(module);
-  } else {
+    follow_table(now_us, module);
+  } else if (motion_->stage == Motion::Stage::kGoes) {
     follow_going(now_us, module);
   }
 }
@@ -139,10 +156,16 @@ void CamacShutter::follow(std::int64_t now_us, camac::Bushd1& module) {
 void CamacShutter::begin(std::int64_t now_us) {
   if (motion_->kind != Motion::Kind::kTravel) {
     motion_->stage = Motion::Stage::kGoes;
-    if (motion_->kind == Motion::Kind::kSensedStep) return ask_mcu();
+    if (motion_->kind == Motion::Kind::kSensedStep) return ask_mcu(now_us);
     return ask_(now_us, asker(),
                 api::Move{.kind = api::Move::Kind::kRelative,
                           .motors = {{installation_[motor_].name(), motion_->left() ? -1 : 1}}});
+  }
+  if (!motion_->table) {
+    // Its MCU takes codes at rest only.
+    if (!installation_.rests(installation_.mcu_of(motor_))) return;
+    motion_->stage = Motion::Stage::kGoes;
+    return ask_mcu(now_us);
   }
   motion_->stage = Motion::Stage::kGetsTable;
   const GroupId group = installation_.config()[motor_].group;
@@ -153,12 +176,12 @@ void CamacShutter::begin(std::int64_t now_us) {
   tables_.use(now_us, by, group, motion_->table);
 }
 
-void CamacShutter::follow_table(camac::Bushd1& module) {
+void CamacShutter::follow_table(std::int64_t now_us, camac::Bushd1& module) {
   const auto& reply = session_->last_answer();
   if (!reply) return;
   if (is_done(*reply, api::Outcome::kDone) && !motion_->to_stop) {
     motion_->stage = Motion::Stage::kGoes;
-    return ask_mcu();
+    return ask_mcu(now_us);
   }
   refuse(motion_->to_stop ? "stopped before it began"
                           : "its codes were not put in service: " + reason_of(*reply));
@@ -166,7 +189,14 @@ void CamacShutter::follow_table(camac::Bushd1& module) {
   module.stands();
 }
 
-void CamacShutter::ask_mcu() {
+void CamacShutter::ask_mcu(std::int64_t now_us) {
+  motion_->from_steps = installation_[motor_].position_steps();
+  if (motion_->alone) {
+    return program_.begin(now_us,
+                          text_of(motion_->travel, installation_[motor_].name(), without_computer_,
+                                  motion_->table == nullptr),
+                          motion_->after_stops);
+  }
   bushd_travel message{};
   message.direction = motion_->left() ? -1 : 1;
   if (motion_->kind == Motion::Kind::kSensedStep) {
@@ -183,7 +213,6 @@ void CamacShutter::ask_mcu() {
         travel.synchronous ? static_cast<std::uint32_t>(travel.first_run_delay_us()) : 0;
     message.wait_us = static_cast<std::uint32_t>(travel.return_delay_us());
   }
-  motion_->from_steps = installation_[motor_].position_steps();
   travels_.request(asker(), motor_, message);
 }
 
@@ -193,9 +222,19 @@ void CamacShutter::follow_going(std::int64_t now_us, camac::Bushd1& module) {
     ask_(now_us, {.session = stops_, .number = stops_->next_number()},
          api::Stop{{installation_[motor_].name()}});
   }
-  if (const auto reply = session_->last_answer()) return end(module, *reply);
-  const bushd_report* report = travels_.progress(motor_);
+  const std::optional<api::Reply> reply =
+      motion_->alone ? program_.follow(now_us) : session_->last_answer();
+  if (reply) return end(module, *reply);
+  const bushd_report* report = progress();
   if (motion_->kind == Motion::Kind::kTravel && report != nullptr) follow_travel(*report, module);
+}
+
+// What the MCU has reported last of the travel that is made.
+const bushd_report* CamacShutter::progress() const {
+  if (!motion_->alone) return travels_.progress(motor_);
+  const Mcu& mcu = installation_.mcu_of(motor_);
+  const bool runs = program_.runs() && installation_[motor_].is<motion::InProgram>();
+  return runs && !mcu.busy() ? &mcu.report() : nullptr;
 }
 
 // What happens between two reports is told in its order, whichever of it they show.

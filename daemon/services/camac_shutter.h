@@ -1,6 +1,7 @@
 // The motor behind a BUSHD-1. A step without a sensor is a move like any other. With one, and in
 // automatic travel, the MCU goes by itself (travels.h), by the codes as the table of the motor's
-// group; the module is told of it as far as reports show it.
+// group; by a program (camac_program.h) if the travel is to go on without the daemon, or its codes
+// rise and fall again. The module is told of it as far as reports show it.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include "daemon/model/outputs.h"
 #include "daemon/model/precedence.h"
 #include "daemon/services/camac_asker.h"
+#include "daemon/services/camac_program.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
 #include "heritage/camac/bushd1.h"
@@ -24,11 +26,13 @@ Result<tables::TablePtr> table_of_travel(const camac::Travel& travel, const std:
 
 class CamacShutter final : public camac::Shutter {
  public:
-  CamacShutter(const std::string& name, MotorId motor, Installation& installation,
-               const Interlocks& interlocks, const Precedence& precedence, const CamacTurn& turn,
-               TablesInService& tables, Travels& travels, Outputs& outputs, AskCore ask)
+  CamacShutter(const std::string& name, const config::CamacModule& module,
+               Installation& installation, const Interlocks& interlocks,
+               const Precedence& precedence, const CamacTurn& turn, TablesInService& tables,
+               Travels& travels, Outputs& outputs, AskCore ask)
       : name_(name),
-        motor_(motor),
+        motor_(module.motors.front()),
+        without_computer_(module.without_computer),
         installation_(installation),
         interlocks_(interlocks),
         precedence_(precedence),
@@ -37,7 +41,8 @@ class CamacShutter final : public camac::Shutter {
         travels_(travels),
         outputs_(outputs),
         ask_(std::move(ask)),
-        session_(std::make_shared<CamacSession>(name)) {}
+        session_(std::make_shared<CamacSession>(name)),
+        program_(name, session_, ask_) {}
 
   void refuses(std::string_view why) override { refuse(std::string(why)); }
   bool step(const camac::SingleStep& step) override;
@@ -47,6 +52,9 @@ class CamacShutter final : public camac::Shutter {
   // A motion that has been begun before a stop of the motor, and is not yet asked of it, does not
   // begin.
   void end_overtaken();
+
+  // What people are told of the motion that was permitted last; empty: nothing.
+  std::string take_note() { return std::exchange(note_, {}); }
 
   // Does what is due, and tells the module what has become of it.
   void follow(std::int64_t now_us, camac::Bushd1& module);
@@ -58,7 +66,8 @@ class CamacShutter final : public camac::Shutter {
     Kind kind;
     camac::SingleStep step{};
     camac::Travel travel{};
-    tables::TablePtr table{};
+    tables::TablePtr table{};  // null: by its codes as they are written
+    bool alone = false;        // by a program of the MCU
     Stage stage = Stage::kBegins;
     bool to_stop = false;
     bool begins_no_more = false;    // by another's stop
@@ -90,8 +99,9 @@ class CamacShutter final : public camac::Shutter {
             .after_stops = motion_->after_stops};
   }
   void begin(std::int64_t now_us);
-  void follow_table(camac::Bushd1& module);
-  void ask_mcu();
+  void follow_table(std::int64_t now_us, camac::Bushd1& module);
+  void ask_mcu(std::int64_t now_us);
+  const bushd_report* progress() const;
   void follow_going(std::int64_t now_us, camac::Bushd1& module);
   void follow_travel(const bushd_report& report, camac::Bushd1& module);
   void tell_steps(camac::Bushd1& module, Motion& motion, bool all) const;
@@ -102,6 +112,7 @@ class CamacShutter final : public camac::Shutter {
 
   const std::string name_;
   const MotorId motor_;
+  const bool without_computer_;
   Installation& installation_;
   const Interlocks& interlocks_;
   const Precedence& precedence_;
@@ -111,6 +122,8 @@ class CamacShutter final : public camac::Shutter {
   Outputs& outputs_;
   AskCore ask_;
   std::shared_ptr<CamacSession> session_;
+  CamacProgram program_;
+  std::string note_;
   std::shared_ptr<CamacSession> stops_ = std::make_shared<CamacSession>(name_);
   std::optional<Motion> motion_;
 };

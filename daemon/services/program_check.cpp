@@ -8,6 +8,7 @@
 
 #include "config/words.h"
 #include "engine/frame.h"
+#include "engine/run.h"
 #include "tables/any_line.h"
 
 namespace bushd::daemon {
@@ -68,6 +69,34 @@ Result<programs::MotorPlace> place_of(const Installation& installation, MotorId 
                               .at_steps = motor.position_steps()};
 }
 
+// The codes of a program's text, if its motor may go by them as they stand.
+Result<tables::TablePtr> written_codes(const Installation& installation, const Mcu& mcu,
+                                       const CheckedProgram& program) {
+  auto made = tables::make_written(*program.text.codes);
+  if (!made) return fail(made.error());
+  const bushd_table& codes = (*made)->view();
+  const motion::Motor& motor = installation[program.motors.front()];
+  const auto shortest = motor.scale().shortest_delay_at({}, codes.time_unit_ns);
+  if (!shortest) return fail(motor.name() + ": " + shortest.error().text());
+  const std::uint16_t fastest = bushd_written_fastest(&codes);
+  if (fastest < *shortest) {
+    return fail(fmt::format(
+        "{}: its codes have a step after {} us, and its max_speed allows none sooner than after {} "
+        "us; write longer delays",
+        motor.name(), fastest * std::uint64_t{codes.time_unit_ns} / 1000,
+        *shortest * codes.time_unit_ns / 1000));
+  }
+  const std::uint32_t tick_ns = installation.bus_of(mcu).config.tick_ns();
+  const std::uint32_t most = bushd_written_max_steps_per_tick(&codes, tick_ns);
+  if (most > BUSHD_MAX_STEPS_PER_TICK) {
+    return fail(fmt::format(
+        "{}: by its codes it could make {} steps in a tick of {} us, which has room for {}; write "
+        "longer delays",
+        motor.name(), most, tick_ns / 1000, BUSHD_MAX_STEPS_PER_TICK));
+  }
+  return made;
+}
+
 // The table of its lines: one that the MCU has, or one that it will get.
 Result<void> find_line_table(const Installation& installation, const Mcu& mcu,
                              CheckedProgram& program, programs::McuPlace& place) {
@@ -76,8 +105,10 @@ Result<void> find_line_table(const Installation& installation, const Mcu& mcu,
     const bushd_table* table = &installation.table_of(motor)->view();
     if (std::ranges::find(tables, table) == tables.end()) tables.push_back(table);
   }
-  auto made =
-      tables::any_line_table(tables, "lines of " + program.name, most_elementary(program.text));
+  auto made = program.text.codes
+                  ? written_codes(installation, mcu, program)
+                  : tables::any_line_table(tables, "lines of " + program.name,
+                                           most_elementary(program.text));
   if (!made) return fail(made.error());
   const bushd_table& table = (*made)->view();
   const auto bank = mcu.bank_of(table);
@@ -117,14 +148,16 @@ Result<CheckedProgram> compile_and_walk(const Installation& installation, const 
                            .memory = mcu.offers.programs->program(mcu.on_bus()).state.memory,
                            .tick_ns = installation.bus_of(mcu).config.tick_ns(),
                            .lines = mcu.makes_lines(),
-                           .elementary = mcu.makes_elementary_lines()};
+                           .elementary = mcu.makes_elementary_lines(),
+                           .travels = mcu.can_travel(),
+                           .has_trigger = mcu.can_trigger()};
   std::vector<programs::MotorPlace> places;
   for (const MotorId motor : program.motors) {
     auto its = place_of(installation, motor);
     if (!its) return fail(its.error());
     places.push_back(std::move(*its));
   }
-  if (has_lines(program.text) && place.lines) {
+  if ((has_lines(program.text) || program.text.codes) && place.lines) {
     if (auto found = find_line_table(installation, mcu, program, place); !found) {
       return fail(found.error());
     }

@@ -31,6 +31,15 @@ const char* stage_word(std::uint8_t stage) {
   }
 }
 
+namespace {
+
+std::string end_of_travel_text(std::uint8_t stage) {
+  return stage == BUSHD_TRAVEL_NOT_LEFT ? "the limit switch that it came from is still active"
+                                        : "its limit switch was not active after its last step";
+}
+
+}  // namespace
+
 ProgramEnd end_of_program(const bushd_program_state& state, const Mcu& mcu) {
   switch (state.reason) {
     case BUSHD_PROGRAM_DONE:
@@ -56,6 +65,8 @@ ProgramEnd end_of_program(const bushd_program_state& state, const Mcu& mcu) {
       return {Outcome::kStopped, "the drivers of MCU " + mcu.name() + " have been disabled"};
     case BUSHD_PROGRAM_LATE:
       return {Outcome::kFault, "bus time has changed before its start; run it again"};
+    case BUSHD_PROGRAM_TRAVELLED:
+      return {Outcome::kFault, end_of_travel_text(mcu.report().homing)};
     default:
       return {Outcome::kFault, "MCU " + mcu.name() + " does not say why it ended"};
   }

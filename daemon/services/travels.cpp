@@ -174,6 +174,10 @@ void Travels::goes_offline(Mcu& mcu, const std::string& cause) {
 // What an MCU still does was asked for by a daemon before, or by this one before the MCU was lost.
 void Travels::goes_online(Mcu& mcu) {
   if (mcu.offers.travel == nullptr || !is_under_way(mcu.report())) return;
+  // A travel of a program is the program's.
+  const bool programmed =
+      mcu.can_have_program() && mcu.offers.programs->program(mcu.on_bus()).under_way();
+  if (programmed) return;
   for (const MotorId id : mcu.motors()) {
     const Output output = installation_[id].output();
     if (!has_bit(mcu.report().autonomous, output)) continue;

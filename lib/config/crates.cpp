@@ -126,6 +126,22 @@ Result<void> read_bushd1(const TomlReader& reader, const std::string& where, con
   return take(reader, "motor", std::nullopt, *motor, place, config, places);
 }
 
+// That motion goes on when nobody can stop it takes two consents.
+Result<void> check_consent(const TomlReader& reader, const Config& config,
+                           const CamacModule& module) {
+  if (!module.without_computer) return {};
+  for (const MotorId motor : module.motors) {
+    const Mcu& mcu = config.mcu_of(config[motor]);
+    if (mcu.programs_without_host) continue;
+    return fail(reader.error(
+        "without_computer",
+        fmt::format("is true, and MCU {} of motor \"{}\" may not go on without a host; set "
+                    "programs_without_host = true in its [[mcu]], or leave without_computer out",
+                    mcu.id, config[motor].name)));
+  }
+  return {};
+}
+
 Result<void> read_module(const TomlReader& reader, const Config& config, Crate* crate,
                          Places* places) {
   const auto station = reader.integer("station", 1, kLastStation);
@@ -148,6 +164,7 @@ Result<void> read_module(const TomlReader& reader, const Config& config, Crate* 
   const std::string where = fmt::format("station {} of crate {}", number, crate->number);
   const auto read = module.type == CamacModule::Type::kBushd1 ? read_bushd1 : read_bushd2;
   if (auto good = read(reader, where, config, &module, places); !good) return good;
+  if (auto good = check_consent(reader, config, module); !good) return good;
   crate->modules.push_back(std::move(module));
   return {};
 }

@@ -112,8 +112,10 @@ static bool in_range(const bushd_program_frame* frame, const uint8_t* at, uint16
   }
 }
 
-static bool leads_to_position(uint8_t kind) {
-  return kind == BUSHD_PROGRAM_MOVE_TO || kind == BUSHD_PROGRAM_LINE_TO;
+// It leads to a place, so that it wants a motor whose position is known.
+static bool needs_position(uint8_t kind) {
+  return kind == BUSHD_PROGRAM_MOVE_TO || kind == BUSHD_PROGRAM_LINE_TO ||
+         kind == BUSHD_PROGRAM_TRAVEL;
 }
 
 static bool flags_fit(uint8_t flags) {
@@ -130,7 +132,7 @@ static bushd_status check_frames(reader* r, const bushd_program* program) {
     const bushd_program_frame frame = get_frame(r);
     if (r->short_of_bytes) return BUSHD_E_LENGTH;
     if (!in_range(&frame, at, program->motors)) return BUSHD_E_FORMAT;
-    if (by_distances && leads_to_position(frame.kind)) return BUSHD_E_FORMAT;
+    if (by_distances && needs_position(frame.kind)) return BUSHD_E_FORMAT;
     if (frame.kind == BUSHD_PROGRAM_REPEAT && ++depth > BUSHD_PROGRAM_MOST_DEPTH) {
       return BUSHD_E_FORMAT;
     }

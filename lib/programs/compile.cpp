@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "base/overloaded.h"
+#include "engine/message_motion.h"
 #include "engine/program.h"
 
 namespace bushd::programs {
@@ -32,13 +33,15 @@ class Compiler {
   Result<std::vector<std::uint8_t>> compile() {
     if (auto put = put_head(); !put) return fail(put.error());
     for (const Frame& frame : program_.frames) {
-      const auto put = std::visit(Overloaded{[&](const Move& move) { return put_move(move); },
-                                             [&](const Line& line) { return put_line(line); },
-                                             [&](const auto& other) {
-                                               put_other(other);
-                                               return Result<void>();
-                                             }},
-                                  frame.what);
+      const auto put =
+          std::visit(Overloaded{[&](const Move& move) { return put_move(move); },
+                                [&](const Line& line) { return put_line(line); },
+                                [&](const Travel& travel) { return put_travel(travel); },
+                                [&](const auto& other) {
+                                  put_other(other);
+                                  return Result<void>();
+                                }},
+                     frame.what);
       if (!put) return fail(frame.place + ": " + put.error().text());
     }
     out_.put(BUSHD_PROGRAM_END, 1);
@@ -180,9 +183,17 @@ class Compiler {
       return fail(mcu_.name +
                   " makes no lines by the elementary law: leave out `law`, or use another MCU");
     }
+    if (program_.codes && (line.speed || line.elementary)) {
+      return fail("`codes` are made as they are written, so there is no `speed` or `law` beside them");
+    }
+    if (program_.at_power_on && mcu_.line_bank == BUSHD_SCRATCH_BANK) {
+      return fail(mcu_.name +
+                  " would have the table of lines in its volatile bank, and no more after a power "
+                  "cut: use moves, or let more motors share a table");
+    }
     std::uint16_t shortest_delay = 0;
     for (const std::size_t i : by_output_) {
-      if (!line.points.front()[i]) continue;
+      if (program_.codes || !line.points.front()[i]) continue;
       const auto delay = delay_of(i, line.speed, mcu_.line_table->time_unit_ns);
       if (!delay) return fail(delay.error());
       shortest_delay = std::max(shortest_delay, *delay);
@@ -205,6 +216,31 @@ class Compiler {
         out_.put(static_cast<std::uint32_t>(*steps), 4);
       }
     }
+    return {};
+  }
+
+  Result<void> put_travel(const Travel& travel) {
+    if (!mcu_.travels) {
+      return fail(mcu_.name + " does not travel between limits by itself: use moves");
+    }
+    if (travel.at_edges && !mcu_.has_trigger) {
+      return fail(mcu_.name + " has no trigger input: leave `after_edge_s` out");
+    }
+    if (program_.codes && mcu_.line_table == nullptr) {
+      return fail(mcu_.name + " has no table bank left for `codes`");
+    }
+    std::size_t i = 0;
+    while (!travel.by[i]) ++i;
+    const auto steps = steps_of(i, *travel.by[i], true);
+    if (!steps) return fail(steps.error());
+    if (*steps == 0) return fail("motor \"" + motors_[i].name + "\" travels by no step");
+    out_.put(BUSHD_PROGRAM_TRAVEL, 1);
+    out_.put(mask_of(travel.by), 2);
+    out_.put(program_.codes ? mcu_.line_bank : motors_[i].bank, 1);
+    out_.put(travel.at_edges ? BUSHD_EDGE_RISING : BUSHD_EDGE_NONE, 1);
+    out_.put(travel.delay_us, 4);
+    out_.put(travel.return_us, 4);
+    out_.put(static_cast<std::uint32_t>(*steps), 4);
     return {};
   }
 

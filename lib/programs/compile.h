@@ -34,7 +34,9 @@ struct McuPlace {
   bool elementary = true;      // BUSHD_CAN_ELEMENTARY
   std::uint8_t line_bank = 0;  // of the table for lines
   const bushd_table* line_table =
-      nullptr;  // any_line_table() of these motors; null: no bank is free
+      nullptr;          // any_line_table() of these motors, or its codes; null: no bank is free
+  bool travels = true;  // BUSHD_CAN_TRAVEL, and for edges a trigger input
+  bool has_trigger = true;
 };
 
 // Precondition: motors are those of the program, in its order, of one MCU, and their outputs

@@ -6,8 +6,11 @@
 #include <utility>
 
 #include "base/csv/number_csv.h"
+#include "engine/message_motion.h"
 #include "engine/program.h"
+#include "programs/parse_head.h"
 #include "programs/program.h"
+#include "tables/table.h"
 #include "tables/toml_file.h"
 #include "tables/toml_reader.h"
 
@@ -53,15 +56,16 @@ class FrameReader {
       const char* const line_key = relative ? "line_by" : "line_to";
       if (toml_.has(line_key)) return put(frame, line(line_key, relative));
     }
+    if (toml_.has("travel_by")) return put(frame, travel());
     if (toml_.has("wait_s")) return put(frame, wait());
     if (toml_.has("wait_input")) return put(frame, wait_input());
     if (toml_.has("pulse_us")) return put(frame, pulse());
     if (toml_.has("repeat")) return put(frame, repeat());
     if (toml_.has("next")) return put(frame, next());
-    return fail(toml_.error(
-        "",
-        "no frame; allowed: one of move_to, move_by, line_to, line_by, wait_s, wait_input, "
-        "pulse_us, repeat, next"));
+    return fail(toml_.error("",
+                            "no frame; allowed: one of move_to, move_by, line_to, line_by, "
+                            "travel_by, wait_s, wait_input, "
+                            "pulse_us, repeat, next"));
   }
 
   Result<Move> move(const char* key, bool relative) const {
@@ -197,17 +201,48 @@ class FrameReader {
                                      std::to_string(kMostPoints)));
   }
 
-  // Seconds as whole microseconds, `least_us` to `most_us`.
+  // Seconds as whole microseconds, 1 to `most_us`.
   Result<std::uint32_t> us_of(const char* key, std::uint32_t most_us) const {
-    const std::string allowed =
-        "0.000001 to " + std::to_string(most_us / static_cast<std::uint32_t>(kUsPerS)) + " s";
+    return us_of(
+        key, 1, most_us,
+        "0.000001 to " + std::to_string(most_us / static_cast<std::uint32_t>(kUsPerS)) + " s");
+  }
+  Result<std::uint32_t> us_of(const char* key, std::uint32_t least_us, std::uint32_t most_us,
+                              const std::string& allowed) const {
     const auto seconds = toml_.number(key, allowed);
     if (!seconds) return fail(seconds.error());
     const double us = std::round(*seconds * kUsPerS);
-    if (us < 1 || us > most_us) {
+    if (us < least_us || us > most_us) {
       return fail(toml_.error(key, "out of range; allowed: " + allowed));
     }
     return static_cast<std::uint32_t>(us);
+  }
+
+  Result<Travel> travel() const {
+    if (auto only = toml_.only({"travel_by", "after_edge_s", "return_s"}); !only) {
+      return fail(only.error());
+    }
+    auto by = toml_.table("travel_by") != nullptr ? by_name("travel_by") : by_order("travel_by");
+    if (!by) return fail(by.error());
+    if (std::ranges::count_if(*by, [](const auto& at) { return at.has_value(); }) != 1) {
+      return fail(toml_.error("travel_by", "several motors; allowed: one, by its name"));
+    }
+    static_assert(BUSHD_TRAVEL_MIN_WAIT_US == BUSHD_TRIGGER_MIN_DELAY_US);
+    static_assert(BUSHD_TRAVEL_MAX_WAIT_US == BUSHD_TRIGGER_MAX_DELAY_US);
+    const auto time = [this](const char* key, std::uint32_t* us) -> Result<void> {
+      if (!toml_.has(key)) return {};
+      const auto given =
+          us_of(key, BUSHD_TRAVEL_MIN_WAIT_US, BUSHD_TRAVEL_MAX_WAIT_US, "0.00005 to 1.65 s");
+      if (!given) return fail(given.error());
+      *us = *given;
+      return {};
+    };
+    Travel travel{.by = std::move(*by),
+                  .at_edges = toml_.has("after_edge_s"),
+                  .return_us = BUSHD_TRAVEL_MIN_WAIT_US};
+    if (auto read = time("after_edge_s", &travel.delay_us); !read) return fail(read.error());
+    if (auto read = time("return_s", &travel.return_us); !read) return fail(read.error());
+    return travel;
   }
 
   Result<Wait> wait() const {
@@ -280,116 +315,6 @@ class FrameReader {
   TomlReader toml_;
   const ReadPoints& points_;
 };
-
-Result<void> read_motors(const TomlReader& toml, Program& program) {
-  const auto array = toml.array("motors", "a list of names of motors");
-  if (!array) return fail(array.error());
-  for (const toml::node& node : **array) {
-    const auto name = node.value<std::string>();
-    if (!name || name->empty()) {
-      return fail(toml.error("motors", program.motors.size(),
-                             tables::describe(node) + "; allowed: the name of a motor"));
-    }
-    if (std::ranges::find(program.motors, *name) != program.motors.end()) {
-      return fail(toml.error("motors", program.motors.size(), "\"" + *name + "\" is named twice"));
-    }
-    program.motors.push_back(*name);
-  }
-  if (!program.motors.empty() && program.motors.size() <= BUSHD_MOTORS_PER_MCU) return {};
-  return fail(toml.error("motors", std::to_string(program.motors.size()) +
-                                       " motors; allowed: 1 to 16, all of one MCU"));
-}
-
-Result<void> read_flag(const TomlReader& toml, const char* key, bool& flag) {
-  if (!toml.has(key)) return {};
-  const auto value = toml.boolean(key);
-  if (!value) return fail(value.error());
-  flag = *value;
-  return {};
-}
-
-Result<void> read_range(const TomlReader& toml, Program& program) {
-  constexpr const char* kKey = "range";
-  constexpr const char* kAllowed =
-      "two distances of each motor, the first not above 0, the second not below it: "
-      "range = { theta = [-1, 1] }";
-  if (!program.at_power_on) {
-    if (!toml.has(kKey)) return {};
-    return fail(toml.error(kKey, "is for at_power_on = true, which is not there; remove it"));
-  }
-  const toml::table* const table = toml.table(kKey);
-  if (table == nullptr) {
-    return fail(toml.error(toml.has(kKey) ? kKey : "at_power_on",
-                           "needs a range, since nobody knows where motors are then; allowed: " +
-                               std::string(kAllowed)));
-  }
-  for (const auto& [name, node] : *table) {
-    if (std::ranges::find(program.motors, std::string(name.str())) == program.motors.end()) {
-      return fail(
-          toml.error(kKey, "\"" + std::string(name.str()) +
-                               "\" is not in `motors`; allowed: the motors of the program"));
-    }
-  }
-  for (std::size_t i = 0; i < program.motors.size(); ++i) {
-    const std::string& name = program.motors[i];
-    const toml::array* const ends = (*table)[name].as_array();
-    if (ends == nullptr || ends->size() != 2) {
-      return fail(toml.error(kKey, "\"" + name + "\" has no two distances; allowed: " + kAllowed));
-    }
-    const auto least = toml.number(kKey, i, (*ends)[0], kAllowed);
-    if (!least) return fail(least.error());
-    const auto most = toml.number(kKey, i, (*ends)[1], kAllowed);
-    if (!most) return fail(most.error());
-    if (*least > 0 || *most < 0) {
-      return fail(
-          toml.error(kKey, "that of \"" + name + "\" does not have 0; allowed: " + kAllowed));
-    }
-    program.range.push_back({*least, *most});
-  }
-  return {};
-}
-
-// Nobody is heard when the power comes, and nobody knows positions then.
-Result<void> check_power_on(const TomlReader& toml, const Program& program) {
-  if (!program.at_power_on) return {};
-  for (const auto& [is, key] :
-       {std::pair{program.kept, "kept"}, std::pair{program.without_host, "without_host"}}) {
-    if (is) continue;
-    return fail(toml.error("at_power_on", std::string("true wants ") + key + " = true as well"));
-  }
-  for (const Frame& frame : program.frames) {
-    const auto* const move = std::get_if<Move>(&frame.what);
-    const auto* const line = std::get_if<Line>(&frame.what);
-    if ((move == nullptr || move->relative) && (line == nullptr || line->relative)) continue;
-    return fail(frame.place +
-                ": a position, in a program with at_power_on: nobody knows then where motors are; "
-                "allowed: move_by and line_by");
-  }
-  return {};
-}
-
-Result<void> read_head(const TomlReader& toml, Program& program) {
-  if (auto only =
-          toml.only({"motors", "without_host", "kept", "at_power_on", "range", "unit", "frame"});
-      !only) {
-    return fail(only.error());
-  }
-  if (auto motors = read_motors(toml, program); !motors) return fail(motors.error());
-  for (const auto& [key, flag] :
-       {std::pair{"without_host", &program.without_host}, std::pair{"kept", &program.kept},
-        std::pair{"at_power_on", &program.at_power_on}}) {
-    if (auto read = read_flag(toml, key, *flag); !read) return read;
-  }
-  if (auto read = read_range(toml, program); !read) return read;
-  if (!toml.has("unit")) return {};
-  const auto unit = toml.string("unit", "\"user\" or \"steps\"");
-  if (!unit) return fail(unit.error());
-  if (*unit != "user" && *unit != "steps") {
-    return fail(toml.error("unit", "\"" + *unit + "\"; allowed: \"user\" or \"steps\""));
-  }
-  program.steps = *unit == "steps";
-  return {};
-}
 
 // Every REPEAT has its NEXT; few enough within each other.
 Result<void> check_nesting(const Program& program) {

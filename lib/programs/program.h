@@ -27,6 +27,11 @@
 //     [[frame]]
 //     next = true
 //
+//     [[frame]]
+//     travel_by = [60]               # to its limit switch and back
+//     after_edge_s = 0.15            # of each edge at the trigger input; left out: once, at once
+//     return_s = 0.3
+//
 // END is what the file's end is.
 #pragma once
 
@@ -38,6 +43,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "words/table_content.h"
 
 namespace bushd::programs {
 
@@ -57,6 +63,13 @@ struct Line {
   bool elementary = false;  // by engine/elementary.h
   std::optional<double> feed = {};
 };
+// Of one motor.
+struct Travel {
+  Point by;
+  bool at_edges = false;
+  std::uint32_t delay_us = 0;  // from an edge
+  std::uint32_t return_us = 0;
+};
 struct Wait {
   std::uint32_t us = 0;
 };
@@ -74,7 +87,7 @@ struct Repeat {
 struct Next {};
 
 struct Frame {
-  std::variant<Move, Line, Wait, WaitInput, Pulse, Repeat, Next> what;
+  std::variant<Move, Line, Travel, Wait, WaitInput, Pulse, Repeat, Next> what;
   std::string place{};  // "scan.toml:7", for refusals
 };
 
@@ -91,6 +104,8 @@ struct Program {
   bool at_power_on = false;       // then it is kept, without a host, and goes by distances
   std::vector<Range> range = {};  // with at_power_on: of each motor
   bool steps = false;             // positions are steps, not user units
+  // As they are written, in place of tables, for lines and travels of its only motor.
+  std::optional<words::TableContent> codes{};
   std::vector<Frame> frames;
 };
 

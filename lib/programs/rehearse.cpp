@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdlib>
 
+#include "engine/message_motion.h"
 #include "engine/program.h"
 #include "engine/run.h"
 #include "programs/compile.h"
@@ -78,6 +79,8 @@ class Walk {
       case BUSHD_PROGRAM_LINE_TO:
       case BUSHD_PROGRAM_LINE_BY:
         return line(frame);
+      case BUSHD_PROGRAM_TRAVEL:
+        return travel(frame);
       case BUSHD_PROGRAM_WAIT:
         later(ticks_of(std::uint64_t{frame.us} * 1000));
         break;
@@ -133,7 +136,9 @@ class Walk {
     Rehearsal::Way& way = out_.motors[i];
     const std::int64_t steps = bushd_program_entry_of(&frame, point, nth).steps;
     const std::int64_t target =
-        bushd_program_is_relative(frame.kind) ? way.end_steps + steps : steps;
+        bushd_program_is_relative(frame.kind) || frame.kind == BUSHD_PROGRAM_TRAVEL
+            ? way.end_steps + steps
+            : steps;
     const MotorPlace& motor = motors_[i];
     if (target < motor.least_steps || target > motor.most_steps) {
       const std::string of_point =
@@ -154,6 +159,46 @@ class Walk {
     way.most_steps = std::max(way.most_steps, target);
     way.edges += static_cast<std::uint64_t>(distance);
     return distance;
+  }
+
+  // All codes as they are written are made.
+  Result<std::uint64_t> ticks_as_written(std::uint64_t steps) const {
+    const bushd_table& codes = *mcu_.line_table;
+    const std::uint64_t count = std::uint64_t{codes.accel.count} + codes.decel.count;
+    if (steps < count) {
+      return fail(text_.frames[frame_ - 1].place + ": " + std::to_string(steps) +
+                  " steps, but `codes` has " + std::to_string(count) +
+                  " delays; give as many steps, or more, which have its cruise delay");
+    }
+    bushd_run run;
+    bushd_run_start_as_written(&run, &codes, static_cast<std::uint32_t>(steps), 1);
+    return ticks_of(bushd_run_units_left(&run) * codes.time_unit_ns);
+  }
+
+  // There and back; from an edge on, once.
+  Result<void> travel(const bushd_program_frame& frame) {
+    std::size_t i = 0;
+    while ((frame.motors >> motors_[i].output & 1u) == 0) ++i;
+    const auto steps = go(frame, 0, 0, i);
+    if (!steps) return fail(steps.error());
+    out_.motors[i].end_steps -= bushd_program_entry_of(&frame, 0, 0).steps;
+    out_.motors[i].edges += static_cast<std::uint64_t>(*steps);
+    const auto way = static_cast<std::uint64_t>(*steps);
+    std::uint64_t ticks = ticks_of(*motors_[i].table, way, 0);
+    if (text_.codes) {
+      const auto as_written = ticks_as_written(way);
+      if (!as_written) return fail(as_written.error());
+      ticks = *as_written;
+    }
+    if (frame.edge == BUSHD_EDGE_NONE) {
+      later(2 * ticks + ticks_of(std::uint64_t{frame.us} * 1000));
+      return {};
+    }
+    later(ticks + ticks_of(std::uint64_t{frame.delay_us} * 1000) + ticks);
+    out_.waits_for_inputs = true;
+    out_.endless = true;
+    ended_ = true;
+    return {};
   }
 
   template <class Act>
@@ -193,7 +238,14 @@ class Walk {
                     ": the ways of all motors together are more than 2^31 - 1 steps; make several "
                     "lines of it, or leave out `law`");
       }
-      if (longest != 0) later(ticks_of(*mcu_.line_table, longest, frame.shortest_delay));
+      if (longest == 0) continue;
+      if (!text_.codes) {
+        later(ticks_of(*mcu_.line_table, longest, frame.shortest_delay));
+        continue;
+      }
+      const auto ticks = ticks_as_written(longest);
+      if (!ticks) return fail(ticks.error());
+      later(*ticks);
     }
     return {};
   }

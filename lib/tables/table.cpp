@@ -70,8 +70,8 @@ ContentFault place(bushd_status status, std::uint32_t engine_index, bool in_dece
   }
 }
 
-std::optional<ContentFault> check_codes(const TableContent& content) {
-  std::vector<std::uint16_t> slow_to_fast;
+// With its codes, and room for those of the other side.
+bushd_table view_of(const TableContent& content, std::vector<std::uint16_t>& slow_to_fast) {
   bushd_table view{};
   view.accel.code = content.accel.data();
   view.accel.count = static_cast<std::uint16_t>(content.accel.size());
@@ -83,6 +83,12 @@ std::optional<ContentFault> check_codes(const TableContent& content) {
     view.decel.code = slow_to_fast.data();
     view.decel.count = static_cast<std::uint16_t>(slow_to_fast.size());
   }
+  return view;
+}
+
+std::optional<ContentFault> check_codes(const TableContent& content) {
+  std::vector<std::uint16_t> slow_to_fast;
+  const bushd_table view = view_of(content, slow_to_fast);
   std::uint32_t index = 0;
   bool in_decel = false;
   const bushd_status status = bushd_table_check(&view, &index, &in_decel);
@@ -90,9 +96,23 @@ std::optional<ContentFault> check_codes(const TableContent& content) {
   return place(status, index, in_decel, content.accel, content.decel.value_or(content.accel));
 }
 
-}  // namespace
+std::optional<ContentFault> check_written(const TableContent& content) {
+  std::vector<std::uint16_t> slow_to_fast;
+  const bushd_table view = view_of(content, slow_to_fast);
+  const bushd_status status = bushd_table_check_written(&view);
+  if (status != BUSHD_OK) {
+    return ContentFault{"accel", std::nullopt,
+                        fmt::format("or decel: {}; allowed: 1..65535 time units, 2147483647 in all",
+                                    bushd_status_text(status))};
+  }
+  if (bushd_table_is_written(&view)) return std::nullopt;
+  return ContentFault{"accel", std::nullopt,
+                      "falls, and decel rises, as those of a table; give the motor this table"};
+}
 
-std::optional<ContentFault> check(const TableContent& content) {
+// `codes`: what is wrong with them.
+template <class Codes>
+std::optional<ContentFault> check_all(const TableContent& content, Codes&& codes) {
   if (auto fault = check_name(content.name)) return fault;
   if (content.time_unit_ns < 1 || content.time_unit_ns > kMaxTimeUnitNs) {
     return ContentFault{
@@ -100,11 +120,22 @@ std::optional<ContentFault> check(const TableContent& content) {
         fmt::format("is {}; allowed: 1..{} (1 s)", content.time_unit_ns, kMaxTimeUnitNs)};
   }
   if (auto fault = check_sizes(content)) return fault;
-  if (auto fault = check_codes(content)) return fault;
+  if (auto fault = codes(content)) return fault;
   if (content.cruise == std::uint16_t{0}) {
     return ContentFault{"cruise", std::nullopt, "is 0; allowed: 1..65535 time units"};
   }
   return std::nullopt;
+}
+
+Error error_of(const ContentFault& fault, const std::string& path) {
+  const std::string index = fault.index ? fmt::format("[{}]", *fault.index) : "";
+  return Error{.message = fault.message, .file = path, .key = fault.key + index};
+}
+
+}  // namespace
+
+std::optional<ContentFault> check(const TableContent& content) {
+  return check_all(content, check_codes);
 }
 
 std::string content_hash(const TableContent& content) {
@@ -151,12 +182,18 @@ bushd_ramp Table::Side::index() {
 }
 
 Result<TablePtr> make(TableContent content, std::string path) {
-  if (const auto fault = check(content)) {
-    const std::string index = fault->index ? fmt::format("[{}]", *fault->index) : "";
-    return fail(Error{.message = fault->message, .file = path, .key = fault->key + index});
-  }
+  if (const auto fault = check(content)) return fail(error_of(*fault, path));
+  return Table::of(std::move(content), std::move(path));
+}
+
+Result<TablePtr> make_written(TableContent content) {
+  if (const auto fault = check_all(content, check_written)) return fail(error_of(*fault, {}));
+  return Table::of(std::move(content), {});
+}
+
+TablePtr Table::of(TableContent content, std::string path) {
   const std::shared_ptr<Table> table(new Table);
-  table->content_hash_ = content_hash(content);
+  table->content_hash_ = tables::content_hash(content);
   table->revision_ = content.revision;
   table->name_ = std::move(content.name);
   table->description_ = std::move(content.description);
@@ -173,7 +210,7 @@ Result<TablePtr> make(TableContent content, std::string path) {
     table->decel_.code = std::move(*content.decel);
     table->view_.decel = table->decel_.index();
   }
-  return TablePtr(table);
+  return table;
 }
 
 }  // namespace bushd::tables

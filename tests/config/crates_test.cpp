@@ -71,6 +71,16 @@ TEST(ConfigCrates, TheAdjustableDelayIsOfOneOfTwoRuns) {
       << "a key of BUSHD-1";
 }
 
+TEST(ConfigCrates, WithoutAComputerItsMcuHasToConsent) {
+  const std::string alone = replaced(kCrate, "f_start_hz = 100", "without_computer = true");
+  EXPECT_THAT(test::error_of(alone), HasSubstr("programs_without_host = true in its [[mcu]]"));
+  const auto loaded =
+      ConfigFile(replaced(alone, "[[mcu]]\n", "[[mcu]]\nprograms_without_host = true\n")).load();
+  ASSERT_TRUE(loaded) << loaded.error().text();
+  EXPECT_TRUE(loaded->crates[0].modules[0].without_computer);
+  EXPECT_FALSE(loaded->crates[0].modules[1].without_computer);
+}
+
 TEST(ConfigCrates, BadOnesAreRefused) {
   EXPECT_THAT(error_of("number = 1\n", "number = 63\n"), HasSubstr("1..62"));
   EXPECT_THAT(error_of("number = 1\n", ""), HasSubstr("crate[0].number"));

@@ -84,7 +84,7 @@ std::pair<std::string, std::string> range_of(const std::string& allowed) {
 
 TEST(ProgramsPage, ItsExamplesArePrograms) {
   const auto examples = blocks("toml");
-  ASSERT_EQ(examples.size(), 3u);
+  ASSERT_EQ(examples.size(), 4u);
   for (const std::string& example : examples) EXPECT_EQ(why_not(example), "");
 }
 
@@ -93,13 +93,15 @@ TEST(ProgramsPage, TheKeysBesideAnotherAreTakenWithItAlone) {
       {"move_to", "[1, 2]"},   {"move_by", "{ phi = 1 }"},
       {"line_to", "[[1, 2]]"}, {"line_by", "\"p.csv\""},
       {"wait_s", "1"},         {"wait_input", "\"trigger\""},
-      {"pulse_us", "5"},       {"repeat", "2"},
+      {"travel_by", "{ phi = 60 }"}, {"pulse_us", "5"},       {"repeat", "2"},
       {"next", "true"}};
   const std::map<std::string, std::string> beside{{"speed", "2.5"},
                                                   {"law", "\"elementary\""},
                                                   {"feed", "2\nlaw = \"elementary\""},
                                                   {"active", "false"},
-                                                  {"longest_s", "9"}};
+                                                  {"longest_s", "9"},
+                                                  {"after_edge_s", "0.1"},
+                                                  {"return_s", "0.1"}};
   const Rows told = rows_under(kBesideRow);
   for (const auto& [key, value] : beside) EXPECT_EQ(told.count(key), 1u) << key;
   EXPECT_EQ(told.size(), beside.size());
@@ -133,6 +135,9 @@ TEST(ProgramsPage, ItsRangesAreThoseOfTheParser) {
   holds(frames.at("wait_s").at(1), "wait_s", "", "3600.000001");
   EXPECT_NE(why_not(frame("wait_s = 0.0000004")), "");
   holds(beside.at("longest_s").at(1), "wait_input = 1\nlongest_s", "", "3600.000001");
+  for (const char* key : {"after_edge_s", "return_s"}) {
+    holds(beside.at(key).at(1), std::string("travel_by = { phi = 1 }\n") + key, "", "1.651");
+  }
   holds(frames.at("pulse_us").at(1), "pulse_us", "", "1000001");
   EXPECT_NE(why_not(frame("pulse_us = 0")), "");
   holds(frames.at("repeat").at(1), "repeat", "\n[[frame]]\nnext = true", "65536");

@@ -76,8 +76,6 @@ void Bushd1::start_travel(bool left) {
     why = "the number of steps at address 0 is not 1..126";
   } else if (at_limit(left)) {
     why = "the limit switch that it is to travel to is active";
-  } else if (!rise_and_fall_once(travel.codes)) {
-    why = "its delays do not fall and then rise, once";
   }
   if (why != nullptr) shutter_.refuses(why);
   if (why != nullptr || !shutter_.travel(travel)) return raise(kTravelFailed);

@@ -24,6 +24,10 @@ constexpr std::uint32_t kReceivedMask = 3;
 
 }  // namespace
 
+std::size_t codes_used(const Program& program) {
+  return std::min<std::size_t>((program.steps + 1) / 2, program.codes.size());
+}
+
 std::uint8_t code_of_step(const Program& program, std::uint32_t step) {
   const std::uint32_t last = static_cast<std::uint32_t>(program.codes.size()) - 1;
   return program.codes[std::min({step, program.steps - 1 - step, last})];

@@ -76,6 +76,8 @@ class Bushd2 final : public MotionModule {
   std::optional<Exchange> exchange_;
 };
 
+// How many codes the motion uses: before the step in the middle stands the last one of them.
+std::size_t codes_used(const Program& program);
 // The code before step `step`, from 0, of `steps`. Precondition: step < steps.
 std::uint8_t code_of_step(const Program& program, std::uint32_t step);
 

@@ -234,11 +234,6 @@ class Bushd1(Station):
             self.raised.add(5)
             return
         codes = [self.delay(self.word(4 + 2 * i)) for i in range(steps)]
-        # Once slower, never faster again.
-        changes = [b - a for a, b in zip(codes, codes[1:]) if a != b]
-        if any(a > 0 > b for a, b in zip(changes, changes[1:])):
-            self.raised.add(5)
-            return
         self.asked.append(f"travel {int(direction == LEFT)} {steps} {checksum(codes)} {self.delay(self.word(2))} {int(second)}")
         if not self.motors["accepts"]:
             self.raised.add(5)

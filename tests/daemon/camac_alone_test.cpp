@@ -1,0 +1,339 @@
+// BUSHD-1 and BUSHD-2 without the computer, and by any law of codes: loaded by NAF, begun by F26,
+// and judged by the edges of the motors. Where those belong is computed from the bytes in the
+// modules' memories, by the sums of the report, and by nothing that the daemon has made.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "daemon/camac_lab.h"
+#include "daemon/program_lab.h"
+
+namespace bushd::test::camac_alone_test {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+constexpr std::uint32_t kEnabled = 0x60;  // fault and end of motion
+constexpr std::uint32_t kLeft = 0x80;
+constexpr std::uint32_t kAutomatic = 0x40;
+constexpr std::uint32_t kSynchronous = 0x80;
+constexpr std::uint32_t kAllOfShutter = 0x37;
+constexpr std::int64_t kCodeNs = 40'000;  // 1 s / (250 x 100 Hz)
+constexpr std::int64_t kSlotNs = 2'560'000 / 128;
+constexpr double kNear = static_cast<double>(kSlotNs);
+
+// Both modules go on without the computer.
+std::string alone(std::string toml) {
+  const auto behind = [&](const std::string& text, const std::string& key) {
+    toml.insert(toml.find(text) + text.size(), key);
+  };
+  behind("[[mcu]]\n", "programs_without_host = true\n");
+  behind("type = \"bushd-2\"\n", "without_computer = true\n");
+  behind("type = \"bushd-1\"\n", "without_computer = true\n");
+  return toml;
+}
+
+std::vector<int> falling() {
+  std::vector<int> codes;
+  for (int i = 0; i < 238; ++i) codes.push_back(std::max(250 - i * 2, 10));
+  return codes;
+}
+std::vector<int> any_codes(unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<int> codes;
+  for (int i = 0; i < 238; ++i) codes.push_back(25 + static_cast<int>(random() % 200));
+  return codes;
+}
+
+// The report: step k of N, from 0, comes after code min(k, N - 1 - k, 237).
+std::vector<std::int64_t> due_ns(const std::vector<int>& codes, int steps) {
+  std::vector<std::int64_t> due;
+  std::int64_t at = 0;
+  for (int k = 0; k < steps; ++k) {
+    at += std::max(codes[static_cast<std::size_t>(std::min({k, steps - 1 - k, 237}))], 1) * kCodeNs;
+    due.push_back(at);
+  }
+  return due;
+}
+
+void expect_steps(const std::vector<sim::TimeNs>& made, const std::vector<std::int64_t>& due) {
+  ASSERT_EQ(made.size(), due.size());
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    EXPECT_NEAR(static_cast<double>(made[i] - made[0]), static_cast<double>(due[i] - due[0]), kNear)
+        << "step " << i;
+  }
+}
+
+struct Edges {
+  StepTimes edges;
+};
+class AloneLab : private Edges, public CamacLab {
+ public:
+  explicit AloneLab(const std::string& toml = alone(lab_with()), std::uint32_t disabled = 0)
+      : CamacLab(toml, &edges, kStation, disabled) {}
+  const std::vector<sim::TimeNs>& steps(unsigned output) { return edges.of(0, output); }
+  bool begins() {
+    return run_until([&] { return steps(0).size() >= 3; });
+  }
+};
+
+TEST(CamacAlone, Bushd2EndsWhereTheReportPutsItWithoutTheComputer) {
+  for (const int steps : {475, 1001}) {
+    SCOPED_TRACE(steps);
+    AloneLab lab;
+    lab.load(0, steps, falling());
+    lab.permit(kEnabled | kLeft);
+    ASSERT_TRUE(lab.begins());
+    lab.restart_daemon([&] { lab.bus(0).advance_to(lab.bus(0).now_ns() + 40'000'000'000); });
+    expect_steps(lab.steps(0), due_ns(falling(), steps));
+    EXPECT_EQ(lab.shaft_steps("m01"), -steps);
+  }
+}
+
+TEST(CamacAlone, ADaemonThatLivesTellsAsEver) {
+  AloneLab lab;
+  lab.load(0, 300, falling());
+  lab.permit(kEnabled);
+  EXPECT_TRUE(lab.run_until([&] { return lab.requests() >> 8 != 0; })) << "statuses are counted";
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.shaft_steps("m01"), 300);
+  EXPECT_EQ(lab.requests(), 0x10U | (300U % 4) << 8);
+  expect_steps(lab.steps(0), due_ns(falling(), 300));
+  lab.naf(kStation, 0, 10);
+  lab.permit(kEnabled | kLeft | 1);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.shaft_steps("m02"), -300);
+  EXPECT_TRUE(lab.warnings().empty());
+}
+
+TEST(CamacAlone, F24AndStopsEndIt) {
+  AloneLab lab;
+  lab.load(0, 20'000, falling());
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.begins());
+  lab.naf(kStation, 0, 24);
+  ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m01").moving; }));
+  EXPECT_FALSE(lab.lam()) << "F24 raises no request";
+  lab.permit(kEnabled);
+  lab.naf(kStation, 0, 24);  // while the program is put
+  lab.run_for(3);
+  const std::size_t made = lab.steps(0).size();
+  lab.run_for(3);
+  EXPECT_EQ(lab.steps(0).size(), made);
+  lab.naf(kStation, 0, 10);
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.run_until([&] { return lab.steps(0).size() > made + 10; }));
+  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  ASSERT_TRUE(lab.run_until([&] { return lab.lam(); })) << "by somebody else it is a fault";
+  EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+}
+
+TEST(CamacAlone, AnMcuWithoutProgramsIsAFaultThatTheLogExplains) {
+  AloneLab lab(alone(lab_with()), BUSHD_CAN_PROGRAM);
+  lab.load(0, 300, falling());
+  lab.permit(kEnabled);
+  EXPECT_TRUE(lab.lam());
+  EXPECT_THAT(lab.warnings().back(), HasSubstr("m01: the module says without_computer = true, and "
+                                               "MCU hall:1 cannot have programs"));
+}
+
+TEST(CamacAnyLaw, EveryStepComesAfterItsOwnCode) {
+  for (const int steps : {3, 17, 475, 476, 477, 900}) {
+    SCOPED_TRACE(steps);
+    AloneLab lab(lab_with());
+    std::vector<int> codes = any_codes(static_cast<unsigned>(steps));
+    codes[0] = 30;
+    codes[1] = 90;
+    lab.load(0, steps, codes);
+    lab.permit(kEnabled);
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.requests(), 0x10U | static_cast<unsigned>(steps % 4) << 8);
+    expect_steps(lab.steps(0), due_ns(codes, steps));
+    EXPECT_THAT(lab.warnings(), Contains(HasSubstr("made as they are written; a stop in them ramps "
+                                                   "down by table bushd2-constant")));
+  }
+}
+
+TEST(CamacAnyLaw, TheAnswerToF26SaysWhatAStopGoesBy) {
+  AloneLab lab(lab_with());
+  lab.load(0, 100, any_codes(1));
+  lab.naf(kStation, 2, 16, kEnabled);
+  const Answer answer = lab.block({.cycles = {{kStation, 0, 26, 0}}});
+  EXPECT_EQ(answer.result, "done");
+  EXPECT_THAT(answer.reason, HasSubstr("m01: its codes rise and fall"));
+}
+
+TEST(CamacAnyLaw, WithoutTheComputerToo) {
+  AloneLab lab;
+  const std::vector<int> codes = any_codes(7);
+  lab.load(0, 600, codes);
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.begins());
+  lab.restart_daemon([&] { lab.bus(0).advance_to(lab.bus(0).now_ns() + 20'000'000'000); });
+  expect_steps(lab.steps(0), due_ns(codes, 600));
+}
+
+// From the delay that runs when it is asked for, by the table that bushd.toml gives the motor.
+TEST(CamacAnyLaw, AStopRampsDownByTheMotorsOwnTable) {
+  for (const bool estop : {false, true}) {
+    AloneLab lab(lab_with());
+    std::vector<int> codes(238, 10);  // at 2500 steps/s
+    for (std::size_t i = 0; i < codes.size(); i += 7) codes[i] = 25;
+    for (std::size_t i = 0; i < 40; ++i) codes[i] = 200 - static_cast<int>(i) * 4;
+    lab.load(0, 20'000, codes);
+    lab.permit(kEnabled);
+    ASSERT_TRUE(lab.run_until([&] { return lab.steps(0).size() > 2000; }));
+    const std::size_t before = lab.steps(0).size();
+    lab.wait(lab.send(estop ? Ask::kEmergencyStop : Ask::kStop, {"m01"}));
+    ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m01").moving; }));
+    // bushd2-constant needs 238 steps from its greatest speed.
+    const std::size_t more = lab.steps(0).size() - before;
+    EXPECT_GT(more, 200u);
+    EXPECT_LT(more, 300u);
+    const auto& made = lab.steps(0);
+    for (std::size_t i = made.size() - 200; i + 1 < made.size(); ++i) {
+      EXPECT_LE(made[i] - made[i - 1], made[i + 1] - made[i] + 2 * kSlotNs) << i;
+    }
+    EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
+  }
+}
+
+TEST(CamacAnyLaw, NeedsAnMcuWithPrograms) {
+  AloneLab lab(lab_with(), BUSHD_CAN_PROGRAM);
+  lab.load(0, 100, any_codes(1));
+  lab.permit(kEnabled);
+  EXPECT_TRUE(lab.lam());
+  EXPECT_THAT(lab.warnings().back(), HasSubstr("m01: its codes rise and fall, and MCU hall:1 "
+                                               "cannot have programs"));
+}
+
+TEST(CamacAnyLaw, WaitsUntilItsMcuTakesCodes) {
+  AloneLab lab(lab_with());
+  const std::int64_t move = lab.send(Ask::kMoveBy, {"m02"}, {2000});
+  lab.load(0, 100, any_codes(1));
+  lab.permit(kEnabled);
+  lab.run_for(0.5);
+  EXPECT_TRUE(lab.steps(0).empty());
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_EQ(lab.shaft_steps("m01"), 100);
+}
+
+// BUSHD-1.
+
+const std::vector<int> kRiseAndFall{400, 250, 300, 60, 120, 50, 70, 50, 300};
+const std::vector<int> kShutterCodes{400, 250, 120, 60, 50, 50, 70, 150, 300};
+
+class AloneShutter : private WithShutter, public CamacLab {
+ public:
+  explicit AloneShutter(bool without_computer = true)
+      : CamacLab(toml(without_computer), &mechanics, kShutterStation) {
+    mechanics.bus = &bus(0);
+    mechanics.tell();
+    run_for(0.1);
+  }
+  static std::string toml(bool without_computer) {
+    const std::string plain =
+        lab_with("fine", "", "inputs = { positive = 3, negative = 4, step = 5 }\n");
+    return without_computer ? alone(plain) : plain;
+  }
+  void load_codes(const std::vector<int>& codes, int delay) {
+    mechanics.right_limit = static_cast<int>(codes.size());
+    mechanics.tell();
+    std::vector<int> bytes{static_cast<int>(codes.size()), 0, delay % 256, delay / 256};
+    for (const int code : codes) {
+      bytes.push_back(code % 256);
+      bytes.push_back(code / 256);
+    }
+    load_bytes(0, bytes);
+  }
+  // The run of these steps, which begins then.
+  sim::TimeNs expect_run(std::size_t first, sim::TimeNs at_ns, const std::vector<int>& codes) {
+    for (std::size_t i = 0; i < codes.size(); ++i) {
+      at_ns += codes[i] * 50'000;
+      if (first + i >= mechanics.steps.size()) {
+        ADD_FAILURE() << "no step " << first + i;
+        break;
+      }
+      EXPECT_NEAR(static_cast<double>(mechanics.steps[first + i].time_ns),
+                  static_cast<double>(at_ns), kNear)
+          << "step " << first + i;
+    }
+    return at_ns;
+  }
+  void pass(std::int64_t ns) { bus(0).advance_to(bus(0).now_ns() + ns); }
+  Shutter& shutter() { return mechanics; }
+};
+
+TEST(CamacAlone, Bushd1TravelsThereAndBackWithoutTheComputer) {
+  for (const std::vector<int>& codes : {kShutterCodes, kRiseAndFall}) {
+    AloneShutter lab;
+    lab.load_codes(codes, 6000);
+    lab.permit(kAutomatic | kAllOfShutter);
+    ASSERT_TRUE(lab.run_until([&] { return lab.shutter().steps.size() == 2; }));
+    lab.restart_daemon([&] { lab.pass(2'000'000'000); });
+    ASSERT_EQ(lab.shutter().steps.size(), 18u);
+    EXPECT_EQ(lab.shutter().position, 0);
+    const sim::TimeNs begin_ns = lab.shutter().steps[0].time_ns - codes[0] * 50'000;
+    const sim::TimeNs there_ns = lab.expect_run(0, begin_ns, codes);
+    lab.expect_run(9, there_ns + 6000 * 50'000, codes);
+  }
+}
+
+TEST(CamacAlone, Bushd1FollowsReactorStartsWithoutTheComputer) {
+  AloneShutter lab;
+  lab.load_codes(kShutterCodes, 12'000);
+  lab.permit(kAutomatic | kSynchronous | kAllOfShutter);
+  lab.run_for(1);
+  EXPECT_TRUE(lab.shutter().steps.empty()) << "it waits for the reactor";
+  std::vector<sim::TimeNs> starts_ns;
+  const auto reactor = [&] {
+    starts_ns.push_back(lab.bus(0).now_ns());
+    lab.shutter().reactor(true);
+    lab.pass(1'000'000);
+    lab.shutter().reactor(false);
+    lab.pass(2'000'300'000);
+  };
+  lab.restart_daemon([&] {
+    lab.pass(3'000'000'000);
+    reactor();
+    reactor();
+  });
+  ASSERT_EQ(lab.shutter().steps.size(), 36u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    lab.expect_run(i * 18, starts_ns[i] + 150'000'000, kShutterCodes);
+    lab.expect_run(i * 18 + 9, starts_ns[i] + 600'000'000, kShutterCodes);
+  }
+}
+
+TEST(CamacAlone, Bushd1TellsAsEverWhileTheDaemonLives) {
+  for (const bool without_computer : {true, false}) {
+    AloneShutter lab(without_computer);
+    const std::vector<int>& codes = without_computer ? kShutterCodes : kRiseAndFall;
+    lab.load_codes(codes, 6000);
+    lab.permit(kAutomatic | kAllOfShutter);
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.requests(), 0x41u) << "right limit";
+    lab.naf(kShutterStation, 0, 10);
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.requests(), 0x82u) << "left limit";
+    ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }));
+    EXPECT_EQ(lab.motor("m03").position_steps, 0);
+    const sim::TimeNs begin_ns = lab.shutter().steps[0].time_ns - codes[0] * 50'000;
+    lab.expect_run(9, lab.expect_run(0, begin_ns, codes) + 6000 * 50'000, codes);
+    EXPECT_EQ(lab.warnings().empty(), without_computer);
+    lab.shutter().right_limit = 5;
+    lab.naf(kShutterStation, 0, 10);
+    lab.naf(kShutterStation, 0, 26);
+    ASSERT_TRUE(lab.wait_for_lam());
+    ASSERT_TRUE(lab.run_until([&] { return (lab.requests() & 0x10) != 0; })) << "met too early";
+  }
+}
+
+}  // namespace
+}  // namespace bushd::test::camac_alone_test

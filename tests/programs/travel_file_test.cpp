@@ -1,0 +1,128 @@
+// Travels, and codes as they are written, in programs: from the text to the bytes and the dry run.
+#include "engine/program.h"
+#include "programs/program_places.h"
+
+namespace bushd::test {
+namespace {
+
+const std::string kCodes =
+    "codes = { time_unit_ns = 50000, accel = [300, 100, 200], cruise = 90, decel = [400] }\n";
+
+class TravelFiles : public ProgramPlaces {
+ protected:
+  std::string refusal(const std::string& text) {
+    const auto program = parse(text);
+    if (!program) return program.error().text();
+    const auto bytes = programs::compile(*program, mcu_, std::span(motors_).first(1));
+    if (!bytes) return bytes.error().text();
+    const auto told = programs::rehearse(*program, mcu_, std::span(motors_).first(1), *bytes);
+    return told ? "taken" : told.error().text();
+  }
+};
+
+TEST_F(TravelFiles, ATravelHasItsBytes) {
+  const auto bytes = compile(
+      parsed("[[frame]]\ntravel_by = { x = -60 }\nafter_edge_s = 0.15\nreturn_s = 0.3\n[[frame]]\n"
+             "travel_by = { theta = 1 }\n"));
+  ASSERT_TRUE(bytes) << bytes.error().text();
+  const std::vector<std::uint8_t> expected = {
+      10, 0x20, 0, 1, 1, 0xF0, 0x49, 2, 0, 0xE0, 0x93, 4, 0, 0xC4, 0xFF, 0xFF, 0xFF,  //
+      10, 4,    0, 3, 0, 0,    0,    0, 0, 50,   0,    0, 0, 0x90, 1,    0,    0,     //
+      0};
+  EXPECT_EQ(std::vector<std::uint8_t>(bytes->begin() + 22, bytes->end()), expected);
+  bushd_program read;
+  EXPECT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
+}
+
+TEST_F(TravelFiles, ADryRunGoesThereAndBack) {
+  const auto told = rehearse("[[frame]]\ntravel_by = { x = 3 }\nreturn_s = 0.0256\n");
+  ASSERT_TRUE(told) << told.error().text();
+  // Delays 250, 200, 240 units of 40 us are 27.6 ms.
+  EXPECT_EQ(told->ticks, 2u * 11 + 10);
+  EXPECT_EQ(told->motors[0].most_steps, 3);
+  EXPECT_EQ(told->motors[0].end_steps, 0);
+  EXPECT_EQ(told->motors[0].edges, 6u);
+  EXPECT_FALSE(told->endless);
+  const auto edges = rehearse("[[frame]]\ntravel_by = { x = 3 }\nafter_edge_s = 0.0256\n");
+  ASSERT_TRUE(edges) << edges.error().text();
+  EXPECT_TRUE(edges->endless);
+  EXPECT_TRUE(edges->waits_for_inputs);
+  EXPECT_NE(rehearse("[[frame]]\ntravel_by = { x = 6001 }\n").error().text().find("may go from"),
+            std::string::npos);
+}
+
+TEST_F(TravelFiles, CodesAreMadeAsTheyAreWritten) {
+  Law law;
+  law.accel = {300, 100, 200};
+  law.decel = {400};
+  law.cruise = 90;
+  law.unit_ns = 50'000;
+  const TestTable written(law, true);
+  mcu_.line_table = written.view();
+  mcu_.line_bank = 8;
+  const auto program = parse("motors = [\"x\"]\n" + kCodes +
+                             "[[frame]]\nline_by = [[-6]]\n[[frame]]\ntravel_by = [4]\n");
+  ASSERT_TRUE(program) << program.error().text();
+  const auto one = std::span(motors_).first(1);
+  const auto bytes = programs::compile(*program, mcu_, one);
+  ASSERT_TRUE(bytes) << bytes.error().text();
+  const std::vector<std::uint8_t> expected = {
+      4,  0x20, 0, 8, 0, 0, 1, 0, 0xFA, 0xFF, 0xFF, 0xFF,                 //
+      10, 0x20, 0, 8, 0, 0, 0, 0, 0,    50,   0,    0,    0, 4, 0, 0, 0,  //
+      0};
+  EXPECT_EQ(std::vector<std::uint8_t>(bytes->begin() + 13, bytes->end()), expected);
+  const auto told = programs::rehearse(*program, mcu_, one, *bytes);
+  ASSERT_TRUE(told) << told.error().text();
+  // 300 + 100 + 200 + 90 + 90 + 400 units are 59 ms; 300 + 100 + 200 + 400 there and back, 50 ms.
+  EXPECT_EQ(told->ticks, 24u + 2 * 20 + 1);
+}
+
+TEST_F(TravelFiles, AreRefusedWithPlaceAndRemedy) {
+  const std::string one = "motors = [\"x\"]\n";
+  const std::string two = "motors = [\"x\", \"theta\"]\n";
+  const std::string line = "[[frame]]\nline_by = [[4]]\n";
+  const auto with = [&](const char* codes) { return one + "codes = " + codes + "\n" + line; };
+  const struct {
+    std::string text;
+    const char* says;
+  } kCases[] = {
+      {two + "[[frame]]\ntravel_by = [1, 2]\n", "allowed: one, by its name"},
+      {one + "[[frame]]\ntravel_by = [0]\n", "travels by no step"},
+      {one + "[[frame]]\ntravel_by = [1]\nreturn_s = 2\n", "0.00005 to 1.65 s"},
+      {one + "[[frame]]\ntravel_by = [1]\nspeed = 2\n", "speed"},
+      {two + kCodes + line, "programs of one motor"},
+      {with("{ time_unit_ns = 1000, accel = [3, 0], decel = [1] }"), "1..65535"},
+      {with("{ time_unit_ns = 0, accel = [3, 1], decel = [1] }"), "time_unit_ns"},
+      {with("{ time_unit_ns = 1000, accel = [3, 4] }"), "decel"},
+      {with("{ time_unit_ns = 1000, accel = [3, 4], decel = [4], last = 1 }"), "last"},
+      {with("{ time_unit_ns = 1000, accel = [4, 3], decel = [3, 4] }"),
+       "give the motor this table"},
+      {one + kCodes + "[[frame]]\nline_by = [[3]]\n", "3 steps, but `codes` has 4 delays"},
+      {one + kCodes + "[[frame]]\ntravel_by = [3]\n", "3 steps, but `codes` has 4 delays"},
+      {one + kCodes + "[[frame]]\nline_by = [[4]]\nspeed = 4\n", "no `speed` beside them"},
+  };
+  Law law;
+  law.accel = {300, 100, 200};
+  law.decel = {400};
+  law.cruise = 90;
+  law.unit_ns = 50'000;
+  const TestTable written(law, true);
+  mcu_.line_table = written.view();
+  for (const auto& one_case : kCases) {
+    EXPECT_NE(refusal(one_case.text).find(one_case.says), std::string::npos)
+        << one_case.text << refusal(one_case.text);
+  }
+  mcu_.has_trigger = false;
+  EXPECT_NE(
+      refusal(one + "[[frame]]\ntravel_by = [1]\nafter_edge_s = 1\n").find("no trigger input"),
+      std::string::npos);
+  mcu_.line_table = nullptr;
+  EXPECT_NE(refusal(one + kCodes + "[[frame]]\ntravel_by = [4]\n").find("no table bank left"),
+            std::string::npos);
+  mcu_.travels = false;
+  EXPECT_NE(refusal(one + "[[frame]]\ntravel_by = [1]\n").find("does not travel"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace bushd::test
