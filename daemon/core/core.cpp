@@ -50,7 +50,8 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       health_(installation_, outputs),
       settings_(installation_, positions_, kept_, journal_, outputs,
                 [this](MotorId motor) { return waiting_requests_.holds(motor); }),
-      camac_(installation_, interlocks_, open_moves_, tables_, lines_, travels_, kept_, outputs,
+      camac_(installation_, interlocks_, open_moves_, tables_, lines_, travels_, programs_, kept_,
+             outputs,
              [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
                this->request(now_us, logged(asker, request, outputs_), request);
              }),

@@ -14,7 +14,8 @@ namespace {
 
 constexpr int kLastN = 31;
 constexpr const char* kMemory = "memory";  // in the store
-constexpr int kWrites = 16;                // the function
+constexpr const char* kMotion = "motion";
+constexpr int kWrites = 16;  // the function
 
 bool writes(const camac::Block& block) {
   return std::ranges::any_of(block.cycles,
@@ -75,8 +76,11 @@ class Camac::Station {
   virtual bool step(std::int64_t now_us) = 0;
   virtual void end_overtaken() = 0;
   virtual std::string take_note() = 0;
+  virtual std::optional<KeptMotion> to_keep() const = 0;
+  virtual void find(const KeptMotion& kept) = 0;
 
   const std::string kept_as;
+  bool keeps_motion = false;  // one that goes on without the daemon is in the store
 };
 
 class Camac::Bushd1Station final : public Station {
@@ -93,6 +97,8 @@ class Camac::Bushd1Station final : public Station {
   }
   void end_overtaken() override { shutter_.end_overtaken(); }
   std::string take_note() override { return shutter_.take_note(); }
+  std::optional<KeptMotion> to_keep() const override { return shutter_.to_keep(module_); }
+  void find(const KeptMotion& kept) override { shutter_.find(kept, module_); }
 
  private:
   CamacShutter shutter_;
@@ -113,6 +119,8 @@ class Camac::Bushd2Station final : public Station {
   }
   void end_overtaken() override { motors_.end_overtaken(); }
   std::string take_note() override { return motors_.take_note(); }
+  std::optional<KeptMotion> to_keep() const override { return motors_.to_keep(module_); }
+  void find(const KeptMotion& kept) override { motors_.find(kept, module_); }
 
  private:
   CamacMotors motors_;
@@ -120,9 +128,9 @@ class Camac::Bushd2Station final : public Station {
 };
 
 Camac::Camac(Installation& installation, const Interlocks& interlocks, const OpenMoves& open_moves,
-             TablesInService& tables, Lines& lines, Travels& travels, KeptPositions& kept,
-             Outputs& outputs, const AskCore& ask)
-    : kept_(kept), outputs_(outputs) {
+             TablesInService& tables, Lines& lines, Travels& travels, const Programs& programs,
+             KeptPositions& kept, Outputs& outputs, const AskCore& ask)
+    : installation_(installation), kept_(kept), outputs_(outputs) {
   for (const config::Crate& configured : installation.config().crates) {
     Crate crate{.number = configured.number};
     for (const config::CamacModule& module : configured.modules) {
@@ -133,11 +141,11 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
       if (module.type == config::CamacModule::Type::kBushd1) {
         station = std::make_unique<Bushd1Station>(kept_as, adjusts(module), name, module,
                                                   installation, interlocks, open_moves.precedence(),
-                                                  turn_, tables, travels, outputs, ask);
+                                                  turn_, tables, travels, programs, outputs, ask);
       } else {
         station = std::make_unique<Bushd2Station>(kept_as, name, module, installation, interlocks,
                                                   open_moves.precedence(), turn_, tables, lines,
-                                                  outputs, ask);
+                                                  programs, outputs, ask);
       }
       crate.crate.insert(module.station, station->module());
       crate.stations.push_back(std::move(station));
@@ -174,11 +182,14 @@ void Camac::request(const api::Asker& asker, const api::Camac& request) {
       .outcome = api::Outcome::kDone, .reason = std::move(reason), .detail = std::move(result)});
 }
 
-void Camac::keep_memories(const Crate& crate) {
+void Camac::keep_memories(Crate& crate) {
   if (!kept_.keeps()) return;
   for (const auto& station : crate.stations) {
-    const std::string text = camac::to_text(station->module().memory());
-    kept_.keep(station->kept_as, {{kMemory, {.value = text}}});
+    state::Settings kept{{kMemory, {.value = camac::to_text(station->module().memory())}}};
+    const auto motion = station->to_keep();
+    station->keeps_motion = motion.has_value();
+    if (motion) kept[kMotion].value = to_text(*motion);
+    kept_.keep(station->kept_as, kept);
   }
 }
 
@@ -197,6 +208,10 @@ void Camac::take_kept() {
       if (const auto bytes = camac::bytes_of(memory->second.value)) {
         station->module().load_memory(*bytes);
       }
+      const auto motion = kept.find(kMotion);
+      if (motion == kept.end()) continue;
+      station->keeps_motion = true;
+      if (const auto found = kept_motion_of(motion->second.value)) station->find(*found);
     }
   }
 }
@@ -204,8 +219,12 @@ void Camac::take_kept() {
 void Camac::step(std::int64_t now_us) {
   for (Crate& crate : crates_) {
     bool changed = false;
-    for (const auto& station : crate.stations) changed |= station->step(now_us);
-    if (changed) keep_memories(crate);
+    for (const auto& station : crate.stations) {
+      changed |= station->step(now_us);
+      changed |= station->to_keep().has_value() != station->keeps_motion;
+    }
+    // What goes on without this daemon is for the next one, as it was begun.
+    if (changed && !installation_.shutting_down) keep_memories(crate);
     tell_lam(crate);
   }
 }

@@ -14,6 +14,7 @@
 #include "daemon/services/kept_positions.h"
 #include "daemon/services/lines.h"
 #include "daemon/services/open_moves.h"
+#include "daemon/services/programs.h"
 #include "daemon/services/tables_in_service.h"
 #include "daemon/services/travels.h"
 #include "heritage/camac/crate.h"
@@ -24,12 +25,13 @@ class Camac final : public Service {
  public:
   // `ask` is called from step() only.
   Camac(Installation& installation, const Interlocks& interlocks, const OpenMoves& open_moves,
-        TablesInService& tables, Lines& lines, Travels& travels, KeptPositions& kept,
-        Outputs& outputs, const AskCore& ask);
+        TablesInService& tables, Lines& lines, Travels& travels, const Programs& programs,
+        KeptPositions& kept, Outputs& outputs, const AskCore& ask);
   ~Camac() override;
 
   void request(const api::Asker& asker, const api::Camac& request);
-  // The store is in use: memories are as they were kept.
+  // The store is in use: memories are as they were kept, and motions that go on without the daemon
+  // are found.
   void take_kept();
 
   void end_overtaken(std::int64_t now_us) override;
@@ -48,8 +50,9 @@ class Camac final : public Service {
   };
 
   void tell_lam(Crate& crate);
-  void keep_memories(const Crate& crate);
+  void keep_memories(Crate& crate);
 
+  const Installation& installation_;
   KeptPositions& kept_;
   Outputs& outputs_;
   CamacTurn turn_;

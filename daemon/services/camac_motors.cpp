@@ -82,7 +82,7 @@ bool CamacMotors::move(const Program& program) {
   const bool alone = as_written || config_.without_computer;
   if (may && alone) may = may_have_program(installation_.mcu_of(id), as_written);
   tables::TablePtr by;
-  if (may && !as_written) {
+  if (may && !alone) {
     auto table = table_of_program(program, config_.f_start_hz, name_);
     if (table) by = std::move(*table);
     if (!table) may = fail(table.error());
@@ -124,9 +124,11 @@ void CamacMotors::step(std::int64_t now_us, Bushd2& module) {
 }
 
 void CamacMotors::begin(std::int64_t now_us, Bushd2& module) {
-  // Its MCU takes codes at rest only.
-  if (!motion_->table && !installation_.rests(installation_.mcu_of(motion_->motor))) return;
-  if (!motion_->table) return move(now_us, module, {});
+  if (motion_->alone) {
+    // Its MCU takes codes at rest only.
+    if (installation_.rests(installation_.mcu_of(motion_->motor))) move(now_us, module, {});
+    return;
+  }
   const GroupId group = installation_.config()[motion_->motor].group;
   if (streams()) return move(now_us, module, motion_->table);
   motion_->stage = Motion::Stage::kGetsTable;
@@ -142,7 +144,6 @@ void CamacMotors::begin(std::int64_t now_us, Bushd2& module) {
 bool CamacMotors::streams() const {
   const GroupId group = installation_.config()[motion_->motor].group;
   const tables::Table& in_mcu = *installation_.tables()[group];
-  if (motion_->alone) return false;  // a stream needs the daemon
   if (in_mcu.content_hash() == motion_->table->content_hash()) return false;
   if (!installation_.mcu_of(motion_->motor).offers.streams || !tables_.waits_for_motors(group)) {
     return false;
@@ -177,10 +178,10 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   motion_->from_steps = motor.position_steps();
   const std::int64_t steps = motion_->program.steps;
   if (motion_->alone) {
-    return program_.begin(now_us,
-                          text_of(motion_->program, motor.name(), config_.without_computer,
-                                  motion_->table == nullptr, config_.f_start_hz),
-                          motion_->after_stops);
+    return program_.begin(
+        now_us,
+        text_of(motion_->program, motor.name(), config_.without_computer, config_.f_start_hz),
+        motion_->after_stops);
   }
   const std::vector<api::MotorAmount> motors{
       {motor.name(), motion_->program.left ? -steps : steps}};
@@ -188,6 +189,33 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   if (!by) return ask_(now_us, who, api::Move{.motors = motors});
   lines_.lend(who, by);
   ask_(now_us, who, api::MoveLine{.motors = motors});
+}
+
+std::optional<KeptMotion> CamacMotors::to_keep(const Bushd2& module) const {
+  const bool goes = motion_ && motion_->alone && motion_->stage == Motion::Stage::kMoves;
+  if (!goes || !config_.without_computer || !program_.runs()) return std::nullopt;
+  const auto checksum = program_.checksum();
+  if (!checksum) return std::nullopt;
+  return KeptMotion{.control = module.control(),
+                    .from_steps = motion_->from_steps,
+                    .steps = motion_->program.steps,
+                    .told = motion_->told,
+                    .checksum = *checksum};
+}
+
+void CamacMotors::find(const KeptMotion& kept, Bushd2& module) {
+  const std::size_t number = kept.control % Bushd2::kMotors;
+  if (!config_.without_computer || number >= config_.motors.size()) return;
+  module.goes_on(kept.control, kept.steps, kept.told);
+  const MotorId motor = config_.motors[number];
+  motion_ = Motion{.motor = motor,
+                   .program = module.moving_program(),
+                   .table = {},
+                   .alone = true,
+                   .stage = Motion::Stage::kMoves,
+                   .from_steps = kept.from_steps,
+                   .told = kept.told};
+  program_.find(installation_.mcu_of(motor).id, kept.checksum);
 }
 
 // In the direction of its program.
@@ -198,6 +226,7 @@ std::int64_t CamacMotors::moved(const Motion& motion) const {
 
 // All but the last one, which comes with the result.
 void CamacMotors::tell_steps(Bushd2& module) {
+  if (!installation_.mcu_of(motion_->motor).online()) return;
   const std::int64_t last = motion_->program.steps - 1;
   const auto made = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
       moved(*motion_), motion_->told, std::max<std::int64_t>(last, motion_->told)));
@@ -207,7 +236,8 @@ void CamacMotors::tell_steps(Bushd2& module) {
 }
 
 void CamacMotors::follow_move(std::int64_t now_us, Bushd2& module) {
-  if (motion_->to_stop && !motion_->stopping) {
+  const bool heard = !program_.is_found() || installation_[motion_->motor].is<motion::InProgram>();
+  if (motion_->to_stop && !motion_->stopping && (!motion_->alone || heard)) {
     motion_->stopping = true;
     ask_(now_us, {.session = stops_, .number = stops_->next_number()},
          api::Stop{{installation_[motion_->motor].name()}});

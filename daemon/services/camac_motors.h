@@ -33,7 +33,8 @@ class CamacMotors final : public camac::Motors {
   // `name` is that of the module: "camac-1-5".
   CamacMotors(std::string name, const config::CamacModule& module, Installation& installation,
               const Interlocks& interlocks, const Precedence& precedence, const CamacTurn& turn,
-              TablesInService& tables, Lines& lines, Outputs& outputs, AskCore ask)
+              TablesInService& tables, Lines& lines, const Programs& programs, Outputs& outputs,
+              AskCore ask)
       : name_(std::move(name)),
         config_(module),
         installation_(installation),
@@ -45,7 +46,7 @@ class CamacMotors final : public camac::Motors {
         outputs_(outputs),
         ask_(std::move(ask)),
         session_(std::make_shared<CamacSession>(name_)),
-        program_(name_, session_, ask_) {}
+        program_(name_, programs, session_, ask_) {}
 
   camac::MotorStatus status(int motor) override;
   bool move(const camac::Program& program) override;
@@ -61,13 +62,18 @@ class CamacMotors final : public camac::Motors {
   // Does what is due, and tells the module what has become of its motion.
   void step(std::int64_t now_us, camac::Bushd2& module);
 
+  // A motion that goes on without the daemon, once its MCU has it; and one that a daemon before has
+  // left so.
+  std::optional<KeptMotion> to_keep(const camac::Bushd2& module) const;
+  void find(const KeptMotion& kept, camac::Bushd2& module);
+
  private:
   struct Motion {
     enum class Stage { kBegins, kGetsTable, kMoves };
     MotorId motor;
     camac::Program program;
-    tables::TablePtr table;  // null: it goes by its codes as they are written
-    bool alone = false;      // by a program of the MCU
+    tables::TablePtr table;  // of its group; null: it goes by a program of the MCU
+    bool alone = false;      // by that
     Stage stage = Stage::kBegins;
     std::int64_t from_steps = 0;
     std::uint32_t told = 0;  // of its steps

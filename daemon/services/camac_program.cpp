@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <functional>
 #include <span>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -58,32 +59,31 @@ Result<void> may_have_program(const Mcu& mcu, bool as_written) {
 }
 
 std::string text_of(const camac::Program& program, const std::string& motor, bool without_host,
-                    bool as_written, int f_start_hz) {
-  std::string text = head(motor, without_host);
-  if (as_written) {
-    const std::size_t used = camac::codes_used(program);
-    const std::vector<int> codes(program.codes.begin(),
-                                 program.codes.begin() + static_cast<std::ptrdiff_t>(used));
-    std::vector<int> back(codes.rbegin(), codes.rend());
-    // The step in the middle has its code once.
-    if (program.steps < 2 * used) back.erase(back.begin());
-    text += codes_text<int>(code_unit_ns(f_start_hz), codes, codes.back(), back);
-  }
+                    int f_start_hz) {
+  const auto used = static_cast<std::ptrdiff_t>(camac::codes_used(program));
+  const std::vector<int> there(program.codes.begin(), program.codes.begin() + used);
+  std::vector<int> back(there.rbegin(), there.rend());
+  // The step in the middle has its code once. A table has both sides.
+  if (program.steps < there.size() + back.size() && back.size() > 1) back.erase(back.begin());
   const std::int64_t steps = program.left ? -std::int64_t{program.steps} : program.steps;
-  return text + fmt::format("[[frame]]\n{} = [{}]\n", as_written ? "line_by" : "move_by",
-                            as_written ? fmt::format("[{}]", steps) : std::to_string(steps));
+  return head(motor, without_host) +
+         codes_text<int>(code_unit_ns(f_start_hz), there, there.back(), back) +
+         fmt::format("[[frame]]\nline_by = [[{}]]\n", steps);
 }
 
-std::string text_of(const camac::Travel& travel, const std::string& motor, bool without_host,
-                    bool as_written) {
-  std::string text = head(motor, without_host);
-  if (as_written) {
-    const std::span<const std::uint16_t> codes = travel.codes;
-    text += codes_text<std::uint16_t>(camac::Travel::kUnitUs * 1000, codes.first(codes.size() - 1),
-                                      codes.back(), codes.last(1));
-  }
-  const auto steps = static_cast<std::int64_t>(travel.codes.size());
-  text += fmt::format("[[frame]]\ntravel_by = [{}]\n", travel.left ? -steps : steps);
+std::string text_of(const camac::Travel& travel, const std::string& motor, bool without_host) {
+  const std::span<const std::uint16_t> codes = travel.codes;
+  const auto slower = std::ranges::is_sorted_until(codes, std::greater<>());
+  auto falling = static_cast<std::size_t>(slower - codes.begin());
+  // A table has both sides.
+  if (falling == codes.size() && codes.size() > 1) --falling;
+  const std::span rest = codes.subspan(falling);
+  const auto steps = static_cast<std::int64_t>(codes.size());
+  std::string text =
+      head(motor, without_host) +
+      codes_text<std::uint16_t>(camac::Travel::kUnitUs * 1000, codes.first(falling),
+                                std::ranges::min(codes), rest.empty() ? codes : rest) +
+      fmt::format("[[frame]]\ntravel_by = [{}]\n", travel.left ? -steps : steps);
   if (travel.synchronous) {
     text += "after_edge_s = " + seconds(travel.first_run_delay_us()) + "\n";
   }
@@ -102,13 +102,48 @@ std::string as_written_note(const Installation& installation, MotorId id, std::i
   return note;
 }
 
+std::string to_text(const KeptMotion& motion) {
+  return fmt::format("{} {} {} {} {}", motion.control, motion.from_steps, motion.steps, motion.told,
+                     motion.checksum);
+}
+
+std::optional<KeptMotion> kept_motion_of(const std::string& text) {
+  std::istringstream words(text);
+  unsigned control = 0;
+  KeptMotion motion;
+  words >> control >> motion.from_steps >> motion.steps >> motion.told >> motion.checksum;
+  if (!words || control > UINT8_MAX || motion.steps == 0 || motion.told > motion.steps) {
+    return std::nullopt;
+  }
+  motion.control = static_cast<std::uint8_t>(control);
+  return motion;
+}
+
 void CamacProgram::begin(std::int64_t now_us, std::string text, std::uint64_t after_stops) {
   stage_ = Stage::kGetsPut;
   after_stops_ = after_stops;
   ask_(now_us, asker(), api::PutProgram{.program = name_, .text = std::move(text)});
 }
 
+void CamacProgram::find(McuId mcu, std::uint32_t checksum) {
+  stage_ = Stage::kFound;
+  mcu_ = mcu;
+  checksum_ = checksum;
+}
+
+std::optional<std::uint32_t> CamacProgram::checksum() const {
+  return stage_ == Stage::kFound ? checksum_ : programs_.checksum_of(name_);
+}
+
 std::optional<api::Reply> CamacProgram::follow(std::int64_t now_us) {
+  if (stage_ == Stage::kFound) {
+    const Programs::Found found = programs_.found(mcu_, checksum_);
+    if (found == Programs::Found::kEnded) return programs_.ending(mcu_);
+    if (found != Programs::Found::kNotThere) return std::nullopt;
+    return api::Completed{.outcome = api::Outcome::kLink,
+                          .reason = "its MCU does not have the program of its motion any more",
+                          .detail = {}};
+  }
   if (!session_->last_answer()) return std::nullopt;
   const auto* completed = std::get_if<api::Completed>(&*session_->last_answer());
   const bool put = completed != nullptr && completed->outcome == api::Outcome::kDone;

@@ -109,7 +109,7 @@ bool CamacShutter::travel(const camac::Travel& travel) {
     return refuse(may.error().text());
   }
   tables::TablePtr by;
-  if (!as_written) {
+  if (!alone) {
     auto table = table_of_travel(travel, name_);
     if (!table) return refuse(table.error().text());
     by = std::move(*table);
@@ -138,9 +138,8 @@ void CamacShutter::end_overtaken() {
 void CamacShutter::follow(std::int64_t now_us, camac::Bushd1& module) {
   tell_limits(module);
   if (!motion_) return;
-  const bool waits_for_rest = motion_->kind == Motion::Kind::kTravel && !motion_->table;
   if (motion_->stage == Motion::Stage::kBegins &&
-      (motion_->begins_no_more || (motion_->to_stop && waits_for_rest))) {
+      (motion_->begins_no_more || (motion_->to_stop && motion_->alone))) {
     refuse("stopped before it began");
     motion_.reset();
     return module.stands();
@@ -161,7 +160,7 @@ void CamacShutter::begin(std::int64_t now_us) {
                 api::Move{.kind = api::Move::Kind::kRelative,
                           .motors = {{installation_[motor_].name(), motion_->left() ? -1 : 1}}});
   }
-  if (!motion_->table) {
+  if (motion_->alone) {
     // Its MCU takes codes at rest only.
     if (!installation_.rests(installation_.mcu_of(motor_))) return;
     motion_->stage = Motion::Stage::kGoes;
@@ -193,8 +192,7 @@ void CamacShutter::ask_mcu(std::int64_t now_us) {
   motion_->from_steps = installation_[motor_].position_steps();
   if (motion_->alone) {
     return program_.begin(now_us,
-                          text_of(motion_->travel, installation_[motor_].name(), without_computer_,
-                                  motion_->table == nullptr),
+                          text_of(motion_->travel, installation_[motor_].name(), without_computer_),
                           motion_->after_stops);
   }
   bushd_travel message{};
@@ -217,7 +215,9 @@ void CamacShutter::ask_mcu(std::int64_t now_us) {
 }
 
 void CamacShutter::follow_going(std::int64_t now_us, camac::Bushd1& module) {
-  if (motion_->to_stop && !motion_->stopping && motion_->kind != Motion::Kind::kStep) {
+  const bool heard =
+      !motion_->alone || !program_.is_found() || installation_[motor_].is<motion::InProgram>();
+  if (motion_->to_stop && !motion_->stopping && heard && motion_->kind != Motion::Kind::kStep) {
     motion_->stopping = true;
     ask_(now_us, {.session = stops_, .number = stops_->next_number()},
          api::Stop{{installation_[motor_].name()}});
@@ -229,12 +229,44 @@ void CamacShutter::follow_going(std::int64_t now_us, camac::Bushd1& module) {
   if (motion_->kind == Motion::Kind::kTravel && report != nullptr) follow_travel(*report, module);
 }
 
+std::optional<KeptMotion> CamacShutter::to_keep(const camac::Bushd1& module) const {
+  const bool goes = motion_ && motion_->alone && motion_->stage == Motion::Stage::kGoes;
+  if (!goes || !without_computer_ || !program_.runs()) return std::nullopt;
+  const auto checksum = program_.checksum();
+  if (!checksum) return std::nullopt;
+  const auto steps = static_cast<std::uint32_t>(motion_->travel.codes.size());
+  return KeptMotion{.control = module.control(),
+                    .from_steps = travel_from(*motion_),
+                    .steps = steps,
+                    .checksum = *checksum};
+}
+
+// Of its first run.
+std::int64_t CamacShutter::travel_from(const Motion& motion) {
+  if (!motion.returns) return motion.from_steps;
+  const auto steps = static_cast<std::int64_t>(motion.travel.codes.size());
+  return motion.from_steps - (motion.travel.left ? -steps : steps);
+}
+
+void CamacShutter::find(const KeptMotion& kept, camac::Bushd1& module) {
+  if (!without_computer_ || kept.steps > camac::Bushd1::kMostSteps) return;
+  module.goes_on(kept.control, static_cast<int>(kept.steps));
+  Motion motion{.kind = Motion::Kind::kTravel,
+                .alone = true,
+                .stage = Motion::Stage::kGoes,
+                .from_steps = kept.from_steps};
+  motion.travel.left = module.goes_left();
+  motion.travel.codes.resize(kept.steps, 1);
+  motion_ = std::move(motion);
+  program_.find(installation_.mcu_of(motor_).id, kept.checksum);
+}
+
 // What the MCU has reported last of the travel that is made.
 const bushd_report* CamacShutter::progress() const {
   if (!motion_->alone) return travels_.progress(motor_);
   const Mcu& mcu = installation_.mcu_of(motor_);
   const bool runs = program_.runs() && installation_[motor_].is<motion::InProgram>();
-  return runs && !mcu.busy() ? &mcu.report() : nullptr;
+  return runs && mcu.online() && !mcu.busy() ? &mcu.report() : nullptr;
 }
 
 // What happens between two reports is told in its order, whichever of it they show.

@@ -29,7 +29,7 @@ class CamacShutter final : public camac::Shutter {
   CamacShutter(const std::string& name, const config::CamacModule& module,
                Installation& installation, const Interlocks& interlocks,
                const Precedence& precedence, const CamacTurn& turn, TablesInService& tables,
-               Travels& travels, Outputs& outputs, AskCore ask)
+               Travels& travels, const Programs& programs, Outputs& outputs, AskCore ask)
       : name_(name),
         motor_(module.motors.front()),
         without_computer_(module.without_computer),
@@ -42,7 +42,7 @@ class CamacShutter final : public camac::Shutter {
         outputs_(outputs),
         ask_(std::move(ask)),
         session_(std::make_shared<CamacSession>(name)),
-        program_(name, session_, ask_) {}
+        program_(name, programs, session_, ask_) {}
 
   void refuses(std::string_view why) override { refuse(std::string(why)); }
   bool step(const camac::SingleStep& step) override;
@@ -59,6 +59,11 @@ class CamacShutter final : public camac::Shutter {
   // Does what is due, and tells the module what has become of it.
   void follow(std::int64_t now_us, camac::Bushd1& module);
 
+  // A travel that goes on without the daemon, once its MCU has it; and one that a daemon before has
+  // left so.
+  std::optional<KeptMotion> to_keep(const camac::Bushd1& module) const;
+  void find(const KeptMotion& kept, camac::Bushd1& module);
+
  private:
   struct Motion {
     enum class Kind { kStep, kSensedStep, kTravel };
@@ -66,8 +71,8 @@ class CamacShutter final : public camac::Shutter {
     Kind kind;
     camac::SingleStep step{};
     camac::Travel travel{};
-    tables::TablePtr table{};  // null: by its codes as they are written
-    bool alone = false;        // by a program of the MCU
+    tables::TablePtr table{};  // of its group; null: it goes by a program of the MCU
+    bool alone = false;        // by that
     Stage stage = Stage::kBegins;
     bool to_stop = false;
     bool begins_no_more = false;    // by another's stop
@@ -102,6 +107,7 @@ class CamacShutter final : public camac::Shutter {
   void follow_table(std::int64_t now_us, camac::Bushd1& module);
   void ask_mcu(std::int64_t now_us);
   const bushd_report* progress() const;
+  static std::int64_t travel_from(const Motion& motion);
   void follow_going(std::int64_t now_us, camac::Bushd1& module);
   void follow_travel(const bushd_report& report, camac::Bushd1& module);
   void tell_steps(camac::Bushd1& module, Motion& motion, bool all) const;

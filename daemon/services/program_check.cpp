@@ -69,11 +69,11 @@ Result<programs::MotorPlace> place_of(const Installation& installation, MotorId 
                               .at_steps = motor.position_steps()};
 }
 
-// The codes of a program's text, if its motor may go by them as they stand.
+// The codes of a program's text, if its motor may go by them.
 Result<tables::TablePtr> written_codes(const Installation& installation, const Mcu& mcu,
                                        const CheckedProgram& program) {
-  auto made = tables::make_written(*program.text.codes);
-  if (!made) return fail(made.error());
+  auto made = tables::make_any_law(*program.text.codes);
+  if (!made || !bushd_table_is_written(&(*made)->view())) return made;
   const bushd_table& codes = (*made)->view();
   const motion::Motor& motor = installation[program.motors.front()];
   const auto shortest = motor.scale().shortest_delay_at({}, codes.time_unit_ns);

@@ -309,6 +309,27 @@ void Programs::follow_erase(std::int64_t now_us, McuId id) {
 
 // -- over restarts of the daemon
 
+std::optional<std::uint32_t> Programs::checksum_of(const std::string& name) const {
+  const auto id = find(name);
+  return id ? std::optional(mcus_[*id].program->crc) : std::nullopt;
+}
+
+Programs::Found Programs::found(McuId id, std::uint32_t checksum) const {
+  const Mcu& mcu = installation_[id];
+  if (mcu.offline() || mcu.busy() || !mcu.can_have_program() || !view(id).known) {
+    return mcu.online() && !mcu.can_have_program() ? Found::kNotThere : Found::kUnknown;
+  }
+  const bushd_program_state& state = view(id).state;
+  if (state.crc != checksum || state.stage < BUSHD_PROGRAM_WAITS) return Found::kNotThere;
+  if (state.stage != BUSHD_PROGRAM_ENDED || mcus_[id].run) return Found::kRuns;
+  return mcu.online() ? Found::kEnded : Found::kUnknown;  // its position is that of the end
+}
+
+api::Completed Programs::ending(McuId id) const {
+  ProgramEnd ending = end_of_program(view(id).state, installation_[id]);
+  return {.outcome = ending.outcome, .reason = ending.reason + where(id), .detail = {}};
+}
+
 // Null: there is none.
 void Programs::keep(McuId id, const api::PutProgram* source) {
   mcus_[id].kept.reset();

@@ -39,6 +39,13 @@ class Programs final : public Service {
   void resume(MotorId motor);
   Result<void> may_resume(MotorId motor) const;  // precondition: is_paused
   bool is_paused(MotorId motor) const;           // all its motors stand
+  // The program of this name that was put by this daemon: the checksum of its bytes.
+  std::optional<std::uint32_t> checksum_of(const std::string& name) const;
+  // What has become of a program with these bytes that was run before this daemon was started.
+  // Unknown: its MCU is not heard, or not yet configured.
+  enum class Found { kUnknown, kRuns, kEnded, kNotThere };
+  Found found(McuId mcu, std::uint32_t checksum) const;
+  api::Completed ending(McuId mcu) const;  // precondition: kEnded
   // The state store has been read.
   void take_kept();
   // The daemon ends: those that go on without a host are left to themselves.

@@ -70,13 +70,12 @@ static inline uint16_t bushd_mcu_moved_without_host(const bushd_mcu* mcu) {
 #endif
 }
 
-// Whether the program has this motor travel by codes as they are written.
-static inline bool bushd_mcu_travels_as_written(const bushd_mcu* mcu, uint8_t m) {
+// Whether the program has this motor travel by what is in BUSHD_SCRATCH_BANK.
+static inline bool bushd_mcu_travels_by_scratch(const bushd_mcu* mcu, uint8_t m) {
 #if BUSHD_PROGRAMS
   const bushd_mcu_program* p = mcu->config.program;
   return p != NULL && (p->motors & p->frame.motors & motor_bit(m)) != 0 &&
-         p->frame.kind == BUSHD_PROGRAM_TRAVEL &&
-         bushd_mcu_is_written(mcu->config.scratch, p->frame.bank);
+         p->frame.kind == BUSHD_PROGRAM_TRAVEL && p->frame.bank == BUSHD_SCRATCH_BANK;
 #else
   (void)mcu;
   (void)m;

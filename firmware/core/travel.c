@@ -48,13 +48,16 @@ static void wait_for_edge(bushd_mcu* mcu) {
 }
 
 static void start_run(bushd_mcu* mcu, uint8_t m, uint32_t steps, int direction) {
-  bushd_mcu_motor* motor = &mcu->motor[m];
-  if (bushd_mcu_travels_as_written(mcu, m)) {
-    bushd_run_start_as_written(&motor->made.run, &mcu->config.scratch->entry.table, steps,
-                               direction);
-  } else {
-    bushd_run_start(&motor->made.run, bushd_mcu_table_of(mcu, motor), steps, direction, 0);
+  bushd_run* run = &mcu->motor[m].made.run;
+  const bushd_table* table = bushd_mcu_table_of(mcu, &mcu->motor[m]);
+  if (bushd_mcu_travels_by_scratch(mcu, m)) {
+    table = &mcu->config.scratch->entry.table;
+    if (mcu->config.scratch->written) {
+      bushd_run_start_as_written(run, table, steps, direction);
+      return;
+    }
   }
+  bushd_run_start(run, table, steps, direction, 0);
 }
 
 static void begin(bushd_mcu* mcu, bushd_travel_stage stage) {

@@ -120,6 +120,9 @@ class Compiler {
                 "speed, or a table with a longer time unit");
   }
 
+  // Codes that no table could have.
+  bool as_written() const { return program_.codes && bushd_table_is_written(mcu_.line_table); }
+
   unsigned mask_of(const Point& point) const {
     unsigned mask = 0;
     for (std::size_t i = 0; i < point.size(); ++i) {
@@ -184,7 +187,7 @@ class Compiler {
                   " makes no lines by the elementary law: leave out `law`, or use another MCU");
     }
     if (program_.codes && (line.speed || line.elementary)) {
-      return fail("`codes` are made as they are written, so there is no `speed` or `law` beside them");
+      return fail("there is no `speed` or `law` beside `codes`: write longer delays");
     }
     if (program_.at_power_on && mcu_.line_bank == BUSHD_SCRATCH_BANK) {
       return fail(mcu_.name +
@@ -193,7 +196,7 @@ class Compiler {
     }
     std::uint16_t shortest_delay = 0;
     for (const std::size_t i : by_output_) {
-      if (program_.codes || !line.points.front()[i]) continue;
+      if (as_written() || !line.points.front()[i]) continue;
       const auto delay = delay_of(i, line.speed, mcu_.line_table->time_unit_ns);
       if (!delay) return fail(delay.error());
       shortest_delay = std::max(shortest_delay, *delay);

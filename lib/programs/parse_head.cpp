@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/program.h"
+#include "tables/table.h"
 #include "tables/toml_reader.h"
 
 namespace bushd::programs {
@@ -115,7 +116,7 @@ Result<void> read_written(const TomlReader& toml, Program& program) {
     if (!cruise) return fail(cruise.error());
     content.cruise = static_cast<std::uint16_t>(*cruise);
   }
-  if (const auto table = tables::make_written(content); !table) {
+  if (const auto table = tables::make_any_law(content); !table) {
     return fail(toml.error(table.error().key, table.error().message));
   }
   program.codes = std::move(content);

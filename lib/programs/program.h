@@ -104,7 +104,7 @@ struct Program {
   bool at_power_on = false;       // then it is kept, without a host, and goes by distances
   std::vector<Range> range = {};  // with at_power_on: of each motor
   bool steps = false;             // positions are steps, not user units
-  // As they are written, in place of tables, for lines and travels of its only motor.
+  // In place of tables, for lines and travels of its only motor; in any order.
   std::optional<words::TableContent> codes{};
   std::vector<Frame> frames;
 };

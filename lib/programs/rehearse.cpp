@@ -161,9 +161,13 @@ class Walk {
     return distance;
   }
 
-  // All codes as they are written are made.
-  Result<std::uint64_t> ticks_as_written(std::uint64_t steps) const {
+  // By the table of lines; or by codes as they are written, all of which are made.
+  Result<std::uint64_t> ticks_by_line_table(std::uint64_t steps,
+                                            std::uint16_t shortest_delay) const {
     const bushd_table& codes = *mcu_.line_table;
+    if (!text_.codes || !bushd_table_is_written(&codes)) {
+      return ticks_of(codes, steps, shortest_delay);
+    }
     const std::uint64_t count = std::uint64_t{codes.accel.count} + codes.decel.count;
     if (steps < count) {
       return fail(text_.frames[frame_ - 1].place + ": " + std::to_string(steps) +
@@ -186,9 +190,9 @@ class Walk {
     const auto way = static_cast<std::uint64_t>(*steps);
     std::uint64_t ticks = ticks_of(*motors_[i].table, way, 0);
     if (text_.codes) {
-      const auto as_written = ticks_as_written(way);
-      if (!as_written) return fail(as_written.error());
-      ticks = *as_written;
+      const auto by_codes = ticks_by_line_table(way, 0);
+      if (!by_codes) return fail(by_codes.error());
+      ticks = *by_codes;
     }
     if (frame.edge == BUSHD_EDGE_NONE) {
       later(2 * ticks + ticks_of(std::uint64_t{frame.us} * 1000));
@@ -239,11 +243,7 @@ class Walk {
                     "lines of it, or leave out `law`");
       }
       if (longest == 0) continue;
-      if (!text_.codes) {
-        later(ticks_of(*mcu_.line_table, longest, frame.shortest_delay));
-        continue;
-      }
-      const auto ticks = ticks_as_written(longest);
+      const auto ticks = ticks_by_line_table(longest, frame.shortest_delay);
       if (!ticks) return fail(ticks.error());
       later(*ticks);
     }

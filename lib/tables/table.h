@@ -42,8 +42,8 @@ class Table {
   Table(const Table&) = delete;
   Table& operator=(const Table&) = delete;
 
-  // Valid as long as this object; passed bushd_table_check (make_written: the other one), and both
-  // sides are indexed. If symmetric(), both sides are the same arrays.
+  // Valid as long as this object; passed bushd_table_check (make_any_law: or the other one), and
+  // both sides are indexed. If symmetric(), both sides are the same arrays.
   const bushd_table& view() const { return view_; }
   const std::string& name() const { return name_; }
   const std::string& description() const { return description_; }
@@ -60,7 +60,7 @@ class Table {
 
  private:
   friend Result<std::shared_ptr<const Table>> make(TableContent content, std::string path);
-  friend Result<std::shared_ptr<const Table>> make_written(TableContent content);
+  friend Result<std::shared_ptr<const Table>> make_any_law(TableContent content);
   static std::shared_ptr<const Table> of(TableContent content, std::string path);
 
   struct Side {
@@ -87,9 +87,9 @@ using TablePtr = std::shared_ptr<const Table>;
 // Checks and indexes. An error's key names the offending element as in a file (`accel[17]`).
 Result<TablePtr> make(TableContent content, std::string path = {});
 
-// Codes as they are written: in any order, each side in that of a file, for one run that has all of
-// them (bushd_run_start_as_written). They are no table, and what is a table is refused: by that a
-// run of as many steps would be another one where a code is below the cruise delay.
-Result<TablePtr> make_written(TableContent content);
+// What make() does; and codes that rise and fall in any order, each side in that of a file, which
+// are no table: bushd_table_is_written, for one run that has all of them
+// (bushd_run_start_as_written).
+Result<TablePtr> make_any_law(TableContent content);
 
 }  // namespace bushd::tables

@@ -89,7 +89,7 @@ TEST(CamacAlone, Bushd2EndsWhereTheReportPutsItWithoutTheComputer) {
     lab.load(0, steps, falling());
     lab.permit(kEnabled | kLeft);
     ASSERT_TRUE(lab.begins());
-    lab.restart_daemon([&] { lab.bus(0).advance_to(lab.bus(0).now_ns() + 40'000'000'000); });
+    lab.restart_daemon([&] { lab.pass_without_daemon(40); });
     expect_steps(lab.steps(0), due_ns(falling(), steps));
     EXPECT_EQ(lab.shaft_steps("m01"), -steps);
   }
@@ -133,6 +133,89 @@ TEST(CamacAlone, F24AndStopsEndIt) {
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
 }
 
+TEST(CamacAlone, TheNextDaemonTellsWhatBecomesOfTheMotion) {
+  for (const double away_s : {0.5, 40.0}) {
+    SCOPED_TRACE(away_s);
+    AloneLab lab;
+    lab.keep_positions();
+    lab.connect();
+    lab.load(0, 1001, falling());
+    lab.permit(kEnabled | kLeft);
+    ASSERT_TRUE(lab.begins());
+    lab.run_for(0.2);
+    lab.restart_daemon([&] { lab.pass_without_daemon(away_s); });
+    EXPECT_EQ(lab.naf(kStation, 2, 0).data, kEnabled | kLeft) << "the control register";
+    EXPECT_FALSE(lab.lam());
+    lab.naf(kStation, 0, 26);
+    ASSERT_TRUE(lab.wait_for_lam(120));
+    EXPECT_EQ(lab.requests(), 0x10U | (1001U % 4) << 8);
+    expect_steps(lab.steps(0), due_ns(falling(), 1001));
+    EXPECT_EQ(lab.motor("m01").position_steps, -1001);
+    lab.naf(kStation, 0, 10);
+    lab.naf(kStation, 1, 16, 240);
+    const unsigned low = lab.naf(kStation, 0, 0).data;
+    EXPECT_EQ(low | lab.naf(kStation, 0, 0).data << 8, 0x10000U - 1001) << "U28";
+    ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+    lab.permit(kEnabled);
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.shaft_steps("m01"), 0) << "it is the module's again";
+    lab.run_for(0.2);
+    lab.restart_daemon();
+    lab.connect();
+    EXPECT_EQ(lab.naf(kStation, 2, 0).data, 0u) << "registers begin anew";
+  }
+}
+
+TEST(CamacAlone, F24OfTheNextDaemonEndsIt) {
+  AloneLab lab;
+  lab.keep_positions();
+  lab.connect();
+  lab.load(0, 20'000, falling());
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.begins());
+  lab.run_for(0.2);
+  lab.restart_daemon();
+  lab.naf(kStation, 0, 24);
+  lab.run_for(5);
+  const std::size_t made = lab.steps(0).size();
+  EXPECT_LT(made, 10'000u);
+  lab.run_for(3);
+  EXPECT_EQ(lab.steps(0).size(), made);
+  EXPECT_FALSE(lab.lam());
+}
+
+TEST(CamacAlone, AMotionWhoseMcuWasResetIsAFault) {
+  AloneLab lab;
+  lab.keep_positions();
+  lab.connect();
+  lab.load(0, 20'000, falling());
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.begins());
+  lab.run_for(0.2);
+  lab.restart_daemon([&] { lab.bus(0).reboot(0, 50'000'000); });
+  lab.naf(kStation, 2, 16, kEnabled);
+  ASSERT_TRUE(lab.wait_for_lam());
+  EXPECT_NE(lab.requests() & 0xC, 0u) << "not connected, or its drivers are not enabled yet";
+  EXPECT_THAT(lab.warnings(), Contains(HasSubstr("does not have the program of its motion")));
+}
+
+TEST(CamacAlone, ADaemonThatEndsLeavesTheMotionToTheNextOne) {
+  AloneLab lab;
+  lab.keep_positions();
+  lab.connect();
+  lab.load(0, 1001, falling());
+  lab.permit(kEnabled);
+  ASSERT_TRUE(lab.begins());
+  lab.run_for(0.2);
+  lab.core().shut_down(lab.now_us());
+  ASSERT_TRUE(lab.run_until([&] { return lab.core().at_rest(); }));
+  lab.run_for(0.1);
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.wait_for_lam(120));
+  EXPECT_EQ(lab.requests(), 0x10U | (1001U % 4) << 8);
+  EXPECT_EQ(lab.shaft_steps("m01"), 1001);
+}
+
 TEST(CamacAlone, AnMcuWithoutProgramsIsAFaultThatTheLogExplains) {
   AloneLab lab(alone(lab_with()), BUSHD_CAN_PROGRAM);
   lab.load(0, 300, falling());
@@ -174,7 +257,7 @@ TEST(CamacAnyLaw, WithoutTheComputerToo) {
   lab.load(0, 600, codes);
   lab.permit(kEnabled);
   ASSERT_TRUE(lab.begins());
-  lab.restart_daemon([&] { lab.bus(0).advance_to(lab.bus(0).now_ns() + 20'000'000'000); });
+  lab.restart_daemon([&] { lab.pass_without_daemon(20); });
   expect_steps(lab.steps(0), due_ns(codes, 600));
 }
 
@@ -266,7 +349,6 @@ class AloneShutter : private WithShutter, public CamacLab {
     }
     return at_ns;
   }
-  void pass(std::int64_t ns) { bus(0).advance_to(bus(0).now_ns() + ns); }
   Shutter& shutter() { return mechanics; }
 };
 
@@ -276,7 +358,7 @@ TEST(CamacAlone, Bushd1TravelsThereAndBackWithoutTheComputer) {
     lab.load_codes(codes, 6000);
     lab.permit(kAutomatic | kAllOfShutter);
     ASSERT_TRUE(lab.run_until([&] { return lab.shutter().steps.size() == 2; }));
-    lab.restart_daemon([&] { lab.pass(2'000'000'000); });
+    lab.restart_daemon([&] { lab.pass_without_daemon(2); });
     ASSERT_EQ(lab.shutter().steps.size(), 18u);
     EXPECT_EQ(lab.shutter().position, 0);
     const sim::TimeNs begin_ns = lab.shutter().steps[0].time_ns - codes[0] * 50'000;
@@ -295,12 +377,12 @@ TEST(CamacAlone, Bushd1FollowsReactorStartsWithoutTheComputer) {
   const auto reactor = [&] {
     starts_ns.push_back(lab.bus(0).now_ns());
     lab.shutter().reactor(true);
-    lab.pass(1'000'000);
+    lab.pass_without_daemon(0.001);
     lab.shutter().reactor(false);
-    lab.pass(2'000'300'000);
+    lab.pass_without_daemon(2.0003);
   };
   lab.restart_daemon([&] {
-    lab.pass(3'000'000'000);
+    lab.pass_without_daemon(3);
     reactor();
     reactor();
   });
@@ -308,6 +390,40 @@ TEST(CamacAlone, Bushd1FollowsReactorStartsWithoutTheComputer) {
   for (std::size_t i = 0; i < 2; ++i) {
     lab.expect_run(i * 18, starts_ns[i] + 150'000'000, kShutterCodes);
     lab.expect_run(i * 18 + 9, starts_ns[i] + 600'000'000, kShutterCodes);
+  }
+}
+
+TEST(CamacAlone, TheNextDaemonTellsWhatBecomesOfATravel) {
+  for (const bool synchronous : {false, true}) {
+    SCOPED_TRACE(synchronous);
+    AloneShutter lab;
+    lab.keep_positions();
+    lab.connect();
+    lab.load_codes(kShutterCodes, 12'000);
+    const std::uint32_t mode = kAutomatic | (synchronous ? kSynchronous : 0);
+    lab.permit(mode | kAllOfShutter);
+    if (synchronous) {
+      lab.run_for(0.5);
+    } else {
+      ASSERT_TRUE(lab.run_until([&] { return lab.shutter().steps.size() == 9; }));
+    }
+    lab.restart_daemon();
+    lab.run_for(0.1);
+    EXPECT_EQ(lab.naf(kShutterStation, 2, 0).data, mode | kAllOfShutter);
+    if (synchronous) {
+      lab.run_for(1);
+      lab.shutter().reactor(true);
+      lab.run_for(0.01);
+      lab.shutter().reactor(false);
+    }
+    ASSERT_TRUE(lab.run_until([&] { return (lab.requests() & 2) != 0; })) << "left limit";
+    EXPECT_EQ(lab.requests() & 0x38, 0u) << "no fault";
+    EXPECT_EQ(lab.shutter().steps.size(), 18u);
+    EXPECT_EQ(lab.motor("m03").moving, synchronous);
+    lab.naf(kShutterStation, 0, 24);
+    ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }));
+    EXPECT_EQ(lab.requests() & 0x38, 0u) << "F24 raises no request";
+    EXPECT_EQ(lab.motor("m03").position_steps, 0);
   }
 }
 

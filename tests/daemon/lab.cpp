@@ -178,6 +178,11 @@ void Lab::restart_daemon(const std::function<void()>& meanwhile) {
   start_daemon();
 }
 
+void Lab::pass_without_daemon(double seconds) {
+  now_ns_ += static_cast<std::int64_t>(seconds * 1e9);
+  run_buses();
+}
+
 void Lab::keep_positions() {
   state_disk_ = std::make_unique<sim::SimDisk>(1);
   restart_daemon();
@@ -349,7 +354,7 @@ void Lab::run_buses() {
       buses_[b].bus->advance_to(now_ns_);
     }
     if (buses_[b].drive) buses_[b].drive->advance_to(now_ns_);
-    if (buses_[b].received.empty()) continue;
+    if (!core_ || buses_[b].received.empty()) continue;
     const std::vector<std::uint8_t> bytes = std::exchange(buses_[b].received, {});
     core().receive(now_us(), BusId{b}, bytes);
   }

@@ -134,6 +134,8 @@ class Lab : public daemon::Outputs, private state::Backend {
   void pause_daemon(double seconds);
   // The daemon is gone, and a new one starts on the same buses. `meanwhile`: no daemon runs.
   void restart_daemon(const std::function<void()>& meanwhile = {});
+  // In `meanwhile`: so much time passes.
+  void pass_without_daemon(double seconds);
   // From now on positions are kept, on a disk of the simulation: the daemon is started again.
   void keep_positions();
   sim::SimDisk& disk() { return *state_disk_; }

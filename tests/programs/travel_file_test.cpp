@@ -77,6 +77,23 @@ TEST_F(TravelFiles, CodesAreMadeAsTheyAreWritten) {
   EXPECT_EQ(told->ticks, 24u + 2 * 20 + 1);
 }
 
+TEST_F(TravelFiles, CodesOfATableHaveItsRule) {
+  const auto told = [this](const char* steps) {
+    const auto program =
+        parse(std::string(
+                  "motors = [\"x\"]\ncodes = { time_unit_ns = 40000, accel = [250, 200, 150, 110], "
+                  "cruise = 100, decel = [160, 240] }\n[[frame]]\nline_by = [[") +
+              steps + "]]\n");
+    EXPECT_TRUE(program) << program.error().text();
+    const auto one = std::span(motors_).first(1);
+    const auto bytes = programs::compile(*program, mcu_, one);
+    return programs::rehearse(*program, mcu_, one, *bytes)->ticks;
+  };
+  // 250 + 200 + 240 and 250 + 200 + 150 + 110 + 3 x 100 + 160 + 240 units of 40 us.
+  EXPECT_EQ(told("3"), 11u);
+  EXPECT_EQ(told("9"), 23u);
+}
+
 TEST_F(TravelFiles, AreRefusedWithPlaceAndRemedy) {
   const std::string one = "motors = [\"x\"]\n";
   const std::string two = "motors = [\"x\", \"theta\"]\n";
@@ -95,11 +112,9 @@ TEST_F(TravelFiles, AreRefusedWithPlaceAndRemedy) {
       {with("{ time_unit_ns = 0, accel = [3, 1], decel = [1] }"), "time_unit_ns"},
       {with("{ time_unit_ns = 1000, accel = [3, 4] }"), "decel"},
       {with("{ time_unit_ns = 1000, accel = [3, 4], decel = [4], last = 1 }"), "last"},
-      {with("{ time_unit_ns = 1000, accel = [4, 3], decel = [3, 4] }"),
-       "give the motor this table"},
       {one + kCodes + "[[frame]]\nline_by = [[3]]\n", "3 steps, but `codes` has 4 delays"},
       {one + kCodes + "[[frame]]\ntravel_by = [3]\n", "3 steps, but `codes` has 4 delays"},
-      {one + kCodes + "[[frame]]\nline_by = [[4]]\nspeed = 4\n", "no `speed` beside them"},
+      {one + kCodes + "[[frame]]\nline_by = [[4]]\nspeed = 4\n", "no `speed` beside `codes`"},
   };
   Law law;
   law.accel = {300, 100, 200};

@@ -83,6 +83,14 @@ void Bushd1::start_travel(bool left) {
       Motion{.automatic = true, .left = left, .synchronous = travel.synchronous, .steps = steps};
 }
 
+void Bushd1::goes_on(std::uint8_t control, int steps) {
+  load_control(control);
+  motion_ = Motion{.automatic = true,
+                   .left = is_enabled(kDirection),
+                   .synchronous = is_enabled(kSecondMode),
+                   .steps = steps};
+}
+
 void Bushd1::stop() {
   if (!motion_ || motion_->stopping) return;
   motion_->stopping = true;

@@ -54,6 +54,10 @@ class Bushd1 final : public MotionModule {
   void stands();
 
   bool is_moving() const { return motion_.has_value(); }
+  // A travel of so many steps that was begun with this control register goes on, in its first run
+  // as far as this module, which has lost its registers since, is told. Precondition: none is made.
+  void goes_on(std::uint8_t control, int steps);
+  bool goes_left() const { return motion_ && motion_->left; }
 
  private:
   // From F26A0 until the motor stands; between two travels as well.

@@ -86,6 +86,13 @@ void Bushd2::start() {
   }
 }
 
+void Bushd2::goes_on(std::uint8_t control, std::uint32_t steps, std::uint32_t answered) {
+  load_control(control);
+  Exchange exchange{.program = program(), .answered = answered};
+  exchange.program.steps = steps;
+  exchange_ = std::move(exchange);
+}
+
 void Bushd2::stop() {
   if (!exchange_ || exchange_->stopping) return;
   exchange_->stopping = true;

@@ -46,6 +46,10 @@ class Bushd2 final : public MotionModule {
   void ends(const MotorStatus& status, std::uint32_t unanswered = 0);
 
   bool is_moving() const { return exchange_.has_value(); }
+  // A motion of so many steps that was begun with this control register goes on: this module has
+  // been told of the first `answered` ones, and lost its registers since. Precondition: none moves.
+  void goes_on(std::uint8_t control, std::uint32_t steps, std::uint32_t answered);
+  const Program& moving_program() const { return exchange_->program; }  // precondition: one moves
 
  private:
   // With the commutator, from F26A0 until the motor stands.

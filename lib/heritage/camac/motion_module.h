@@ -30,6 +30,7 @@ class MotionModule : public Module {
   // What is kept over power cuts: Z leaves it as it is, too.
   std::span<const std::uint8_t> memory() const { return memory_.bytes(); }
   void load_memory(std::span<const std::uint8_t> bytes) { memory_.load(bytes); }
+  std::uint8_t control() const { return control_; }
 
  protected:
   explicit MotionModule(std::size_t memory_bytes) : memory_(memory_bytes) {}
@@ -37,7 +38,7 @@ class MotionModule : public Module {
   // Bits are numbered from 1, as in the report.
   static constexpr std::uint32_t bit(int number) { return 1U << (number - 1); }
   bool is_enabled(int control_bit) const { return (control_ & bit(control_bit)) != 0; }
-  std::uint8_t control() const { return control_; }
+  void load_control(std::uint8_t bits) { control_ = bits; }
   const CountingMemory& programs() const { return memory_; }
   CountingMemory& programs() { return memory_; }
 

@@ -344,7 +344,7 @@ TEST(Bushd1, ErrorsOfATravelStopIt) {  // S15, S17, U15
 
 TEST(Bushd1, ErrorsAreToldWhateverIsEnabled) {  // S17, U3
   Bushd1Bench bench;
-  bench.load({1, 2, 1});
+  bench.write_at(0, {127});
   bench.set_control(kAutomatic);
   bench.permit();
   EXPECT_FALSE(bench.lam());
