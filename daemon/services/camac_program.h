@@ -63,7 +63,7 @@ class CamacProgram {
   bool runs() const { return stage_ != Stage::kGetsPut; }
   // One that is found can be stopped once its MCU is heard.
   bool is_found() const { return stage_ == Stage::kFound; }
-  // Of the program that runs.
+  // Those of the program that runs.
   std::optional<std::uint32_t> checksum() const;
 
  private:

@@ -241,7 +241,7 @@ std::optional<KeptMotion> CamacShutter::to_keep(const camac::Bushd1& module) con
                     .checksum = *checksum};
 }
 
-// Of its first run.
+// Where its first run has begun.
 std::int64_t CamacShutter::travel_from(const Motion& motion) {
   if (!motion.returns) return motion.from_steps;
   const auto steps = static_cast<std::int64_t>(motion.travel.codes.size());

@@ -101,8 +101,8 @@ Result<void> read_written(const TomlReader& toml, Program& program) {
   if (program.motors.size() != 1) {
     return fail(toml.error("", "for several motors; allowed: in programs of one motor"));
   }
-  words::TableContent content{.name = "codes of " + program.motors.front()};
-  const auto unit = toml.integer("time_unit_ns", 1, words::TableContent::kMaxTimeUnitNs, "ns");
+  tables::TableContent content{.name = "codes of " + program.motors.front()};
+  const auto unit = toml.integer("time_unit_ns", 1, tables::TableContent::kMaxTimeUnitNs, "ns");
   if (!unit) return fail(unit.error());
   content.time_unit_ns = static_cast<std::uint32_t>(*unit);
   auto accel = read_codes(toml, "accel");

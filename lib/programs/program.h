@@ -43,7 +43,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "words/table_content.h"
+#include "tables/table.h"
 
 namespace bushd::programs {
 
@@ -63,7 +63,7 @@ struct Line {
   bool elementary = false;  // by engine/elementary.h
   std::optional<double> feed = {};
 };
-// Of one motor.
+// For one motor.
 struct Travel {
   Point by;
   bool at_edges = false;
@@ -105,7 +105,7 @@ struct Program {
   std::vector<Range> range = {};  // with at_power_on: of each motor
   bool steps = false;             // positions are steps, not user units
   // In place of tables, for lines and travels of its only motor; in any order.
-  std::optional<words::TableContent> codes{};
+  std::optional<tables::TableContent> codes{};
   std::vector<Frame> frames;
 };
 
