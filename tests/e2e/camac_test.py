@@ -1,6 +1,9 @@
 """CAMAC cycles by bushctl, over both transports, down to the steps of a motor."""
 
 import json
+import random
+import signal
+import time
 import unittest
 
 import bushd
@@ -15,6 +18,8 @@ type = "bushd-2"
 f_start_hz = 100
 motors = ["a0", "b0"]
 """
+STEPS = 601
+SLOT_NS = 20_000
 
 
 class Camac(EndToEndTest):
@@ -46,6 +51,39 @@ class Camac(EndToEndTest):
             self.cycle(5, 0, 10, *more)
         self.assertEqual(self.bushd.end(), 0)
         self.assert_one_result_each()
+
+    def test_a_program_goes_on_without_the_computer(self):
+        """The daemon is killed behind F26. Where each step belongs follows from the codes alone, which rise and fall."""
+        self.write_config(state=self.file("state"))
+        text = self.file("bushd.toml").read_text().replace("[[mcu]]", "[[mcu]]\nprograms_without_host = true")
+        self.file("bushd.toml").write_text(text + CRATE + "without_computer = true\n")
+        self.bushsim = self.start_bushsim()
+        self.bushd = self.start_bushd()
+        self.wait_until_ready()
+        self.survey()
+        chance = random.Random(1985)
+        codes = [chance.randrange(25, 225) for _ in range(238)]
+        with bushd.connect() as client:
+            client.camac([(5, 1, 16, 0)])
+            client.camac([(5, 0, 16, byte) for byte in [STEPS % 256, STEPS // 256, *codes]], mode="q-stop")
+        self.cycle(5, 2, 16, 0x60)
+        began = self.command("camac", 5, 0, 26)
+        self.wait_until("a0 to move", lambda: self.motors()["a0"]["position_steps"] > 20)
+        self.assertEqual(self.bushd.end(signal.SIGKILL), -signal.SIGKILL, began.stdout)
+        delays_ns = [40_000 * codes[min(step, STEPS - 1 - step, 237)] for step in range(STEPS)]
+        time.sleep(sum(delays_ns) / 1e9 + 0.5)
+        self.bushd = self.start_bushd("again.jsonl")
+        self.wait_until("LAM", lambda: self.bushctl("camac", 5, 0, 8, "--json").returncode == 0 and self.cycle(5, 0, 8)["q"])
+        self.assertEqual(self.motors()["a0"]["position_steps"], STEPS)
+        self.assertEqual(self.cycle(5, 3, 0)["data"], 0x10 | STEPS % 4 << 8)
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        made_ns = [edge.time_ns for edge in self.traced()["a0"]]
+        self.assertEqual(len(made_ns), STEPS)
+        due_ns = made_ns[0]
+        for step in range(1, STEPS):
+            due_ns += delays_ns[step]
+            self.assertAlmostEqual(made_ns[step], due_ns, delta=SLOT_NS, msg=f"step {step}")
 
     def test_a_program_in_c_does_too(self):
         self.run_on_crate("ESONE_PROGRAM", "205")

@@ -92,7 +92,9 @@ void Witness::module_moves(TimeNs now_ns, Motor& motor, const Crates::Accepted& 
     const auto& module = config_.crates.front().modules.front();
     const bushd::config::Bus& bus = config_.buses.front();
     const auto table = bushd::daemon::table_of_program(program_->program, module.f_start_hz, "");
-    if (!table) return violated(now_ns, motor.name + " moves by codes that rise");
+    if (!table || !bushd::daemon::falls_to_the_middle(program_->program)) {
+      return violated(now_ns, motor.name + " moves by codes that rise");
+    }
     motor.own_ramp_excess = std::max(
         motor.own_ramp_excess, own_ramp_excess((*table)->view(), bus.tick_us * 1000, bus.format));
   }

@@ -24,6 +24,8 @@ constexpr std::uint32_t kFaultStream = 300;  // and one for each kind of fault
 bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t index,
                                    std::int64_t crystal_ppm, bushd::sim::Random& random) {
   bushd::sim::McuOptions options;
+  // The witness has no model of programs of MCUs; so codes that rise and fall are refused.
+  options.disabled_capabilities = BUSHD_CAN_PROGRAM;
   options.address = mcu.address.value;
   options.boot_number = static_cast<std::uint16_t>(1000 * (index + 1));
   options.boot_ns = random.between(0, 3 * kMs);
