@@ -47,6 +47,10 @@ TEST_P(LineTrigger, EveryStepFallsIntoItsSlotCountedFromTheEdge) {
     SCOPED_TRACE(i);
     Arming arming{.number = static_cast<std::uint8_t>(i + 1), .line = line()};
     arming.delay_us = i % 10 == 0 ? 1'650'000 - below(1000) : 50 + below(9000);
+    if (i % 2 == 1) {
+      arming.line.elementary = true;
+      arming.line.longest = 97 + 31 + 1 + 96;
+    }
     if (i % 3 == 1) arming.line.shortest_delay = static_cast<std::uint16_t>(law.cruise + 5);
     ASSERT_EQ(arm(rig, arming), BUSHD_OK);
     EXPECT_EQ(rig.poll().armed, 0b1111);
@@ -64,8 +68,9 @@ TEST_P(LineTrigger, EveryStepFallsIntoItsSlotCountedFromTheEdge) {
     ASSERT_EQ(report.start_tick * kTick + report.start_ns, begin_ns);
     ASSERT_EQ(report.running, 0b1111);
     arming.line.first = report.start_tick;
-    const Reference run = Reference::move(law, 97, arming.line.shortest_delay);
-    const auto end_ns = begin_ns + static_cast<std::int64_t>(run.step(96).end / 256);
+    const Reference run = Reference::move(law, arming.line.longest, arming.line.shortest_delay);
+    const std::size_t last = arming.line.longest - 1;
+    const auto end_ns = begin_ns + static_cast<std::int64_t>(run.step(last).end / 256);
     ASSERT_EQ(report.motor[2].known_until,
               static_cast<std::uint16_t>((end_ns + kTick - 1) / kTick));
     ASSERT_NO_FATAL_FAILURE(expect_slots(rig, run, arming.line, report.start_ns));
