@@ -18,7 +18,7 @@
 // any number of them. Coordinates are numbered as the motors of the MCU are.
 //
 // Between two of its own steps a motor's position rises evenly, as displacements in 1/256 step need
-// it.
+// it. The functions of both laws are in line.c.
 #ifndef BUSHD_ENGINE_ELEMENTARY_H
 #define BUSHD_ENGINE_ELEMENTARY_H
 
