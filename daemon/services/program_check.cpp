@@ -105,10 +105,9 @@ Result<void> find_line_table(const Installation& installation, const Mcu& mcu,
     const bushd_table* table = &installation.table_of(motor)->view();
     if (std::ranges::find(tables, table) == tables.end()) tables.push_back(table);
   }
-  auto made = program.text.codes
-                  ? written_codes(installation, mcu, program)
-                  : tables::any_line_table(tables, "lines of " + program.name,
-                                           most_elementary(program.text));
+  auto made = program.text.codes ? written_codes(installation, mcu, program)
+                                 : tables::any_line_table(tables, "lines of " + program.name,
+                                                          most_elementary(program.text));
   if (!made) return fail(made.error());
   const bushd_table& table = (*made)->view();
   const auto bank = mcu.bank_of(table);

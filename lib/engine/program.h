@@ -30,8 +30,8 @@ enum {
   BUSHD_PROGRAM_WITHOUT_HOST = 1 << 0,
   BUSHD_PROGRAM_KEPT = 1 << 1,  // it outlives resets and power cuts
   // It begins by itself when the power comes. The other two are set then, it has no MOVE_TO,
-  // LINE_TO and TRAVEL, since nobody knows where its motors are, and its parts' ranges count from where each
-  // motor is when it begins, however that was asked for.
+  // LINE_TO and TRAVEL, since nobody knows where its motors are, and its parts' ranges count from
+  // where each motor is when it begins, however that was asked for.
   BUSHD_PROGRAM_AT_POWER_ON = 1 << 2
 };
 

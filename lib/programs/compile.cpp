@@ -186,8 +186,11 @@ class Compiler {
       return fail(mcu_.name +
                   " makes no lines by the elementary law: leave out `law`, or use another MCU");
     }
-    if (program_.codes && (line.speed || line.elementary)) {
-      return fail("there is no `speed` or `law` beside `codes`: write longer delays");
+    if (program_.codes && line.speed) {
+      return fail("there is no `speed` beside `codes`: write longer delays");
+    }
+    if (program_.codes && line.elementary) {
+      return fail("there is no `law` beside `codes`, which have one motor: leave it out");
     }
     if (program_.at_power_on && mcu_.line_bank == BUSHD_SCRATCH_BANK) {
       return fail(mcu_.name +

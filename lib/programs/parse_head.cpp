@@ -126,8 +126,8 @@ Result<void> read_written(const TomlReader& toml, Program& program) {
 }  // namespace
 
 Result<void> read_head(const TomlReader& toml, Program& program) {
-  if (auto only = toml.only({"motors", "without_host", "kept", "at_power_on", "range", "unit", "codes",
-                             "frame"});
+  if (auto only = toml.only(
+          {"motors", "without_host", "kept", "at_power_on", "range", "unit", "codes", "frame"});
       !only) {
     return fail(only.error());
   }
@@ -167,8 +167,9 @@ Result<void> check_power_on(const TomlReader& toml, const Program& program) {
     const auto* const move = std::get_if<Move>(&frame.what);
     const auto* const line = std::get_if<Line>(&frame.what);
     if (std::holds_alternative<Travel>(frame.what)) {
-      return fail(frame.place + ": a travel, in a program with at_power_on: nobody knows then "
-                                "between which switches its motor is; allowed: move_by and line_by");
+      return fail(frame.place +
+                  ": a travel, in a program with at_power_on: nobody knows then "
+                  "between which switches its motor is; allowed: move_by and line_by");
     }
     if ((move == nullptr || move->relative) && (line == nullptr || line->relative)) continue;
     return fail(frame.place +

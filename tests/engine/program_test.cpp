@@ -100,7 +100,9 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
   };
   ASSERT_EQ(check(program({0})), BUSHD_OK);
   EXPECT_EQ(check(head(0, 2)), BUSHD_E_VERSION);
-  EXPECT_EQ(check(head(1, 2)), BUSHD_E_FORMAT) << "an unknown flag";
+  for (const int flags : {4, 5, 6, 8, 16, 0x80}) {
+    EXPECT_EQ(check(head(1, static_cast<std::uint8_t>(flags))), BUSHD_E_FORMAT) << flags;
+  }
   EXPECT_EQ(check(head(4, 8)), BUSHD_E_FORMAT) << "the volatile bank";
   EXPECT_EQ(check(head(12, 0x80)), BUSHD_E_FORMAT) << "no place to be in";
   EXPECT_EQ(check(program({0}), 1), BUSHD_E_FORMAT) << "the MCU has one motor";

@@ -65,7 +65,7 @@ void CoreRig::boot() {
                              .in_pieces = configuration_.in_pieces,
                              .keypad = true,
                              .keeps_programs = true,
-                             .no_slow_runs = false,  // below
+                             .no_slow_runs = false,   // below
                              .no_elementary = false,  // below
                              .queue = queue_.data(),
                              .queue_ticks = configuration_.queue_ticks,

@@ -89,19 +89,20 @@ TEST(ProgramsPage, ItsExamplesArePrograms) {
 }
 
 TEST(ProgramsPage, TheKeysBesideAnotherAreTakenWithItAlone) {
-  const std::map<std::string, std::string> written{
-      {"move_to", "[1, 2]"},   {"move_by", "{ phi = 1 }"},
-      {"line_to", "[[1, 2]]"}, {"line_by", "\"p.csv\""},
-      {"wait_s", "1"},         {"wait_input", "\"trigger\""},
-      {"travel_by", "{ phi = 60 }"}, {"pulse_us", "5"},       {"repeat", "2"},
-      {"next", "true"}};
-  const std::map<std::string, std::string> beside{{"speed", "2.5"},
-                                                  {"law", "\"elementary\""},
-                                                  {"feed", "2\nlaw = \"elementary\""},
-                                                  {"active", "false"},
-                                                  {"longest_s", "9"},
-                                                  {"after_edge_s", "0.1"},
-                                                  {"return_s", "0.1"}};
+  const std::map<std::string, std::string> written{{"move_to", "[1, 2]"},
+                                                   {"move_by", "{ phi = 1 }"},
+                                                   {"line_to", "[[1, 2]]"},
+                                                   {"line_by", "\"p.csv\""},
+                                                   {"wait_s", "1"},
+                                                   {"wait_input", "\"trigger\""},
+                                                   {"travel_by", "{ phi = 60 }"},
+                                                   {"pulse_us", "5"},
+                                                   {"repeat", "2"},
+                                                   {"next", "true"}};
+  const std::map<std::string, std::string> beside{
+      {"speed", "2.5"},    {"law", "\"elementary\""}, {"feed", "2\nlaw = \"elementary\""},
+      {"active", "false"}, {"longest_s", "9"},        {"after_edge_s", "0.1"},
+      {"return_s", "0.1"}};
   const Rows told = rows_under(kBesideRow);
   for (const auto& [key, value] : beside) EXPECT_EQ(told.count(key), 1u) << key;
   EXPECT_EQ(told.size(), beside.size());
