@@ -167,6 +167,7 @@ Result<void> Programs::may_be_put(const CheckedProgram& program) const {
                 (its.upload ? "program " + its.upload->program.name : "a program") +
                 "; wait for its end");
   }
+  if (its.erase) return fail("MCU " + mcu.name() + " erases its program; wait for its end");
   for (const McuId other : installation_.mcus()) {
     if (other == mcu.id || !has_or_gets(other, program.name)) continue;
     return fail("MCU " + installation_[other].name() + " has a program of that name; erase it, " +
@@ -207,8 +208,14 @@ void Programs::request(const api::Asker& asker, const api::PutProgram& request) 
   if (program->line_table && !program->line_table_is_there) {
     mcu.offers.uploads->upload(mcu.on_bus(), program->line_table->view());
   }
-  mcus_[id].upload = Upload{.program = std::move(*program), .source = request, .asker = asker};
+  const bool kept = program->text.kept || is_kept(id);
+  mcus_[id].upload =
+      Upload{.program = std::move(*program), .source = request, .asker = asker, .kept = kept};
   installation_.changed = true;
+}
+
+bool Programs::is_kept(McuId id) const {
+  return view(id).known && (view(id).state.flags & BUSHD_PROGRAM_KEPT) != 0;
 }
 
 // Until a reset would leave what is there now; for a while only, since motors may move for hours.
@@ -246,7 +253,7 @@ void Programs::follow_upload(std::int64_t now_us, McuId id) {
   if (its.state.stage != BUSHD_PROGRAM_LOADED || its.state.crc != upload.program.crc) {
     return end_upload(id, fail("MCU " + mcu.name() + " has another program: somebody else put it"));
   }
-  if (upload.program.text.kept && waits_until_stored(now_us, id, upload.stored_by_us)) return;
+  if (upload.kept && waits_until_stored(now_us, id, upload.stored_by_us)) return;
   end_upload(id, {});
 }
 
@@ -278,14 +285,17 @@ void Programs::request(const api::Asker& asker, const api::EraseProgram& request
     return asker.answer(
         api::Refused{"it is under way; run " + words::remedy("stop", stopped_by(*id)) + " first"});
   }
+  if (mcus_[*id].upload || mcus_[*id].erase) {
+    return asker.answer(
+        api::Refused{"MCU " + mcu.name() + " gets or erases a program; wait for its end"});
+  }
   if (const auto online = mcu.must_be_online(); !online) {
     return asker.answer(api::Refused{online.error().text()});
   }
   asker.answer(api::Accepted{});
   mcus_[*id].program.reset();
   keep(*id, nullptr);
-  const bool kept = (view(*id).state.flags & BUSHD_PROGRAM_KEPT) != 0;
-  mcus_[*id].erase = Erase{.asker = asker, .kept = kept};
+  mcus_[*id].erase = Erase{.asker = asker, .kept = is_kept(*id)};
   mcu.offers.programs->erase_program(mcu.on_bus());
 }
 

@@ -74,8 +74,9 @@ class Programs final : public Service {
     CheckedProgram program;
     api::PutProgram source;
     api::Asker asker;
-    bool began = false;                          // its bytes are being sent; else its line table
-    std::optional<std::int64_t> stored_by_us{};  // that it has, and is to outlive power cuts
+    bool began = false;  // its bytes are being sent; else its line table
+    bool kept = false;   // it is to outlive power cuts, or the one before was
+    std::optional<std::int64_t> stored_by_us{};  // the MCU has it
   };
   struct Erase {
     api::Asker asker;
@@ -138,6 +139,7 @@ class Programs final : public Service {
   void follow(McuId mcu);
   void follow_end(McuId mcu);
   void follow_erase(std::int64_t now_us, McuId mcu);
+  bool is_kept(McuId mcu) const;  // the program that it has now
   bool waits_until_stored(std::int64_t now_us, McuId mcu, std::optional<std::int64_t>& by_us) const;
   void give_up(const Start& start, api::Outcome outcome, const std::string& reason);
   void give_up_start_of(McuId mcu, api::Outcome outcome, const std::string& reason);

@@ -35,7 +35,10 @@ Result<void> Programs::may_run(McuId id) const {
   if (mcus_[id].run || view(id).under_way()) {
     return fail("the program of MCU " + mcu.name() + " is under way already");
   }
-  if (mcus_[id].upload || !is_loaded(id)) {
+  if (mcus_[id].upload || mcus_[id].erase) {
+    return fail("MCU " + mcu.name() + " gets or erases its program; wait for its end");
+  }
+  if (!is_loaded(id)) {
     return fail("MCU " + mcu.name() + " does not have it any more; put it again");
   }
   const auto now = check_program(installation_, program.name, program.text);

@@ -66,6 +66,39 @@ TEST(ProgramsKept, PutAndEraseSayThatItIsNotKeptYet) {
   EXPECT_FALSE(lab.has_result(move)) << "longer than both";
 }
 
+// Else the one before would be back after a power cut, and begin.
+TEST(ProgramsKept, OneInItsPlaceAnswersWhenThatIsStored) {
+  KeptLab lab;
+  ASSERT_EQ(lab.put("a", "\"m01\"", kThere, kAtPowerOn).result, "done");
+  const std::int64_t before = lab.now_us();
+  const Answer put = lab.put("b", "\"m01\"", kThere);
+  ASSERT_EQ(put.result, "done") << put.reason;
+  EXPECT_FALSE(put.programs.at(0).kept);
+  EXPECT_GT(lab.now_us() - before, 512 * 2560);
+  lab.cut_power();
+  ASSERT_TRUE(lab.is_back());
+  EXPECT_EQ(lab.entry().stage, "none");
+  lab.run_for(3);
+  EXPECT_TRUE(lab.steps.none());
+}
+
+TEST(ProgramsKept, WhatIsBeingWrittenWaitsForNobodyElse) {
+  KeptLab lab;
+  const std::int64_t put = lab.send(ProgramLab::put_of("a", "\"m01\"", kThere, "kept = true\n"));
+  ASSERT_TRUE(lab.run_until([&] { return lab.entry().stage == "loaded"; }));
+  ASSERT_FALSE(lab.has_result(put));
+  const std::string checksum = lab.entry().checksum;
+  EXPECT_THAT(lab.wait(lab.send(api::EraseProgram{checksum})).reason,
+              HasSubstr("gets or erases a program; wait for its end"));
+  EXPECT_EQ(lab.wait(put).result, "done");
+  const std::int64_t erase = lab.send(api::EraseProgram{"a"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.entry().stage == "none"; }));
+  ASSERT_FALSE(lab.has_result(erase));
+  EXPECT_THAT(lab.put("b", "\"m01\"", kThere).reason, HasSubstr("erases its program"));
+  EXPECT_EQ(lab.wait(erase).result, "done");
+  EXPECT_EQ(lab.put("b", "\"m01\"", kThere).result, "done");
+}
+
 TEST(ProgramsKept, OneThatBeginsAtPowerOnIsFollowed) {
   KeptLab lab;
   const char* const endless =

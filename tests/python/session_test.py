@@ -155,6 +155,19 @@ class OverASocket(unittest.TestCase):
         self.assertEqual(str(other.error), "closed; it may have carried the command out")
         self.assertIsInstance(self.daemon.begin().error, NoDaemon)
 
+    def test_what_cannot_be_read_ends_the_link(self):
+        for channel in ("PROGRAM_REPLY", "STATE", "REPLY"):
+            with self.subTest(channel):
+                daemon = Daemon(loses=False)
+                exchange = daemon.begin()
+                daemon.tell("REPLY", answer(daemon.request(), ACCEPTED))
+                daemon.tell("SOMETHING", b"of a later version")
+                self.assertFalse(exchange.over)
+                daemon.tell(channel, b"of another version")
+                self.assertIsInstance(exchange.error, ResultUnknown)
+                self.assertIn(f"the daemon's {channel} cannot be read", str(exchange.error))
+                self.assertIsInstance(daemon.begin().error, NoDaemon)
+
     def test_several_requests_are_told_apart(self):
         exchanges = [self.daemon.begin() for _ in range(5)]
         asked = [message.request for _, message in self.daemon.sent]

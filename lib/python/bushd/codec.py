@@ -128,6 +128,11 @@ def encode(message: Any) -> bytes:
     return payload
 
 
+def is_known(channel: str) -> bool:
+    """Whether the daemon has messages of this channel for clients. `channel` without a prefix."""
+    return channel in _DECODERS
+
+
 def decode(channel: str, payload: bytes) -> Message | None:
     """`channel` without a prefix."""
     known = _DECODERS.get(channel)

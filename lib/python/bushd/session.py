@@ -214,12 +214,13 @@ class Session:
     # -- what has come
 
     def receive(self, channel: str, payload: bytes, now: float) -> None:
-        """`channel` without the prefix. Whatever it is: what is no message of the daemon to this client is dropped."""
+        """`channel` without the prefix. Whatever it is: what is no message of the daemon to this client is dropped. Over a link
+        where nobody else sends, one that cannot be read ends it."""
         collectors = self._collectors
         if channel == "STATE" and not self._queries:
             unread = codec.unread(payload)
             if unread is None:
-                return
+                return self._cannot_read(channel)
             collectors = [collector for collector in collectors if not collector.put_off(unread)]
             if not collectors:
                 return self._on_state(unread.run, now)
@@ -232,6 +233,13 @@ class Session:
             self._on_welcome(message, now)
         elif isinstance(message, codec.Part):
             self._on_snapshot(message, collectors, now)
+        else:
+            self._cannot_read(channel)
+
+    def _cannot_read(self, channel: str) -> None:
+        """Where nobody but the daemon can have sent it, to wait for what else it says would be for ever."""
+        if not self.loses and codec.is_known(channel):
+            self.link_ended(f"the daemon's {channel} cannot be read: it is of another version than this client; install the same of both")
 
     def link_ended(self, why: str) -> None:
         """No message comes any more. What has come before counts."""
