@@ -154,6 +154,16 @@ std::vector<McuId> Installation::mcus_of(const std::vector<MotorId>& motors) con
   return {mcus.begin(), mcus.end()};
 }
 
+std::vector<MotorId> Installation::to_be_homed(const Mcu& mcu) const {
+  std::vector<MotorId> motors;
+  if (!mcu.config.ready_after_homing || !mcu.online()) return motors;
+  for (const MotorId motor : mcu.motors()) {
+    const bool homed = (mcu.report().homed >> motors_[motor].output().value & 1) != 0;
+    if (config_[motor].home && !homed) motors.push_back(motor);
+  }
+  return motors;
+}
+
 std::vector<MotorId> Installation::with_lines(std::vector<MotorId> motors) const {
   std::set<std::uint64_t> lines;
   for (const MotorId id : motors) {

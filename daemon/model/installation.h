@@ -198,6 +198,9 @@ class Installation {
   std::vector<McuId> mcus_of(const std::vector<MotorId>& motors) const;  // each once, in order
   // With those that move on a line with one of them.
   std::vector<MotorId> with_lines(std::vector<MotorId> motors) const;
+  // What an MCU with `ready = "after-homing"` waits for: its motors with a home that it has not
+  // homed since it booted.
+  std::vector<MotorId> to_be_homed(const Mcu& mcu) const;
   bool any_moves(const Mcu& mcu) const;  // or is not at rest
   bool rests(const Mcu& mcu) const;      // all of it, as planned and as reported
   // The MCU gets such a move as a whole and runs it by the motor's table.

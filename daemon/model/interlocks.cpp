@@ -14,6 +14,16 @@ Result<void> Interlocks::may_move() const {
 }
 
 Result<void> Interlocks::may_move(MotorId motor) const {
+  if (auto may = may_home(motor); !may) return may;
+  const Mcu& mcu = installation_.mcu_of(motor);
+  const std::vector<MotorId> left = installation_.to_be_homed(mcu);
+  if (left.empty()) return {};
+  const std::string& name = installation_[left.front()].name();
+  return fail("MCU " + mcu.name() + " is not ready before " + name +
+              " has been homed; wait for that, or run " + words::remedy("home", name));
+}
+
+Result<void> Interlocks::may_home(MotorId motor) const {
   if (auto may = may_move(); !may) return may;
   if (auto may = installation_[motor].reach().may_be_used(); !may) return may;
   const Mcu& mcu = installation_.mcu_of(motor);

@@ -384,7 +384,8 @@ void HomingQueue::goes_online(Mcu& mcu) {
     const auto& home = installation_.config()[id].home;
     const motion::Motor& motor = installation_[id];
     const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
-    if (!home || !home->at_start || (homed && !motor.trust().uncertain_reason())) continue;
+    const bool at_start = home && (home->at_start || mcu.config.ready_after_homing);
+    if (!at_start || (homed && !motor.trust().uncertain_reason())) continue;
     const auto shortest_delay = shortest_delay_of(id, {});
     auto may = shortest_delay ? may_home(id) : fail(shortest_delay.error());
     if (may) may = may_home_by(id, *shortest_delay);

@@ -50,7 +50,7 @@ Result<void> HomingQueue::may_home(MotorId id) const {
     return fail("no home switch configured: add 'home = {...}' to motor \"" +
                 installation_[id].name() + "\"");
   }
-  if (auto may = interlocks_.may_move(id); !may) return may;
+  if (auto may = interlocks_.may_home(id); !may) return may;
   if (installation_[id].has_plan()) {
     return fail("it moves; run " + words::remedy("stop", installation_[id].name()) + " first");
   }

@@ -186,6 +186,13 @@ api::StateSnapshot StatePublisher::state_of(const Mcu& mcu) const {
   state.mcu = mcu.name();
   state.state = state_word(view);
   state.detail = detail_of(mcu, bus.two_masters);
+  const bool is_good =
+      state.state == api::McuState::kReady || state.state == api::McuState::kRunning;
+  if (const auto left = installation_.to_be_homed(mcu); is_good && !left.empty()) {
+    state.state = api::McuState::kBusy;
+    state.detail = "not homed yet:";
+    for (const MotorId motor : left) state.detail += " " + installation_[motor].name();
+  }
   if (view.reported) state.inputs = motion::system_inputs_words(view.report.system_inputs);
   state.program = programs_.text(mcu.id);
   state.boot = view.identified ? view.identity.boot_number : 0;

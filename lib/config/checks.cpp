@@ -127,6 +127,21 @@ Result<void> check_emission(const Loading& loading, std::size_t index) {
   return fail(std::move(error));
 }
 
+// Else it would be ready at once after all.
+Result<void> check_ready(const Config& config, McuId id) {
+  const Mcu& mcu = config.mcus[id.value];
+  if (!mcu.ready_after_homing) return {};
+  const bool homes = std::ranges::any_of(
+      config.motors, [&](const Motor& motor) { return motor.mcu == id && motor.home.has_value(); });
+  if (homes) return {};
+  Error error = mcu.places.at("ready");
+  error.message = fmt::format(
+      "is \"after-homing\", but no motor of MCU \"{}\" has a home; give one home = {{...}}, or "
+      "leave `ready` out",
+      mcu.id);
+  return fail(std::move(error));
+}
+
 // Its local inputs move nothing while the drivers are disabled, and cannot enable them.
 Result<void> check_idle(const Loading& loading, std::size_t index) {
   const Motor& motor = loading.config.motors[index];
@@ -261,6 +276,7 @@ Result<void> check_together(const Loading& loading) {
   }
   for (std::size_t i = 0; i < loading.config.mcus.size(); ++i) {
     if (auto checked = check_emission(loading, i); !checked) return checked;
+    if (auto checked = check_ready(loading.config, {i}); !checked) return checked;
   }
   for (std::size_t i = 0; i < loading.config.motors.size(); ++i) {
     if (auto checked = check_speed(loading, i); !checked) return checked;

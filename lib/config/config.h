@@ -118,8 +118,9 @@ struct Mcu {
   std::uint32_t keypad_ms = 500;       // that a key of its keypad counts; 0: until the next one
   bool programs_without_host = false;  // its programs may go on when no host is heard
   bool programs_at_power_on = false;   // and begin by themselves when the power comes
+  bool ready_after_homing = false;     // not before its motors with `home` have been homed
   bool stand_in = false;               // for a bus that has no MCUs
-  KeyPlaces places{};                  // of `address`
+  KeyPlaces places{};                  // of `address`, `ready`
 };
 
 struct Group {

@@ -53,6 +53,11 @@ Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
     if (!when) return fail(when.error());
     mcu->enable_after_reset = static_cast<EnableAfterReset>(*when);
   }
+  if (reader.has("ready")) {
+    const auto when = read_word(reader, "ready", {"at-once", "after-homing"});
+    if (!when) return fail(when.error());
+    mcu->ready_after_homing = *when != 0;
+  }
   return {};
 }
 

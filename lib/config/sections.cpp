@@ -210,6 +210,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
                                   "debounce_ticks",
                                   "overcurrent",
                                   "enable_after_reset",
+                                  "ready",
                                   "idle_disable_s",
                                   "enable_settle_ms",
                                   "keypad_ms",
@@ -235,7 +236,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     Mcu mcu{.bus = *bus,
             .address = {static_cast<std::uint8_t>(*address)},
             .id = fmt::format("{}:{}", config->buses[bus->value].name, *address)};
-    mcu.places = KeyPlaces(reader, {"address"});
+    mcu.places = KeyPlaces(reader, {"address", "ready"});
     auto emission = read_emission(reader);
     if (!emission) return fail(emission.error());
     mcu.emission = std::move(*emission);

@@ -169,6 +169,41 @@ TEST_F(Homing, AtTheStartOfItsMcu) {
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01") + 250);
 }
 
+// From boot on the MCU is ready only when all its motors with a home have been homed.
+TEST_F(Homing, AnMcuIsReadyAfterIt) {
+  std::string toml = with(homes());
+  const std::string mcu = "[[mcu]]\n";
+  toml.insert(toml.find(mcu) + mcu.size(), "ready = \"after-homing\"\n");
+  Lab lab(toml);
+  put_switch(lab, -300);
+  ASSERT_TRUE(lab.run_until([&] {
+    return lab.has_state("hall:1") && lab.state_of("hall:1").detail == "not homed yet: m01";
+  }));
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kBusy);
+  EXPECT_EQ(lab.motor("m01").activity, api::Activity::kHoming) << "nobody has asked for it";
+  for (const std::string motor : {"m01", "m02"}) {
+    EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {motor}, {5})).reason,
+                HasSubstr("is not ready before m01 has been homed"));
+  }
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  lab.run_for(2);
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kBusy) << "it was stopped";
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m02"}, {5})).reason,
+              HasSubstr("'bushctl home m01'"));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "reached");
+  EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady);
+  lab.connect();
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached");
+  // A new daemon finds it homed; after a reset it homes them anew.
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  lab.bus(0).reboot(0, 50'000'000);
+  ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:1").state == api::McuState::kBusy; }));
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 60));
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01") + 250);
+}
+
 TEST_F(Homing, IsLostWithItsMcuAndCountedAllTheSame) {
   Lab lab(with(homes()));
   lab.connect();

@@ -64,6 +64,25 @@ class Moves(EndToEndTest):
     def test_lines_made_by_the_mcus_coarse(self):
         self.check_line_made_by_the_mcus("coarse")
 
+    def test_a_line_by_the_elementary_law(self):
+        """One motor makes one step at a time, in the order that the paper's function has; the trace is judged edge by edge, too."""
+        self.bring_up("fine")
+        self.command("move", "--line", "--law", "elementary", "--wait", "a0", "900", "a2", "-400")
+        refused = self.bushctl("move", "--line", "--law", "elementary", "a0", "10", "b0", "10")
+        self.assertIn("one MCU", refused.stderr)
+        status = self.status()
+        self.assertEqual(self.bushd.end(), 0)
+        self.assertEqual(self.bushsim.end(), 0)
+        edges = self.traced()
+        made = [name for _, name in sorted((edge.time_ns, name) for name in ("a0", "a2") for edge in edges[name])]
+        printed, function = [], 0
+        while printed.count("a0") < 900 or printed.count("a2") < 400:
+            printed.append("a0" if function >= 0 else "a2")
+            function += -400 if function >= 0 else 900
+        self.assertEqual(made, printed)
+        self.assert_one_result_each()
+        self.assert_trace_is_right(status)
+
     def check_new_targets(self, displacement_format, bus_lines=()):
         self.bring_up(displacement_format, bus_lines)
         first = self.start_move("a0", FAR, "b1", -FAR)
