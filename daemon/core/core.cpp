@@ -38,7 +38,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
       while_connected_(installation_, moves_, open_moves_),
       position_compare_(installation_),
       pseudo_axes_(installation_),
-      state_(installation_, pseudo_axes_, open_moves_, programs_, outputs),
+      state_(
+          installation_, pseudo_axes_, open_moves_,
+          [this](McuId mcu) { return programs_.text(mcu); }, outputs),
       line_tables_(installation_, lines_),
       waiting_requests_(
           installation_, interlocks_, open_moves_, kept_, idle_drivers_, line_tables_,

@@ -80,12 +80,11 @@ void show_inputs(const link::McuView& view, const config::MotorInputs& inputs,
 }  // namespace
 
 StatePublisher::StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
-                               const OpenMoves& open_moves, const Programs& programs,
-                               Outputs& outputs)
+                               const OpenMoves& open_moves, ProgramOf program_of, Outputs& outputs)
     : installation_(installation),
       pseudo_axes_(pseudo_axes),
       open_moves_(open_moves),
-      programs_(programs),
+      program_of_(std::move(program_of)),
       outputs_(outputs) {
   for (std::size_t i = 0; i < installation.config().state_parts(); ++i) described_.add();
 }
@@ -194,7 +193,7 @@ api::StateSnapshot StatePublisher::state_of(const Mcu& mcu) const {
     for (const MotorId motor : left) state.detail += " " + installation_[motor].name();
   }
   if (view.reported) state.inputs = motion::system_inputs_words(view.report.system_inputs);
-  state.program = programs_.text(mcu.id);
+  state.program = program_of_(mcu.id);
   state.boot = view.identified ? view.identity.boot_number : 0;
   state.tick = view.tick;
   for (const MotorId motor : mcu.motors()) {

@@ -3,12 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <string>
 
 #include "daemon/model/installation.h"
 #include "daemon/model/outputs.h"
 #include "daemon/services/open_moves.h"
-#include "daemon/services/programs.h"
 #include "daemon/services/pseudo_axes.h"
 
 namespace bushd::daemon {
@@ -22,8 +23,11 @@ class StatePublisher {
   // Passed on to clients every few seconds only (Publishing).
   static constexpr std::int64_t kDescriptionPeriodUs = 500'000;
 
+  // What an MCU has under way, and where, in words; "": nothing.
+  using ProgramOf = std::function<std::string(McuId)>;
+
   StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
-                 const OpenMoves& open_moves, const Programs& programs, Outputs& outputs);
+                 const OpenMoves& open_moves, ProgramOf program_of, Outputs& outputs);
 
   void step(std::int64_t now_us);
   // As it is now, whether due or not.
@@ -44,7 +48,7 @@ class StatePublisher {
   Installation& installation_;
   const PseudoAxes& pseudo_axes_;
   const OpenMoves& open_moves_;
-  const Programs& programs_;
+  ProgramOf program_of_;
   Outputs& outputs_;
   ById<McuId, Described> described_;  // then computed axes
   std::int64_t due_us_ = 0;

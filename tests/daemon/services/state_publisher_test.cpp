@@ -14,7 +14,8 @@ TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   Bench bench;
   const PseudoAxes none(bench.installation);
   const OpenMoves nobody(bench.installation);
-  StatePublisher publisher(bench.installation, none, nobody, bench);
+  StatePublisher publisher(
+      bench.installation, none, nobody, [](McuId) { return "scan runs"; }, bench);
   publisher.step(0);
   EXPECT_EQ(bench.states.size(), 2u) << "one for each MCU";
   EXPECT_EQ(bench.descriptions.size(), 2u);
@@ -33,6 +34,7 @@ TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   EXPECT_EQ(bench.descriptions.size(), 4u);
   EXPECT_EQ(bench.states.back().state, api::McuState::kOffline);
   EXPECT_EQ(bench.states.back().motors.at(0).name, "m03");
+  EXPECT_EQ(bench.states.back().program, "scan runs");
 }
 
 }  // namespace
