@@ -181,10 +181,8 @@ TEST_F(Homing, AnMcuIsReadyAfterIt) {
   }));
   EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kBusy);
   EXPECT_EQ(lab.motor("m01").activity, api::Activity::kHoming) << "nobody has asked for it";
-  for (const std::string motor : {"m01", "m02"}) {
-    EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {motor}, {5})).reason,
-                HasSubstr("is not ready before m01 has been homed"));
-  }
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m02"}, {5})).reason,
+              HasSubstr("is not ready before m01 has been homed"));
   EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
   lab.run_for(2);
   EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kBusy) << "it was stopped";
