@@ -112,7 +112,6 @@ static bool start(bushd_mcu* mcu, const bushd_line_part* part) {
   return true;
 }
 
-// The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
 #if BUSHD_ELEMENTARY
 static void lay_elementary(bushd_mcu* mcu, const bushd_line_part* part) {
   bushd_elementary* line = &mcu->line.elementary;
@@ -126,6 +125,7 @@ static void lay_elementary(bushd_mcu* mcu, const bushd_line_part* part) {
 }
 #endif
 
+// The run, what its motors are told of it, and how many ticks it takes (bushd_mcu_ticks_of_run).
 static bool make(bushd_mcu* mcu, const bushd_line_part* part, uint32_t* ticks, uint32_t* spare_ns) {
   if (!start(mcu, part)) return false;
   if (!bushd_mcu_ticks_of_run(&mcu->line.run, mcu->tick_ns, ticks, spare_ns)) return false;

@@ -232,12 +232,18 @@ static bool is_waiting(const bushd_mcu_program* p) {
          (p->frame.kind == BUSHD_PROGRAM_WAIT || p->frame.kind == BUSHD_PROGRAM_WAIT_INPUT);
 }
 
+// From where it was: not a travel, nor codes that are to be made as they are written.
+static bool can_go_on(const bushd_mcu* mcu, const bushd_program_frame* frame) {
+  if (frame->kind == BUSHD_PROGRAM_TRAVEL) return false;
+  return !bushd_program_is_line(frame->kind) ||
+         !bushd_mcu_is_written(mcu->config.scratch, frame->bank);
+}
+
 static bushd_status pause(bushd_mcu* mcu) {
   bushd_mcu_program* p = mcu->config.program;
   if (p->stage == BUSHD_PROGRAM_PAUSES || p->stage == BUSHD_PROGRAM_PAUSED) return BUSHD_OK;
   if (p->stage != BUSHD_PROGRAM_RUNS) return BUSHD_E_STATE;
-  // A travel cannot go on from where it was.
-  if (p->has_frame && p->frame.kind == BUSHD_PROGRAM_TRAVEL) return BUSHD_E_STATE;
+  if (p->has_frame && !can_go_on(mcu, &p->frame)) return BUSHD_E_STATE;
   if (is_waiting(p)) p->until -= mcu->uptime;
   bushd_mcu_stop_program_motors(mcu, BUSHD_STOP_RAMP, bushd_mcu_first_open(mcu));
   p->stage = BUSHD_PROGRAM_PAUSES;

@@ -288,7 +288,9 @@ bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message) 
 #if BUSHD_PROGRAMS
 bushd_status bushd_mcu_begin_travel(bushd_mcu* mcu, const bushd_travel* message) {
   const bushd_status status = begin_first(mcu, message, mcu->tick + 1u);
-  if (mcu->travel.stage == BUSHD_TRAVEL_DELAY) begin(mcu, BUSHD_TRAVEL_RUN);
+  // Else it may be another motor's, which waits for its own time.
+  const bool waits = mcu->travel.stage == BUSHD_TRAVEL_DELAY;
+  if (status == BUSHD_OK && waits) begin(mcu, BUSHD_TRAVEL_RUN);
   return status;
 }
 

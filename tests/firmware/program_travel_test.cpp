@@ -155,5 +155,36 @@ TEST_P(ProgramTravel, AnMcuThatDoesNotTravelTakesNone) {
   EXPECT_EQ(other.request(BUSHD_MSG_PROGRAM, commit), BUSHD_E_UNKNOWN_MESSAGE);
 }
 
+// It waits for its own delay, whatever a program asks for meanwhile.
+TEST_P(ProgramTravel, AnotherMotorsTravelIsNotBegunByARefusedOne) {
+  constexpr std::uint8_t kOtherTravels = 3;
+  constexpr std::uint16_t kBothBits = kProgrammedBit | 1 << kOtherTravels;
+  ASSERT_EQ(rig.set_inputs({.limit_positive = kBothBits, .limit_negative = kBothBits}), BUSHD_OK);
+  ASSERT_EQ(rig.motor_inputs({kProgrammed, 1, 2, 1}), BUSHD_OK);
+  ASSERT_EQ(rig.motor_inputs({kOtherTravels, 3, 0, 3}), BUSHD_OK);
+  rig.sense = [] { return bushd_inputs{kProgrammedLeft | 1, 0}; };
+  rig.pass(2);
+  const bushd_travel message = {.number = 9,
+                                .kind = BUSHD_TRAVEL_LIMITS,
+                                .motor = kOtherTravels,
+                                .direction = 1,
+                                .edge = BUSHD_EDGE_RISING,
+                                .sensor = 0,
+                                .steps = 50,
+                                .delay_us = 100'000,
+                                .wait_us = 200'000};
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_travel(&message, payload.data()));
+  ASSERT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload), BUSHD_OK);
+  rig.trigger(0);
+  ASSERT_EQ(rig.mcu().travel.stage, BUSHD_TRAVEL_DELAY);
+  ASSERT_EQ(load(alone({travel(), kProgramEnd})), BUSHD_OK);
+  ASSERT_EQ(start(rig.first_open()), BUSHD_OK);
+  pass(10);
+  EXPECT_EQ(state().reason, BUSHD_PROGRAM_REFUSED);
+  EXPECT_EQ(rig.mcu().travel.stage, BUSHD_TRAVEL_DELAY);
+  EXPECT_EQ(rig.pulses(kOtherTravels), 0);
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -222,5 +222,16 @@ TEST_P(WrittenCodes, AreForOneMotorAndItsWholeRun) {
   EXPECT_EQ(rig.upload(kWrittenBank, zero), BUSHD_E_TABLE_ZERO);
 }
 
+// They would begin anew from where they stand, or have too few steps left.
+TEST_P(WrittenCodes, AreNotPaused) {
+  ASSERT_EQ(rig.upload(kWrittenBank, any_codes(7, 20, 10)), BUSHD_OK);
+  ASSERT_EQ(load(line(120)), BUSHD_OK);
+  ASSERT_EQ(start(rig.first_open()), BUSHD_OK);
+  pass(30);
+  EXPECT_EQ(control(BUSHD_PROGRAM_PAUSE), BUSHD_E_STATE);
+  expect_ended(BUSHD_PROGRAM_DONE);
+  EXPECT_EQ(rig.pulses(kWritten), 120);
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -163,7 +163,7 @@ static void give_samples(bushd_virtual* v) {
 
 // What outlives resets: compared a little in every tick, and written at once when it has stayed the
 // same for as long as a real port wants it to.
-static void write_nvm(bushd_virtual* v, uint32_t crc, uint16_t size) {
+static void write_nvm(bushd_virtual* v) {
   size_t at = 0;
   bushd_mcu_nvm_begin_scan(&v->scan);
   for (;;) {
@@ -173,9 +173,8 @@ static void write_nvm(bushd_virtual* v, uint32_t crc, uint16_t size) {
     memcpy(v->config.nvm + at, bytes.at, bytes.size);
     at += bytes.size;
   }
-  assert(v->scan.crc == crc && v->scan.size == size);
-  v->kept.size = size;
-  v->kept.crc = crc;
+  v->kept.size = v->scan.size;
+  v->kept.crc = v->scan.crc;
 }
 
 static void go_on_with_nvm(bushd_virtual* v) {
@@ -186,7 +185,7 @@ static void go_on_with_nvm(bushd_virtual* v) {
   const bool quiet = bushd_mcu_nvm_is_quiet(&v->mcu, &v->scan);
   if (!same && quiet && (v->kept.size != 0 || v->mcu.tables.codes_used != 0)) {
     const bushd_mcu_nvm_scan whole = v->scan;
-    write_nvm(v, whole.crc, whole.size);
+    write_nvm(v);
     v->scan = whole;
   }
   bushd_mcu_nvm_begin_scan(&v->scan);
