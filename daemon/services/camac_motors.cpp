@@ -179,7 +179,7 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   const std::int64_t steps = motion_->program.steps;
   if (motion_->alone) {
     return program_.begin(
-        now_us,
+        now_us, installation_.mcu_of(motion_->motor),
         text_of(motion_->program, motor.name(), config_.without_computer, config_.f_start_hz),
         motion_->after_stops);
   }

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "config/words.h"
 #include "heritage/camac/bushd2.h"
 
 namespace bushd::daemon {
@@ -119,10 +120,14 @@ std::optional<KeptMotion> kept_motion_of(const std::string& text) {
   return motion;
 }
 
-void CamacProgram::begin(std::int64_t now_us, std::string text, std::uint64_t after_stops) {
+void CamacProgram::begin(std::int64_t now_us, const Mcu& mcu, std::string text,
+                         std::uint64_t after_stops) {
+  program_ = name_ + "-" + mcu.name();
+  std::ranges::replace(program_, ':', '-');
+  program_.resize(std::min(program_.size(), config::kLongestName));
   stage_ = Stage::kGetsPut;
   after_stops_ = after_stops;
-  ask_(now_us, asker(), api::PutProgram{.program = name_, .text = std::move(text)});
+  ask_(now_us, asker(), api::PutProgram{.program = program_, .text = std::move(text)});
 }
 
 void CamacProgram::find(McuId mcu, std::uint32_t checksum) {
@@ -132,7 +137,7 @@ void CamacProgram::find(McuId mcu, std::uint32_t checksum) {
 }
 
 std::optional<std::uint32_t> CamacProgram::checksum() const {
-  return stage_ == Stage::kFound ? checksum_ : programs_.checksum_of(name_);
+  return stage_ == Stage::kFound ? checksum_ : programs_.checksum_of(program_);
 }
 
 std::optional<api::Reply> CamacProgram::follow(std::int64_t now_us) {
@@ -149,7 +154,7 @@ std::optional<api::Reply> CamacProgram::follow(std::int64_t now_us) {
   const bool put = completed != nullptr && completed->outcome == api::Outcome::kDone;
   if (stage_ == Stage::kRuns || !put) return session_->last_answer();
   stage_ = Stage::kRuns;
-  ask_(now_us, asker(), api::RunPrograms{{name_}});
+  ask_(now_us, asker(), api::RunPrograms{{program_}});
   return std::nullopt;
 }
 

@@ -55,7 +55,7 @@ class CamacProgram {
         session_(std::move(session)),
         ask_(std::move(ask)) {}
 
-  void begin(std::int64_t now_us, std::string text, std::uint64_t after_stops);
+  void begin(std::int64_t now_us, const Mcu& mcu, std::string text, std::uint64_t after_stops);
   // One with these bytes was run by a daemon before.
   void find(McuId mcu, std::uint32_t checksum);
   // The result of the run; or why there is none, once that is known.
@@ -72,7 +72,8 @@ class CamacProgram {
     return {.session = session_, .number = session_->next_number(), .after_stops = after_stops_};
   }
 
-  const std::string name_;
+  const std::string name_;  // of the module
+  std::string program_{};   // of that and the MCU: an MCU has one program
   const Programs& programs_;
   const std::shared_ptr<CamacSession> session_;
   const AskCore ask_;

@@ -191,7 +191,7 @@ void CamacShutter::follow_table(std::int64_t now_us, camac::Bushd1& module) {
 void CamacShutter::ask_mcu(std::int64_t now_us) {
   motion_->from_steps = installation_[motor_].position_steps();
   if (motion_->alone) {
-    return program_.begin(now_us,
+    return program_.begin(now_us, installation_.mcu_of(motor_),
                           text_of(motion_->travel, installation_[motor_].name(), without_computer_),
                           motion_->after_stops);
   }

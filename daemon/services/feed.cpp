@@ -38,8 +38,7 @@ Result<Feed> Feed::make(const Installation& installation, const std::vector<Moto
     if (law == motion::Way::Law::kElementary && scale.steps_per_unit != first.steps_per_unit) {
       return fail(
           fmt::format("{} has {} steps per {} and {} has {}: by the elementary law a feed is h f, "
-                      "with one step "
-                      "h for all; give a feed in steps, or ask for the leading law",
+                      "with one step h for all; give a feed in steps, or ask for the leading law",
                       name, to_text(first.steps_per_unit), first.unit, installation[motor].name(),
                       to_text(scale.steps_per_unit)));
     }

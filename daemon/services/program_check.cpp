@@ -155,12 +155,14 @@ Result<CheckedProgram> compile_and_walk(const Installation& installation, const 
     auto its = place_of(installation, motor);
     if (!its) return fail(its.error());
     places.push_back(std::move(*its));
+    program.tables.push_back(installation.table_of(motor)->content_hash());
   }
   if ((has_lines(program.text) || program.text.codes) && place.lines) {
     if (auto found = find_line_table(installation, mcu, program, place); !found) {
       return fail(found.error());
     }
   }
+  if (program.line_table) program.tables.push_back(program.line_table->content_hash());
   auto bytes = programs::compile(program.text, place, places);
   if (!bytes) return fail(bytes.error());
   program.bytes = std::move(*bytes);

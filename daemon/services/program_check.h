@@ -30,6 +30,7 @@ struct CheckedProgram {
   programs::Rehearsal walk{};         // from where the motors stand
   tables::TablePtr line_table{};      // of its lines; null: it has none
   bool line_table_is_there = false;   // in a bank of the MCU
+  std::vector<std::string> tables{};  // what their bytes are: of its motors, then of its lines
 };
 
 // Errors name file, line, motor, cause and remedy.

@@ -60,7 +60,11 @@ ProgramEnd end_of_program(const bushd_program_state& state, const Mcu& mcu) {
     case BUSHD_PROGRAM_NO_INPUT:
       return {Outcome::kFault, "the input has not come within longest_s"};
     case BUSHD_PROGRAM_REFUSED:
-      return {Outcome::kFault, "MCU " + mcu.name() + " cannot make this motion as things are"};
+      return {Outcome::kFault,
+              "MCU " + mcu.name() +
+                  " cannot make this motion as things are: another line, travel or "
+                  "homing is under way, or a motor waits for the trigger; run it "
+                  "again when they have ended"};
     case BUSHD_PROGRAM_DISABLED:
       return {Outcome::kStopped, "the drivers of MCU " + mcu.name() + " have been disabled"};
     case BUSHD_PROGRAM_LATE:

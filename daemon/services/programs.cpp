@@ -170,8 +170,9 @@ Result<void> Programs::may_be_put(const CheckedProgram& program) const {
   if (its.erase) return fail("MCU " + mcu.name() + " erases its program; wait for its end");
   for (const McuId other : installation_.mcus()) {
     if (other == mcu.id || !has_or_gets(other, program.name)) continue;
-    return fail("MCU " + installation_[other].name() + " has a program of that name; erase it, " +
-                "or give this one another name");
+    return fail("MCU " + installation_[other].name() + " has a program of that name; " +
+                (installation_[other].online() ? "erase it, or " : "") +
+                "give this one another name");
   }
   if (!program.line_table || program.line_table_is_there) return {};
   if (!mcu.uploads() && installation_.rests(mcu)) return {};
@@ -260,7 +261,9 @@ void Programs::follow_upload(std::int64_t now_us, McuId id) {
 void Programs::end_upload(McuId id, const Result<void>& how) {
   Upload upload = *std::exchange(mcus_[id].upload, std::nullopt);
   const Mcu& mcu = installation_[id];
-  if (!how) {
+  // It was taken, and its MCU was lost while it wrote.
+  const bool there = upload.stored_by_us.has_value();
+  if (!how && !there) {
     if (!upload.began && mcu.uploads()) mcu.offers.uploads->end_upload(mcu.on_bus());
     return upload.asker.answer(
         api::Completed{.outcome = mcu.online() ? Outcome::kFault : Outcome::kLink,
@@ -269,6 +272,14 @@ void Programs::end_upload(McuId id, const Result<void>& how) {
   }
   mcus_[id].program = std::move(upload.program);
   keep(id, &upload.source);
+  if (!how) {
+    return upload.asker.answer(
+        api::Completed{.outcome = Outcome::kLink,
+                       .reason = how.error().text() +
+                                 ": it is put, and may outlive a power cut or not; the list of "
+                                 "programs shows it when its MCU is back",
+                       .detail = {}});
+  }
   upload.asker.answer(api::Completed{
       .outcome = Outcome::kDone, .reason = "done", .detail = api::ProgramList{{entry(id)}}});
 }
@@ -311,8 +322,8 @@ void Programs::follow_erase(std::int64_t now_us, McuId id) {
   if (gone && for_good) return asker.answer(api::done("done"));
   const std::string reason =
       gone ? "MCU " + mcu.name() +
-                 " has erased it, and would have it again after a power cut: it writes what it "
-                 "keeps when its motors rest; put another one or erase it then"
+                 " has erased it, and would have it again after a power cut: that is over when its "
+                 "motors have rested for 512 ticks, or else after its next reset"
            : "MCU " + mcu.name() + " has a program still";
   asker.answer(api::Completed{.outcome = Outcome::kFault, .reason = reason, .detail = {}});
 }

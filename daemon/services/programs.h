@@ -83,6 +83,11 @@ class Programs final : public Service {
     bool kept = false;  // it was to outlive power cuts
     std::optional<std::int64_t> stored_by_us{};
   };
+  // Motors whose limit switch inhibits a direction.
+  struct Forbidden {
+    std::uint16_t positive = 0;
+    std::uint16_t negative = 0;
+  };
   // Its motors are in the program until it ends.
   struct Run {
     std::vector<MotorId> motors{};
@@ -95,7 +100,7 @@ class Programs final : public Service {
     bool stop_asked = false;   // and its MCU has been told
     bool pause_asked = false;
     bool table_asked = false;               // that of its lines, once more
-    std::uint16_t forbidden_before = 0;     // motors whose limit switch was active at its start
+    Forbidden forbidden_before{};           // by limit switches, at its start
     std::optional<std::string> ended_by{};  // why, if nobody has stopped it
   };
   struct OfMcu {
@@ -135,7 +140,8 @@ class Programs final : public Service {
   void begin(std::int64_t now_us, Start& start);
   bool follow(std::int64_t now_us, Start& start);
   void adopt(McuId mcu);
-  std::uint16_t forbidden(McuId mcu) const;
+  void warn_of_power_on(const Mcu& mcu);
+  Forbidden forbidden(McuId mcu) const;
   void follow(McuId mcu);
   void follow_end(McuId mcu);
   void follow_erase(std::int64_t now_us, McuId mcu);

@@ -43,7 +43,7 @@ Result<void> Programs::may_run(McuId id) const {
   }
   const auto now = check_program(installation_, program.name, program.text);
   if (!now) return fail(now.error());
-  if (now->bytes != program.bytes) {
+  if (now->bytes != program.bytes || now->tables != program.tables) {
     return fail(
         "tables, speeds or limits of its motors are not those with which it was put; put it again");
   }
@@ -239,10 +239,9 @@ std::int64_t Programs::next_wake_us() const {
   return wake;
 }
 
-// Motors whose limit switch inhibits a direction.
-std::uint16_t Programs::forbidden(McuId id) const {
+Programs::Forbidden Programs::forbidden(McuId id) const {
   const bushd_report& report = installation_[id].report();
-  return report.forbidden_positive | report.forbidden_negative;
+  return {.positive = report.forbidden_positive, .negative = report.forbidden_negative};
 }
 
 // A program of before this daemon, or of before its MCU was lost.
@@ -317,9 +316,13 @@ void Programs::follow_end(McuId id) {
   const bushd_report& report = mcu.report();
   if (static_cast<std::int32_t>(report.tick - state.tick) < 0) return;
   if (((report.moving | report.autonomous) & state.motors) != 0) return;
+  // A travel begins at one switch, and the other one may cut it.
+  const Forbidden now = forbidden(id);
+  const Forbidden& before = run.forbidden_before;
+  const unsigned positive = now.positive & ~before.positive;
+  const unsigned negative = now.negative & ~before.negative;
   for (const MotorId motor : run.motors) {
-    const bool met =
-        (forbidden(id) & ~run.forbidden_before) >> installation_[motor].output().value & 1;
+    const bool met = (positive | negative) >> installation_[motor].output().value & 1;
     if (!met || installation_.config()[motor].limit_action != BUSHD_STOP_IMMEDIATE) continue;
     installation_[motor].trust().is_uncertain(
         "it was stopped immediately at its limit switch and may have overrun");
@@ -359,8 +362,21 @@ void Programs::refuses(Mcu& mcu, std::uint8_t type, std::uint8_t status) {
   run->stop_wanted = run->stop_asked = true;
 }
 
+// The MCU begins it whatever this configuration says, so somebody has to erase it.
+void Programs::warn_of_power_on(const Mcu& mcu) {
+  if (mcu.offers.programs == nullptr || !view(mcu.id).known) return;
+  const bushd_program_state& state = view(mcu.id).state;
+  if ((state.flags & BUSHD_PROGRAM_AT_POWER_ON) == 0 || mcu.config.programs_at_power_on) return;
+  outputs_.log(LogLevel::kWarning, mcu.id,
+               fmt::format("MCU {} has a program that begins whenever its power comes, and "
+                           "programs_at_power_on does not allow it; erase it: 'bushctl program "
+                           "erase {:08x}'",
+                           mcu.name(), state.crc));
+}
+
 // Another firmware, or one that denies programs: nobody will tell what has become of it.
 void Programs::goes_online(Mcu& mcu) {
+  warn_of_power_on(mcu);
   if (!mcus_[mcu.id].run || mcu.can_have_program()) return;
   end(mcu.id, Outcome::kLink, "MCU " + mcu.name() + " came back and knows no programs");
 }

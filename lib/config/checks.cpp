@@ -133,8 +133,15 @@ Result<void> check_ready(const Config& config, McuId id) {
   if (!mcu.ready_after_homing) return {};
   const bool homes = std::ranges::any_of(
       config.motors, [&](const Motor& motor) { return motor.mcu == id && motor.home.has_value(); });
-  if (homes) return {};
   Error error = mcu.places.at("ready");
+  if (homes && mcu.programs_at_power_on) {
+    error.message = fmt::format(
+        "is \"after-homing\", and programs_at_power_on lets a program of MCU \"{}\" move motors "
+        "before they are homed; leave out one of the two",
+        mcu.id);
+    return fail(std::move(error));
+  }
+  if (homes) return {};
   error.message = fmt::format(
       "is \"after-homing\", but no motor of MCU \"{}\" has a home; give one home = {{...}}, or "
       "leave `ready` out",

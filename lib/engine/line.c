@@ -80,9 +80,10 @@ uint16_t bushd_line_crossing(const bushd_line* line) {
 // The elementary law. A coordinate with N against R, the sum of those behind it: in r steps of
 // these N + R = T
 //
-//     its own:    floor( N (r - 1) / T ) + 1     for r > 0,      its step j is at    ceil( T (j -
-//     1) / N ) + 1 of the R:   what is left of r,             the step j of those at floor( T (j -
-//     1) / R ) + 2
+//     its own steps:      floor( N (r - 1) / T ) + 1 for r > 0
+//     its step j is at:   ceil( T (j - 1) / N ) + 1
+//     those of the R:     what is left of r
+//     their step j is at: floor( T (j - 1) / R ) + 2
 //
 // which is where F, begun at 0, is not, or is, below 0.
 

@@ -114,6 +114,12 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
        "mcu[1].ready: is \"later\"; allowed: \"at-once\" or \"after-homing\""},
       {with_mcu("ready = \"after-homing\"\n"), 22,
        "mcu[1].ready: is \"after-homing\", but no motor of MCU \"roof:255\" has a home"},
+      {replaced(with_mcu("ready = \"after-homing\"\nprograms_without_host = true\n"
+                         "programs_at_power_on = true\n"),
+                "output = 15\n",
+                "output = 15\ninputs = { home = 3 }\n"
+                "home = { direction = \"negative\", most_steps = 9 }\n"),
+       22, "mcu[1].ready: is \"after-homing\", and programs_at_power_on lets a program of MCU"},
       {with_mcu("idle_disable_s = -1\n"), 22,
        "mcu[1].idle_disable_s: is -1; allowed: a number 0..1000000 s; 0: at once"},
       {with_mcu("enable_settle_ms = -1\n"), 22, "mcu[1].enable_settle_ms: is -1; allowed: a whole"},

@@ -111,6 +111,23 @@ TEST(CamacAlone, ADaemonThatLivesTellsAsEver) {
   EXPECT_TRUE(lab.warnings().empty());
 }
 
+// An MCU has one program, of a name of its own.
+TEST(CamacAlone, MotorsOfOneModuleMayBeAtSeveralMcus) {
+  AloneLab lab(hall_of_programs(2, 1, true) +
+               "[[crate]]\nnumber = 1\n"
+               "[[crate.module]]\nstation = 5\ntype = \"bushd-2\"\nf_start_hz = 100\n"
+               "without_computer = true\nmotors = [\"m01\", \"m02\"]\n");
+  lab.load(0, 300, falling());
+  for (const std::uint32_t motor : {0U, 1U, 0U}) {
+    lab.permit(kEnabled | motor);
+    ASSERT_TRUE(lab.wait_for_lam());
+    EXPECT_EQ(lab.requests() & 0xFF, 0x10U);
+    lab.naf(kStation, 0, 10);
+  }
+  EXPECT_EQ(lab.shaft_steps("m01"), 600);
+  EXPECT_EQ(lab.shaft_steps("m02"), 300);
+}
+
 TEST(CamacAlone, F24AndStopsEndIt) {
   AloneLab lab;
   lab.load(0, 20'000, falling());

@@ -82,6 +82,21 @@ TEST(ProgramsKept, OneInItsPlaceAnswersWhenThatIsStored) {
   EXPECT_TRUE(lab.steps.none());
 }
 
+// The MCU has it, and may have written it.
+TEST(ProgramsKept, AnMcuThatIsLostWhileItWritesIsTold) {
+  KeptLab lab;
+  const std::int64_t put = lab.send(ProgramLab::put_of("a", "\"m01\"", kThere, "kept = true\n"));
+  ASSERT_TRUE(lab.run_until([&] { return lab.entry().stage == "loaded"; }));
+  lab.run_for(0.3);
+  ASSERT_FALSE(lab.has_result(put));
+  lab.cut_power();
+  const Answer answer = lab.wait(put);
+  EXPECT_EQ(answer.result, "link");
+  EXPECT_THAT(answer.reason, HasSubstr("it is put, and may outlive a power cut or not"));
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  EXPECT_EQ(lab.entry().stage, "none");
+}
+
 TEST(ProgramsKept, WhatIsBeingWrittenWaitsForNobodyElse) {
   KeptLab lab;
   const std::int64_t put = lab.send(ProgramLab::put_of("a", "\"m01\"", kThere, "kept = true\n"));
@@ -136,6 +151,8 @@ TEST(ProgramsKept, AnotherConfigurationStopsItAndErasesIt) {
   ASSERT_EQ(lab.put("a", "\"m01\"", endless, kAtPowerOn).result, "done");
   lab.use_configuration(hall_with(1, 2, "programs_without_host = true\n"));
   lab.connect();
+  EXPECT_THAT(lab.warnings(),
+              Contains(HasSubstr("programs_at_power_on does not allow it; erase it")));
   lab.cut_power();
   ASSERT_TRUE(lab.run_until([&] { return lab.entry().stage == "ended"; }));
   EXPECT_THAT(lab.warnings(),
