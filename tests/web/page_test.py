@@ -1,6 +1,7 @@
 """What a page is told and what it may ask: by real programs, and edges of the simulator's trace."""
 
 import json
+import re
 import signal
 
 from lab import WebTest, free_port, main
@@ -154,7 +155,8 @@ class WebPage(WebTest):
         self.assertIn("openmetrics-text", headers["content-type"])
         self.assertIn('bushd_motor_position_steps{daemon="bushd",mcu="hall:1",motor="a0"} 0\n', body)
         self.assertIn('bushd_motor_trust{daemon="bushd",mcu="hall:1",motor="a0",bushd_motor_trust="known"} 1\n', body)
-        self.assertRegex(body, r'bushd_daemon_cpu_seconds_total\{daemon="bushd"\} 0\.\d+\n')
+        self.wait_until("the daemon to tell what it takes", lambda: re.search(
+            r'bushd_daemon_cpu_seconds_total\{daemon="bushd"\} 0\.\d+\n', self.http("GET", "/metrics")[2]))
         self.assertTrue(body.endswith("# EOF\n"))
         self.bushd.send(signal.SIGSTOP)
         self.wait_until("it to be old", lambda: self.http("GET", "/api/state")[0] == 503)
