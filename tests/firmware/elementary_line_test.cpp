@@ -107,38 +107,9 @@ TEST_P(ElementaryLineRun, IsReplacedByTicksAtEveryTick) {
     const std::uint32_t first = fresh.first_open();
     ASSERT_EQ(start(fresh, line_of(first, motors)), BUSHD_OK);
     fresh.pass(static_cast<int>(k) / 2);
-    for (std::size_t from = k; from < run.ticks(); from += 20) {
-      const std::size_t count = std::min<std::size_t>(20, run.ticks() - from);
-      Ticks rest{.flags = from == k ? kReplace : std::uint8_t{0},
-                 .first = first + static_cast<std::uint32_t>(from),
-                 .count = static_cast<std::uint8_t>(count),
-                 .mask = 7,
-                 .displacements = {},
-                 .delays = {},
-                 .epoch = 1};
-      for (std::size_t tick = from; tick < from + count; ++tick) {
-        for (const LineMotor& motor : motors) {
-          const std::int64_t moved = position_at(motor, tick + 1) - position_at(motor, tick);
-          const bool back = motor.steps < 0;
-          rest.displacements.push_back(static_cast<std::int16_t>(
-              format == BUSHD_FORMAT_FINE ? (back ? -moved : moved)
-                                          : (moved / 256) | (back ? 0 : BUSHD_COARSE_DIRECTION)));
-        }
-      }
-      const bool over = from + count == run.ticks();
-      for (std::size_t i = 0; i < motors.size(); ++i) {
-        rest.delays.push_back(static_cast<std::uint16_t>(over ? 0 : 1000));
-      }
-      ASSERT_EQ(fresh.take(rest), BUSHD_OK) << k << " " << from;
-      while (static_cast<std::int32_t>(rest.first - fresh.tick()) > 50) fresh.pass();
-    }
-    fresh.pass_until_rest();
-    for (const LineMotor& motor : motors) {
-      ASSERT_EQ(fresh.pulses(motor.number), motor.steps) << k;
-      ASSERT_EQ(fresh.mcu().motor[motor.number].remainder, 0) << k;
-    }
-    ASSERT_EQ(fresh.poll().faults, 0);
-    ASSERT_EQ(fresh.mcu().line.motors, 0);
+    ASSERT_NO_FATAL_FAILURE(replace_rest(
+        fresh, first, {.from = k, .ticks = run.ticks(), .motors = motors},
+        [&](const LineMotor& motor, std::size_t tick) { return position_at(motor, tick); }));
   }
 }
 

@@ -101,6 +101,51 @@ class OfLines : public Streams {
     return on.take(BUSHD_MSG_LINE_RUN, frame(of));
   }
 
+  // Ticks from this one of a line's run on take the place of its rest, and no step is lost or made
+  // twice.
+  struct Rest {
+    std::size_t from;
+    std::size_t ticks;  // of the run
+    const std::vector<LineMotor>& motors;
+  };
+  template <class PositionAt>
+  void replace_rest(Rig& fresh, std::uint32_t first, const Rest& of, PositionAt&& position_at) {
+    const std::size_t k = of.from;
+    const std::vector<LineMotor>& motors = of.motors;
+    for (std::size_t from = k; from < of.ticks; from += 20) {
+      const std::size_t count = std::min<std::size_t>(20, of.ticks - from);
+      Ticks rest{.flags = from == k ? kReplace : std::uint8_t{0},
+                 .first = first + static_cast<std::uint32_t>(from),
+                 .count = static_cast<std::uint8_t>(count),
+                 .mask = 7,
+                 .displacements = {},
+                 .delays = {},
+                 .epoch = 1};
+      for (std::size_t tick = from; tick < from + count; ++tick) {
+        for (const LineMotor& motor : motors) {
+          const std::int64_t moved = position_at(motor, tick + 1) - position_at(motor, tick);
+          const bool back = motor.steps < 0;
+          rest.displacements.push_back(static_cast<std::int16_t>(
+              format == BUSHD_FORMAT_FINE ? (back ? -moved : moved)
+                                          : (moved / 256) | (back ? 0 : BUSHD_COARSE_DIRECTION)));
+        }
+      }
+      const bool over = from + count == of.ticks;
+      for (std::size_t i = 0; i < motors.size(); ++i) {
+        rest.delays.push_back(static_cast<std::uint16_t>(over ? 0 : 1000));
+      }
+      ASSERT_EQ(fresh.take(rest), BUSHD_OK) << k << " " << from;
+      while (static_cast<std::int32_t>(rest.first - fresh.tick()) > 50) fresh.pass();
+    }
+    fresh.pass_until_rest();
+    for (const LineMotor& motor : motors) {
+      ASSERT_EQ(fresh.pulses(motor.number), motor.steps) << k;
+      ASSERT_EQ(fresh.mcu().motor[motor.number].remainder, 0) << k;
+    }
+    ASSERT_EQ(fresh.poll().faults, 0);
+    ASSERT_EQ(fresh.mcu().line.motors, 0);
+  }
+
   // From tick `first` on, each slot of each tick until the run is over, which begins `late_ns`
   // after the beginning of that tick.
   static void expect_slots(Rig& of, const Reference& run, const Frame& frame,
