@@ -91,11 +91,7 @@ class ElementaryMove(LineMove):
     def _told(self, tick):
         at_ns = (tick + 1) * self.tick_ns
         rest = next(rest for since, rest in reversed(self._rests) if tick >= since)
-        plan = self._plan
-        run = plan.made_by(at_ns)
-        part = 0
-        if run < plan.count:
-            part = (at_ns - plan.begin_ns(run)) * 256 // (plan.delays[run] * plan.unit_ns)
+        run, part = self._plan.place(at_ns)
         step = self._from + run
         made = self._made(step)
         place = 256 * made

@@ -232,11 +232,7 @@ class LineMove(Move):
     def _told(self, tick):
         at_ns = (tick + 1) * self.tick_ns
         rest = next(rest for since, rest in reversed(self._rests) if tick >= since)
-        plan = self._plan
-        run = plan.made_by(at_ns)
-        part = 0
-        if run < plan.count:
-            part = (at_ns - plan.begin_ns(run)) * 256 // (plan.delays[run] * plan.unit_ns)
+        run, part = self._plan.place(at_ns)
         twice = 2 * self._increment * (256 * (self._from + run) + part)
         ruled = (twice + 256 * (self._longest - self._increment)) // (2 * self._longest)
         place = min(ruled, twice // self._longest, 256 * rest) - 256 * self._first

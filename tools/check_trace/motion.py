@@ -128,6 +128,13 @@ class Plan:
         """When this step begins; the one before it is worked out."""
         return self.times_ns[index - 1] if index else self.first_ns
 
+    def place(self, ns):
+        """How many steps are made by then, and how many 256ths of the one that runs."""
+        made = self.made_by(ns)
+        if made == self.count:
+            return made, 0
+        return made, (ns - self.begin_ns(made)) * 256 // (self.delays[made] * self.unit_ns)
+
     def running(self, begin_ns, end_ns):
         """The delays of the steps that run between these times."""
         first, last = self.made_by(begin_ns), self.made_by(end_ns)
