@@ -11,7 +11,7 @@ bool ends_others(const Request& request) {
 
 bool begins_motion(const Request& request) {
   const bool jogs = request.ask == Ask::kJog && request.speed_micro != 0 && !request.renew;
-  return request.is_move() || request.ask == Ask::kHome || jogs;
+  return request.is_move() || request.ask == Ask::kHome || request.ask == Ask::kRunPrograms || jogs;
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ bool begins_motion(CommandKind kind) {
     case CommandKind::kPath:
     case CommandKind::kTrajectory:
     case CommandKind::kArmLine:
+    case CommandKind::kMcuProgram:
       return true;
     default:
       return false;
@@ -49,6 +50,7 @@ Clients::Clients(const bushd::config::Config& config, const Witness& witness,
       random_(seed, kClientsStream),
       joggers_(seed),
       programs_(config, seed),
+      mcu_programs_(config, seed),
       random_of_shutter_(seed, kShutterStream) {
   if (const auto motor = ShutterPlace::motor(config)) shutter_ = config[*motor].name;
 }
@@ -338,6 +340,8 @@ Request Clients::compose(CommandKind kind) {
       return of_program();
     case CommandKind::kChased:
       return chased();
+    case CommandKind::kMcuProgram:
+      return mcu_programs_.next();
     case CommandKind::kShutter:
       return programs_.next_of_shutter(
           witness_.positions().plant_steps(ShutterPlace::motor(config_)->value),

@@ -9,6 +9,7 @@
 
 #include "joggers.h"
 #include "kinds.h"
+#include "mcu_programs.h"
 #include "programs.h"
 #include "request.h"
 #include "sim/random.h"
@@ -102,6 +103,7 @@ class Clients {
   bushd::sim::Random random_;
   Joggers joggers_;
   Programs programs_;
+  McuPrograms mcu_programs_;
   std::string shutter_{};                         // name of its motor, if there is one
   mutable bushd::sim::Random random_of_shutter_;  // who moves it beside its programs
   struct Later {

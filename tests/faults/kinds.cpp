@@ -75,6 +75,8 @@ constexpr std::array<KindInfo, kCommandKinds> kCommands = {{
     {"line-armings", 0, "2 .. 5 motors wait for the trigger, on one line; wants --triggers", 300},
     {"chased", 0,
      "a motion with a stop, an emergency stop, a pause or a hold right behind it, or soon", 600},
+    {"mcu-programs", 0, "programs are put into MCUs, run there and erased; no CAMAC modules then",
+     600},
 }};
 
 template <std::size_t kSize>
@@ -102,6 +104,11 @@ void add_all_kinds(FaultRates& faults, CommandRates& commands, std::uint64_t see
   bushd::sim::Random random(seed, kRatesStream);
   add_all(faults, kFaults, random);
   add_all(commands, kCommands, random);
+  // MCUs with motors of CAMAC modules have no programs here.
+  const auto none = [&commands](CommandKind kind) { commands[static_cast<std::size_t>(kind)] = 0; };
+  if (random.one_in(2)) return none(CommandKind::kMcuProgram);
+  none(CommandKind::kCamac);
+  none(CommandKind::kShutter);
 }
 
 const KindInfo& info(FaultKind kind) {

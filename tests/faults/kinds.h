@@ -79,8 +79,9 @@ enum class CommandKind : std::uint8_t {
   kShutter,
   kArmLine,
   kChased,
+  kMcuProgram,
 };
-inline constexpr std::size_t kCommandKinds = 28;
+inline constexpr std::size_t kCommandKinds = 29;
 
 struct KindInfo {
   std::string_view name;  // as a flag and in the summary

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "bus/bus_budget.h"
+#include "mcu_programs.h"
 #include "programs.h"
 #include "sim/random.h"
 #include "tables/table_file.h"
@@ -120,6 +121,7 @@ void furnish(bushd::config::Config& config, const FaultRates& faults, const Comm
   const bool shutter = rate(commands, CommandKind::kShutter) > 0;
   if (shutter || rate(commands, CommandKind::kCamac) > 0) add_crate(config);
   if (shutter) add_shutter(config);
+  if (rate(commands, CommandKind::kMcuProgram) > 0) allow_mcu_programs(config, seed);
   if (rate(commands, CommandKind::kHome) > 0) add_homes(config, seed);
   if (rate(faults, FaultKind::kLimitSwitch) > 0) add_limit_switches(config);
   if (rate(faults, FaultKind::kEmergencyInput) > 0) add_emergency_inputs(config, seed);

@@ -128,6 +128,14 @@ int run(int argc, char** argv) {
   if (all_kinds) {
     bushfaults::add_all_kinds(options.fault_rates, options.command_rates, options.seed);
   }
+  if (rate(options.command_rates, bushfaults::CommandKind::kMcuProgram) > 0 &&
+      (rate(options.command_rates, bushfaults::CommandKind::kCamac) > 0 ||
+       rate(options.command_rates, bushfaults::CommandKind::kShutter) > 0)) {
+    fmt::print(stderr,
+               "bushfaults: --mcu-programs: MCUs with motors of CAMAC modules have none; leave out "
+               "--camac-blocks and --shutter-blocks\n");
+    return kUsage;
+  }
   if (all_kinds) bushfaults::add_all_ways(ways, options.seed);
   options.all_kinds = all_kinds;
   auto config =

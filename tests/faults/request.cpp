@@ -222,6 +222,14 @@ api::Request api_of(const Request& request) {
                                                ? static_cast<std::uint32_t>(request.cycles.size())
                                                : request.words,
                                   .last_station = request.last_station}};
+    case Ask::kPutProgram:
+      return api::PutProgram{.program = request.program.name,
+                             .text = request.program.text(),
+                             .dry_run = request.program.dry_run};
+    case Ask::kEraseProgram:
+      return api::EraseProgram{request.programs.front()};
+    case Ask::kRunPrograms:
+      return api::RunPrograms{request.programs};
     case Ask::kDisarm:
       break;
   }
@@ -271,6 +279,11 @@ std::string text_of(const Request& request) {
     const auto [key, value] = key_and_value(setting);
     how += fmt::format(" {}={}", key, value);
   }
+  if (request.ask == Ask::kPutProgram) {
+    how += fmt::format("{}{}:\n{}", request.program.name,
+                       request.program.dry_run ? " (dry run)" : "", request.program.text());
+  }
+  if (!request.programs.empty()) how += fmt::format(" {}", fmt::join(request.programs, ","));
   return fmt::format("{}: {} {} {}{}{}", text_of(request.id()), word_of(request),
                      fmt::join(request.motors, ","), fmt::join(request.steps, ","), how,
                      request.damage == Damage::kNone ? "" : " (broken)");

@@ -11,6 +11,7 @@
 
 #include "api/request.h"
 #include "lcm/codec.h"
+#include "mcu_program.h"
 
 namespace bushfaults {
 
@@ -38,6 +39,9 @@ enum class Ask : std::uint8_t {
   kConfigure,
   kCamac,
   kRows,  // of a trajectory, or points of a path that others follow
+  kPutProgram,
+  kEraseProgram,
+  kRunPrograms,  // its motors are those of the programs
 };
 
 // What a motor may be given in operation. Numbers are millionths of its unit.
@@ -84,9 +88,11 @@ struct Request {
   std::int32_t delay_us = 0;                  // kArm
   std::vector<bushd::camac::Naf> cycles{};    // kCamac
   bushd::camac::BlockMode block_mode = bushd::camac::BlockMode::kSingle;
-  std::uint32_t words = 0;   // of the other modes
-  int last_station = 23;     // of a scan
-  bool unknown_way = false;  // a move, and nobody knows by how many steps
+  std::uint32_t words = 0;              // of the other modes
+  int last_station = 23;                // of a scan
+  bool unknown_way = false;             // a move, and nobody knows by how many steps
+  McuProgram program{};                 // kPutProgram
+  std::vector<std::string> programs{};  // kEraseProgram, kRunPrograms: their names
   Damage damage = Damage::kNone;
 
   void add(const std::string& motor, std::int64_t steps_of_it) {
@@ -106,8 +112,10 @@ struct Request {
     return std::find(motors.begin(), motors.end(), motor) != motors.end();
   }
   bool names_or_all(const std::string& motor) const { return motors.empty() || names(motor); }
-  // For other motors' homing, or the trigger: nobody knows for how long.
-  bool may_wait() const { return ask == Ask::kHome || ask == Ask::kArm; }
+  // For other motors' homing, or the trigger; or in repeats without end: nobody knows for how long.
+  bool may_wait() const {
+    return ask == Ask::kHome || ask == Ask::kArm || ask == Ask::kRunPrograms;
+  }
 };
 
 // The same as an lcm::RequestId, in an order.

@@ -85,6 +85,13 @@ std::string summary_text(const World& world, double processor_s) {
   for (const auto& [result, count] : world.witness().jogs_by_result()) {
     text += fmt::format("           {:<17}{:>9}\n", result, count);
   }
+  if (!world.witness().programs_by_result().empty()) {
+    text += fmt::format("programs   of MCUs by result; {} were judged by where they lead\n",
+                        world.witness().programs_judged());
+  }
+  for (const auto& [result, count] : world.witness().programs_by_result()) {
+    text += fmt::format("           {:<17}{:>9}\n", result, count);
+  }
   text += fmt::format("legs       {} last approaches, {} rests in pauses\n",
                       world.witness().approaches(), world.witness().times_paused());
   if (!world.config().crates.empty()) {
@@ -127,6 +134,8 @@ std::string summary_json(const World& world) {
       {"moves", world.witness().moves_by_result()},
       {"homings", world.witness().homings_by_result()},
       {"jogs", world.witness().jogs_by_result()},
+      {"programs", world.witness().programs_by_result()},
+      {"programs_judged", world.witness().programs_judged()},
       {"approaches", world.witness().approaches()},
       {"camac_starts", world.witness().crates().starts()},
       {"camac_lams", world.witness().crates().ended_by_lam()},

@@ -83,6 +83,7 @@ void Witness::daemon_started(TimeNs now_ns) {
     motor.stopped_at.reset();
   }
   std::fill(states_.begin(), states_.end(), std::nullopt);
+  forget_programs();
   positions_.daemon_started();
   units_.daemon_started(offsets_kept_);
   crates_.daemon_started(now_ns, offsets_kept_);
@@ -134,6 +135,7 @@ void Witness::refused(const Asked& asked) {
   if (asked.request.is_move()) ++moves_by_result_["refused"];
   if (asked.request.ask == Ask::kHome) ++homings_by_result_["refused"];
   if (asked.request.ask == Ask::kJog) ++jogs_by_result_["refused"];
+  if (asked.request.ask == Ask::kRunPrograms) ++programs_by_result_["refused"];
 }
 
 void Witness::forget_some() {
@@ -150,6 +152,9 @@ void Witness::state(TimeNs now_ns, std::size_t mcu, const api::StateSnapshot& st
     recent_.note(now_ns, fmt::format("{} {} {}", state.mcu, word(state.state), state.detail));
   }
   states_[mcu] = state;
+  if (state.state == api::McuState::kReady && state.program.empty()) {
+    for (Motor& motor : motors_) motor.program_may_go_on &= motor.mcu != mcu;
+  }
   if (const auto wrong = positions_.check(now_ns, mcu, state)) violated(now_ns, *wrong);
   for (const api::MotorState& motor : state.motors) {
     const auto wrong = units_.check(index_of(*find(motor.name)), motor);

@@ -17,6 +17,7 @@
 #include "beginnings.h"
 #include "config/config.h"
 #include "crate_model.h"
+#include "mcu_program.h"
 #include "positions.h"
 #include "promise.h"
 #include "recent.h"
@@ -52,6 +53,9 @@ class Witness {
     second_ns_ = now_ns;
     beginnings_.other_daemon();
   }
+  void mcu_reset(std::size_t mcu);
+  // A program that a daemon before has run, or whose MCU was lost, may be under way.
+  bool program_may_go_on() const;
   // Its limit switch is, or was until now, active.
   void pressed(TimeNs now_ns, std::size_t motor);
   // At the daemon, where it may wait for its turn.
@@ -107,6 +111,11 @@ class Witness {
   }
   const std::map<std::string, std::uint64_t>& moves_by_result() const { return moves_by_result_; }
   const std::map<std::string, std::uint64_t>& jogs_by_result() const { return jogs_by_result_; }
+  // Runs of programs of MCUs; those that were reached, and were judged by where they lead.
+  const std::map<std::string, std::uint64_t>& programs_by_result() const {
+    return programs_by_result_;
+  }
+  std::uint64_t programs_judged() const { return programs_judged_; }
   // Last approaches that were made, of moves of two legs.
   std::uint64_t approaches() const { return approaches_; }
   std::uint64_t times_paused() const { return times_paused_; }
@@ -161,7 +170,9 @@ class Witness {
     TimeNs set_ns = -1;            // when somebody said where it stands, the last time
     int idle_checks = 0;           // of the deadlines, while no motion of it was open
     std::optional<std::int64_t> held_at{};
-    TimeNs asked_ns = -1;  // when somebody asked for a motion of it, the last time
+    std::optional<Key> program{};    // the run of it in which it is
+    bool program_may_go_on = false;  // it was in one, and nobody knows whether that has ended
+    TimeNs asked_ns = -1;            // when somebody asked for a motion of it, the last time
     std::optional<std::int64_t> stopped_at{};  // where it stood when a stop was done, until then
     void is_asked_for(TimeNs now_ns) {
       asked_ns = now_ns;
@@ -208,8 +219,9 @@ class Witness {
     TimeNs runs_begun_ns = -1;
     std::size_t runs_begun = 0;
     bool way_is_over = false;  // a motor of it, which has ended, moves for somebody else
-    std::vector<std::uint64_t> changes{};        // of settings
-    std::vector<std::optional<bool>> outside{};  // of its new limits; nothing: it is not known
+    std::vector<std::uint64_t> changes{};             // of settings
+    std::vector<std::optional<bool>> outside{};       // of its new limits; nothing: it is not known
+    std::vector<std::vector<McuProgram>> programs{};  // that it runs: what each may be
     std::size_t index_of(const std::string& motor) const {
       const auto& all = request.motors;
       return static_cast<std::size_t>(std::find(all.begin(), all.end(), motor) - all.begin());
@@ -293,6 +305,16 @@ class Witness {
   void hold_accepted(const Request& request);
   void hold_done(const Key& key, const bushd::api::Completed& result);
   void paused(TimeNs now_ns, const Key& key, const std::string& reason);
+  // Programs of MCUs.
+  void put_accepted(const Request& request);
+  void put_finished(const Request& request, const bushd::api::Completed& result);
+  void programs_accepted(TimeNs now_ns, const Key& key, Asked& asked);
+  void programs_ended(TimeNs now_ns, const Key& key, const Asked& asked,
+                      const bushd::api::Completed& result);
+  void program_ended(TimeNs now_ns, const Asked& asked, const bushd::api::Completed& result,
+                     std::size_t first, const std::vector<McuProgram>& texts);
+  void leave_program(TimeNs now_ns, Motor& motor, const Request& request);
+  void forget_programs();
   // CAMAC modules, which ask for motion themselves.
   void asked_by_module(TimeNs now_ns, const std::string& client, const std::string& what,
                        const std::string& motor);
@@ -342,6 +364,11 @@ class Witness {
   std::map<std::string, std::uint64_t> moves_by_result_;
   std::map<std::string, std::uint64_t> homings_by_result_;
   std::map<std::string, std::uint64_t> jogs_by_result_;
+  std::map<std::string, std::uint64_t> programs_by_result_;
+  std::uint64_t programs_judged_ = 0;
+  // By name: what it may be, since one of them was known to be put. A daemon that was killed may
+  // have put the newest or not.
+  std::map<std::string, std::vector<McuProgram>> programs_put_;
   std::uint64_t approaches_ = 0;
   std::uint64_t times_paused_ = 0;
   std::uint64_t steps_commanded_ = 0;

@@ -34,6 +34,13 @@ constexpr std::int64_t kEventSteps = 60;
 
 bool Witness::concerns(const Request& request, const Motor& motor) const {
   if (request.names_or_all(motor.name)) return true;
+  if (motor.program) {
+    // What is asked of one motor of a program is asked of all.
+    const auto& programs = asked_.at(*motor.program).request;
+    return std::ranges::any_of(motors_, [&](const Motor& other) {
+      return other.mcu == motor.mcu && programs.names(other.name) && request.names(other.name);
+    });
+  }
   if (!motor.move || !asked_.at(*motor.move).request.line) return false;
   return std::ranges::any_of(motors_, [&](const Motor& other) {
     return other.move == motor.move && request.names(other.name);
@@ -62,6 +69,7 @@ void Witness::stop_is_done(const Asked& asked, const std::string& reason) {
     const bool named =
         asked.request.ask == Ask::kEmergencyStop || asked.request.names_or_all(motor.name);
     if (!named || is_shutter(motor) || motor.asked_ns >= asked.since_ns) continue;
+    if (motor.program_may_go_on) continue;
     motor.stopped_at = plant_steps(motor);
   }
 }
@@ -79,7 +87,10 @@ void Witness::disarm_accepted(const Request& request) {
 // What is being stopped, and what waits for the trigger, is left alone. Jogs end.
 void Witness::pause_accepted(TimeNs now_ns, const Request& request) {
   for (Motor& motor : motors_) {
-    if (!concerns(request, motor) || !motor.move) continue;
+    if (!concerns(request, motor)) continue;
+    if (motor.program && request.ask == Ask::kResume) motor.is_asked_for(now_ns);
+    if (motor.program) motor.stops |= request.ask == Ask::kPause;  // one that has not begun ends
+    if (!motor.move) continue;
     Asked& asked = asked_.at(*motor.move);
     if (request.ask == Ask::kResume) {
       motor.is_asked_for(now_ns);
@@ -291,6 +302,10 @@ void Witness::configured(TimeNs now_ns, const Asked& asked, const api::Completed
 void Witness::watch(TimeNs now_ns) {
   watch_ways();
   for (std::size_t i = 0; i < motors_.size(); ++i) {
+    // One without a host goes on when the daemon ends, and no emergency stop reaches it then.
+    const Motor& of = motors_[i];
+    const bool without_host = config_.mcus[of.mcu].programs_without_host;
+    if (without_host && (of.program || of.program_may_go_on)) continue;
     const auto wrong = beginnings_.watch(now_ns, i, plant_steps(motors_[i]));
     if (wrong) violated(now_ns, motors_[i].name + *wrong);
   }
@@ -351,6 +366,7 @@ void Witness::check_deadlines(TimeNs now_ns) {
   }
   for (Motor& motor : motors_) {
     ++motor.idle_checks;
+    if (motor.program || motor.program_may_go_on) motor.idle_checks = 0;
     if (is_of_module(motor) && motor.pauses) crates_.wait_since(now_ns);
     if (motor.held && !motor.held_at && motor.idle_checks > kIdleChecks) {
       motor.held_at = plant_steps(motor);

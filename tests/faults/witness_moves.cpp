@@ -48,6 +48,8 @@ void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   if (request.ask == Ask::kHold || request.ask == Ask::kRelease) hold_accepted(request);
   if (request.ask == Ask::kConfigure) configure_accepted(asked);
   if (request.ask == Ask::kJog) return jog_accepted(now_ns, key, asked);
+  if (request.ask == Ask::kPutProgram) return put_accepted(request);
+  if (request.ask == Ask::kRunPrograms) return programs_accepted(now_ns, key, asked);
   for (std::size_t i = 0; i < request.motors.size(); ++i) {
     Motor& motor = *find(request.motors[i]);
     if (request.is_move() || request.ask == Ask::kHome) {
@@ -69,6 +71,7 @@ void Witness::accepted_motion(TimeNs now_ns, const Key& key, Asked& asked, std::
   Motor& motor = *find(request.motors[i]);
   const std::int64_t stands = plant_steps(motor);
   if (motor.held) violated(now_ns, motor.name + " is held, and may move: " + text_of(request));
+  leave_program(now_ns, motor, request);
   motor.is_asked_for(now_ns);
   forget_unbegun(motor);
   std::optional<std::int64_t> target;
@@ -209,6 +212,8 @@ void Witness::finished(TimeNs now_ns, const Key& key, const Asked& asked,
   if (request.ask == Ask::kPause) paused(now_ns, key, completed.reason);
   if (request.is_stop() && done) stop_is_done(asked, completed.reason);
   if (request.ask == Ask::kJog && asked.jog) jogged(now_ns, asked, completed);
+  if (request.ask == Ask::kPutProgram) put_finished(request, completed);
+  if (request.ask == Ask::kRunPrograms) programs_ended(now_ns, key, asked, completed);
   if (request.ask == Ask::kCamac) {
     crate_answered(now_ns, request, std::get<api::CamacResult>(completed.detail));
   }

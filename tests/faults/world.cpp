@@ -24,8 +24,6 @@ constexpr std::uint32_t kFaultStream = 300;  // and one for each kind of fault
 bushd::sim::McuOptions mcu_options(const bushd::config::Mcu& mcu, std::size_t index,
                                    std::int64_t crystal_ppm, bushd::sim::Random& random) {
   bushd::sim::McuOptions options;
-  // The witness has no model of programs of MCUs; so codes that rise and fall are refused.
-  options.disabled_capabilities = BUSHD_CAN_PROGRAM;
   options.address = mcu.address.value;
   options.boot_number = static_cast<std::uint16_t>(1000 * (index + 1));
   options.boot_ns = random.between(0, 3 * kMs);
@@ -77,6 +75,8 @@ void World::add_mcus() {
   const std::size_t present = config_.mcus.size() - options_.absent_mcus;
   for (std::size_t i = 0; i < config_.mcus.size(); ++i) {
     auto options = mcu_options(config_.mcus[i], i, options_.crystal_ppm, random);
+    // The models of CAMAC modules know no program that an MCU makes of codes which rise and fall.
+    if (!config_.crates.empty()) options.disabled_capabilities = BUSHD_CAN_PROGRAM;
     if (i >= present) options.boot_ns = kNever / 2;
     if (i < present && i + options_.late_mcus >= present) {
       options.boot_ns = late.between(kSecond, kHour / 6);
@@ -216,6 +216,7 @@ void World::be_well(TimeNs began_ns) {
     run_until(std::min(now_ns_ + 100 * kMs, began_ns + kWellAfterNs));
     // What a client has switched off or stopped only a client sets going again.
     mail_.send(now_ns_, clients_.emergency() ? clients_.clear_all() : clients_.enable_all());
+    if (witness_.program_may_go_on()) mail_.send(now_ns_, clients_.stop_all());
     if (bare_ && bare_->not_ready()) bare_->clear_faults();
   }
   if (ready() || witness_.violation()) return;
@@ -267,7 +268,7 @@ void World::reset_mcu() {
 void World::take_power_of(std::size_t mcu, TimeNs for_ns) {
   bus_.reboot(mcu, for_ns);
   plant_.cut(mcu);
-  witness_.positions().mcu_reset(mcu);
+  witness_.mcu_reset(mcu);
   overheard_->mcu_reset(mcu);
   mcus_up_ns_ = std::max(mcus_up_ns_, now_ns_ + for_ns);
 }
