@@ -30,8 +30,10 @@ class Beginnings {
     since_ns_.reset();
     ends_ = false;
   }
-  // From time to time, of each motor. Why what it has done was not to be.
-  std::optional<std::string> watch(TimeNs now_ns, std::size_t motor, std::int64_t steps);
+  // From time to time, of each motor; one that `goes_on` whatever the daemon does may begin. Why
+  // what it has done was not to be.
+  std::optional<std::string> watch(TimeNs now_ns, std::size_t motor, std::int64_t steps,
+                                   bool goes_on);
 
  private:
   // Until what an MCU had been told before is under way: an edge that came within the second in

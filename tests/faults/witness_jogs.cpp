@@ -305,8 +305,8 @@ void Witness::watch(TimeNs now_ns) {
     // One without a host goes on when the daemon ends, and no emergency stop reaches it then.
     const Motor& of = motors_[i];
     const bool without_host = config_.mcus[of.mcu].programs_without_host;
-    if (without_host && (of.program || of.program_may_go_on)) continue;
-    const auto wrong = beginnings_.watch(now_ns, i, plant_steps(motors_[i]));
+    const bool goes_on = without_host && (of.program || of.program_may_go_on);
+    const auto wrong = beginnings_.watch(now_ns, i, plant_steps(of), goes_on);
     if (wrong) violated(now_ns, motors_[i].name + *wrong);
   }
   const bool second = second_ns_ >= 0 && now_ns - second_ns_ < 5 * kSecond;

@@ -55,6 +55,7 @@ void Witness::accepted(TimeNs now_ns, const Key& key, Asked& asked) {
     if (request.is_move() || request.ask == Ask::kHome) {
       accepted_motion(now_ns, key, asked, i);
     } else if (request.ask == Ask::kSetPosition) {
+      leave_program(now_ns, motor, request);
       position_accepted(request, i);
       motor.set_ns = now_ns;
       motor.range.reset();

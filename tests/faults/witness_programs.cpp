@@ -52,7 +52,7 @@ void Witness::leave_program(TimeNs now_ns, Motor& motor, const Request& request)
   if (!motor.program) return;
   const Asked& asked = asked_.at(*motor.program);
   if (asked.request.programs.size() == 1 && second_ns_ < asked.since_ns) {
-    violated(now_ns, motor.name + " is in a program, and may move: " + text_of(request));
+    violated(now_ns, motor.name + " is in a program, which has not ended: " + text_of(request));
   }
   motor.program.reset();
 }
