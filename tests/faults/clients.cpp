@@ -15,6 +15,7 @@ namespace {
 constexpr std::int64_t kLongestMove = 6000;
 constexpr std::uint32_t kClientsStream = 100;  // of randomness
 constexpr std::uint32_t kShutterStream = 421;
+constexpr std::uint32_t kLawStream = 422;
 using bushd::sim::TimeNs;
 
 bool begins_motion(CommandKind kind) {
@@ -51,7 +52,8 @@ Clients::Clients(const bushd::config::Config& config, const Witness& witness,
       joggers_(seed),
       programs_(config, seed),
       mcu_programs_(config, seed),
-      random_of_shutter_(seed, kShutterStream) {
+      random_of_shutter_(seed, kShutterStream),
+      random_of_laws_(seed, kLawStream) {
   if (const auto motor = ShutterPlace::motor(config)) shutter_ = config[*motor].name;
 }
 

@@ -75,6 +75,7 @@ class Clients {
   Request move_or_retarget();
   Request move_with_legs();
   Request move_along_line();
+  void be_elementary(Request& line) const;
   Request arm_line();
   Request jog();
   Request pause_or_hold();
@@ -106,6 +107,7 @@ class Clients {
   McuPrograms mcu_programs_;
   std::string shutter_{};                         // name of its motor, if there is one
   mutable bushd::sim::Random random_of_shutter_;  // who moves it beside its programs
+  bushd::sim::Random random_of_laws_;             // of lines
   struct Later {
     bushd::sim::TimeNs after_ns;
     bushd::sim::TimeNs due_ns;  // 0: it has only just been thought of

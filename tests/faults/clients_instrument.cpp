@@ -114,7 +114,19 @@ Request Clients::move_along_line() {
     request.speed_micro = random_.magnitude(100, 3'000) * 1'000'000;
     request.speed_in_steps = true;
   }
+  if (request.line && random_of_laws_.one_in(3)) be_elementary(request);
   return request;
+}
+
+// Of one MCU, since no other law steps motors of several in one order.
+void Clients::be_elementary(Request& line) const {
+  const bushd::McuId mcu = config_.motors[index_of(line.motors.front())].mcu;
+  for (std::size_t i = line.motors.size(); i-- > 1;) {
+    if (config_.motors[index_of(line.motors[i])].mcu == mcu) continue;
+    line.motors.erase(line.motors.begin() + static_cast<std::ptrdiff_t>(i));
+    line.steps.erase(line.steps.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  line.elementary = true;
 }
 
 // Every second one of motors with one table and equal ways. Most others get a table of their own

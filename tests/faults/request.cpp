@@ -76,7 +76,8 @@ api::MoveLine line_of(const Request& request) {
   return {
       .kind = request.ask == Ask::kMoveTo ? api::Move::Kind::kAbsolute : api::Move::Kind::kRelative,
       .motors = motor_steps(request),
-      .speed = speed_of(request)};
+      .speed = speed_of(request),
+      .law = request.elementary ? api::MoveLine::Law::kElementary : api::MoveLine::Law::kLeading};
 }
 
 api::Edge edge_of(const Request& request) {
@@ -147,10 +148,12 @@ api::Follow follow_of(const Request& request) {
 std::string_view word_of(const Request& request) {
   switch (request.ask) {
     case Ask::kMoveBy:
+      if (request.elementary) return "elementary line by";
       return request.line ? "line by" : "move by";
     case Ask::kMoveTo:
       if (!request.points.empty()) return request.exact ? "exact path to" : "path to";
       if (request.trajectory != 0) return "follow to";
+      if (request.elementary) return "elementary line to";
       return request.line ? "line to" : "move to";
     case Ask::kArm:
       if (request.line) return request.rising ? "arm line (rising)" : "arm line (falling)";

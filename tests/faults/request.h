@@ -67,6 +67,7 @@ struct Request {
   std::vector<std::int64_t> steps{};   // as many as motors
   bool user = false;                   // they are millionths of each motor's unit
   bool line = false;                   // kMoveBy, kMoveTo, kArm: all on one way
+  bool elementary = false;             // a line: by that law
   std::vector<std::int64_t> points{};  // of a path, or a trajectory, row by row, in millionths
   std::vector<double> point_speeds{};  // of a path of one motor: to each point
   bool exact = false;                  // a path: with a rest at each point
