@@ -170,7 +170,10 @@ event::Ended Motor::ran_out() {
 }
 
 event::Ended Motor::stopped() {
-  event::Ended event = ended(Outcome::kStopped, "stopped on request");
+  const bool by_others = is<OnLine>() && moving_now().by_others;
+  event::Ended event =
+      ended(Outcome::kStopped,
+            by_others ? "ramped down with the others of its line" : "stopped on request");
   event.by_plan = true;
   return event;
 }

@@ -6,17 +6,17 @@
 #include <vector>
 
 #include "engine/frame.h"
-#include "positions.h"
 #include "sim/bus.h"
 #include "sim/plant.h"
 #include "skew.h"
+#include "witness.h"
 
 namespace bushfaults {
 
 class Overheard {
  public:
   // All of them outlive it. Takes Bus::on_mcu_byte.
-  Overheard(bushd::sim::Bus& bus, bushd::sim::Plant& plant, Skew& skew, Positions& positions);
+  Overheard(bushd::sim::Bus& bus, bushd::sim::Plant& plant, Skew& skew, Witness& witness);
   ~Overheard();
   Overheard(const Overheard&) = delete;
   Overheard& operator=(const Overheard&) = delete;
@@ -32,7 +32,7 @@ class Overheard {
   bushd::sim::Bus& bus_;
   bushd::sim::Plant& plant_;
   Skew& skew_;
-  Positions& positions_;
+  Witness& witness_;
   std::vector<bushd_receiver> receiver_;  // by MCU
   std::uint64_t emergencies_ = 0;
 };

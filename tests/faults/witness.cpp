@@ -42,6 +42,7 @@ Witness::Witness(const bushd::config::Config& config, const bushd::sim::Bus& bus
   }
   states_.resize(config.mcus.size());
   present_.resize(config.mcus.size(), true);
+  heard_ns_.resize(config.mcus.size(), 0);
 }
 
 void Witness::violated(TimeNs now_ns, const std::string& what) {

@@ -54,6 +54,8 @@ class Witness {
     beginnings_.other_daemon();
   }
   void mcu_reset(std::size_t mcu);
+  // It has received a frame for it, of whoever.
+  void is_heard(TimeNs now_ns, std::size_t mcu) { heard_ns_[mcu] = now_ns; }
   // A program that a daemon before has run, or whose MCU was lost, may be under way.
   bool program_may_go_on() const;
   // Its limit switch is, or was until now, active.
@@ -170,6 +172,7 @@ class Witness {
     TimeNs set_ns = -1;            // when somebody said where it stands, the last time
     int idle_checks = 0;           // of the deadlines, while no motion of it was open
     std::optional<std::int64_t> held_at{};
+    std::int64_t watched_at = 0;     // where it stood when it was watched last
     std::optional<Key> program{};    // the run of it in which it is
     bool program_may_go_on = false;  // it was in one, and nobody knows whether that has ended
     TimeNs asked_ns = -1;            // when somebody asked for a motion of it, the last time
@@ -315,6 +318,7 @@ class Witness {
                      std::size_t first, const std::vector<McuProgram>& texts);
   void leave_program(TimeNs now_ns, Motor& motor, const Request& request);
   void forget_programs();
+  bool goes_on_alone(const Motor& motor) const;
   // CAMAC modules, which ask for motion themselves.
   void asked_by_module(TimeNs now_ns, const std::string& client, const std::string& what,
                        const std::string& motor);
@@ -359,7 +363,8 @@ class Witness {
   std::map<Key, Asked> asked_;
   std::deque<Key> finished_;  // of asked_, oldest first
   std::vector<std::optional<bushd::api::StateSnapshot>> states_;
-  std::vector<bool> present_;  // by MCU
+  std::vector<bool> present_;     // by MCU
+  std::vector<TimeNs> heard_ns_;  // by MCU: when it has heard somebody, the last time
   bool ready(std::size_t mcu) const;
   std::map<std::string, std::uint64_t> moves_by_result_;
   std::map<std::string, std::uint64_t> homings_by_result_;

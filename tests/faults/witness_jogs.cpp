@@ -29,6 +29,10 @@ constexpr int kIdleChecks = 4;
 // at 2500 steps/s, in the latency of the worst adapter, by which a daemon may misjudge the bus's
 // time, and two ticks.
 constexpr std::int64_t kEventSteps = 60;
+// What an MCU does that hears nobody: an edge that comes within a second is taken, its motor begins
+// after at most 1.65 s, and ramps down from there, at most as long as the longest delay and the
+// ramp of the slowest table here.
+constexpr TimeNs kSilentAfterNs = 5 * kSecond;
 
 }  // namespace
 
@@ -302,12 +306,14 @@ void Witness::configured(TimeNs now_ns, const Asked& asked, const api::Completed
 void Witness::watch(TimeNs now_ns) {
   watch_ways();
   for (std::size_t i = 0; i < motors_.size(); ++i) {
-    // One without a host goes on when the daemon ends, and no emergency stop reaches it then.
-    const Motor& of = motors_[i];
-    const bool without_host = config_.mcus[of.mcu].programs_without_host;
-    const bool goes_on = without_host && (of.program || of.program_may_go_on);
-    const auto wrong = beginnings_.watch(now_ns, i, plant_steps(of), goes_on);
-    if (wrong) violated(now_ns, motors_[i].name + *wrong);
+    Motor& motor = motors_[i];
+    const std::int64_t stands = plant_steps(motor);
+    const bool alone = goes_on_alone(motor);
+    const auto wrong = beginnings_.watch(now_ns, i, stands, alone);
+    if (wrong) violated(now_ns, motor.name + *wrong);
+    const bool moved = std::exchange(motor.watched_at, stands) != stands;
+    if (!moved || alone || now_ns - heard_ns_[motor.mcu] <= kSilentAfterNs) continue;
+    violated(now_ns, motor.name + " moves, and its MCU has heard nobody for long");
   }
   const bool second = second_ns_ >= 0 && now_ns - second_ns_ < 5 * kSecond;
   for (Motor& motor : motors_) {

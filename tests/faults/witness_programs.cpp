@@ -29,6 +29,12 @@ bool Witness::program_may_go_on() const {
   return std::ranges::any_of(motors_, [](const Motor& motor) { return motor.program_may_go_on; });
 }
 
+// It may be in a program that goes on whatever becomes of the daemon.
+bool Witness::goes_on_alone(const Motor& motor) const {
+  return config_.mcus[motor.mcu].programs_without_host &&
+         (motor.program || motor.program_may_go_on);
+}
+
 // The daemon's: what it had asked of MCUs may be under way.
 void Witness::forget_programs() {
   for (Motor& motor : motors_) {

@@ -59,7 +59,7 @@ World::World(const Options& options, bushd::config::Config config, bushd::config
     witness_.positions().keep();
     witness_.keep_offsets();
   }
-  overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_.positions());
+  overheard_ = std::make_unique<Overheard>(bus_, plant_, skew_, witness_);
   inputs_ = std::make_unique<Inputs>(config_, bus_, plant_, witness_, options.seed);
   second_ = std::make_unique<SecondDaemon>(config_, bus_, recent_, options.seed);
   for (std::size_t i = 0; i < kFaultKinds; ++i) {
