@@ -118,7 +118,7 @@ Request Clients::move_along_line() {
   return request;
 }
 
-// Of one MCU, since no other law steps motors of several in one order.
+// All of one MCU: the law has one order of steps.
 void Clients::be_elementary(Request& line) const {
   const bushd::McuId mcu = config_.motors[index_of(line.motors.front())].mcu;
   for (std::size_t i = line.motors.size(); i-- > 1;) {

@@ -52,7 +52,7 @@ void Witness::put_finished(const Request& request, const api::Completed& complet
   if (done && !request.program.dry_run) programs_put_[request.program.name] = {request.program};
 }
 
-// Of several that began together one may have ended: that is told with the end of the last one.
+// One of several that began together may have ended: that is told with the end of the last one.
 void Witness::leave_program(TimeNs now_ns, Motor& motor, const Request& request) {
   motor.program_may_go_on = false;
   if (!motor.program) return;
@@ -95,7 +95,7 @@ void Witness::programs_accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   if (i != request.motors.size()) violated(now_ns, "other motors: " + text_of(request));
 }
 
-// Of each program by itself, unless something else has been asked of its motors since it ended.
+// Each program is judged by itself, unless something else has been asked of its motors since it ended.
 void Witness::programs_ended(TimeNs now_ns, const Key& key, const Asked& asked,
                              const api::Completed& completed) {
   ++programs_by_result_[std::string(word(completed.outcome))];
