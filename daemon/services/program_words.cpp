@@ -58,7 +58,9 @@ ProgramEnd end_of_program(const bushd_program_state& state, const Mcu& mcu) {
       return {Outcome::kFault,
               "it leads a motor beyond where it may go; start it from elsewhere, or change it"};
     case BUSHD_PROGRAM_NO_INPUT:
-      return {Outcome::kFault, "the input has not come within longest_s"};
+      return {
+          Outcome::kFault,
+          "the input has not come within longest_s, or within the way of the move that it ends"};
     case BUSHD_PROGRAM_REFUSED:
       return {Outcome::kFault,
               "MCU " + mcu.name() +

@@ -86,7 +86,7 @@ static bushd_status check_kinds(const bushd_mcu* mcu, const bushd_program* progr
     if (travel && (disabled & BUSHD_CAN_TRAVEL) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
     const bool pulse = frame.kind == BUSHD_PROGRAM_PULSE;
     if (pulse && (disabled & BUSHD_CAN_POSITION_COMPARE) != 0) return BUSHD_E_UNKNOWN_MESSAGE;
-    const bool waits = frame.kind == BUSHD_PROGRAM_WAIT_INPUT;
+    const bool waits = bushd_program_has_input(frame.kind);
     const bool of_motor = frame.input < BUSHD_PROGRAM_SYSTEM_INPUT;
     if (waits && of_motor && frame.input >= mcu->config.motors) return BUSHD_E_FORMAT;
   }
@@ -232,9 +232,10 @@ static bool is_waiting(const bushd_mcu_program* p) {
          (p->frame.kind == BUSHD_PROGRAM_WAIT || p->frame.kind == BUSHD_PROGRAM_WAIT_INPUT);
 }
 
-// From where it was: not a travel, nor codes that are to be made as they are written.
+// From where it was: not a travel, nor codes that are to be made as they are written, nor what an
+// input ends.
 static bool can_go_on(const bushd_mcu* mcu, const bushd_program_frame* frame) {
-  if (frame->kind == BUSHD_PROGRAM_TRAVEL) return false;
+  if (frame->kind == BUSHD_PROGRAM_TRAVEL || frame->kind == BUSHD_PROGRAM_MOVE_UNTIL) return false;
   return !bushd_program_is_line(frame->kind) ||
          !bushd_mcu_is_written(mcu->config.scratch, frame->bank);
 }

@@ -51,6 +51,7 @@ typedef struct bushd_mcu_program {
   bushd_program_frame frame;  // the present one
   bool has_frame : 1;         // one is under way
   bool pulsed : 1;
+  bool met : 1;  // MOVE_UNTIL: the input has shown its level
   bool resumes : 1;
   uint8_t depth;
   bushd_mcu_repeat repeat[BUSHD_PROGRAM_MOST_DEPTH];

@@ -257,6 +257,47 @@ static bool shows_level(const bushd_mcu* mcu) {
   return active == frame->level;
 }
 
+// Moves until an input.
+
+// The running step is the first of those that are made after it. Fewer than a ramp-down takes are
+// not made up for; those that lie beyond the frame's way are not made.
+static void shorten_run(bushd_mcu* mcu, uint8_t m) {
+  const bushd_mcu_program* p = mcu->config.program;
+  bushd_mcu_motor* motor = &mcu->motor[m];
+  bushd_run* run = &motor->made.run;
+  const uint32_t left = bushd_run_steps_left(run);
+  const uint32_t after = p->frame.after_steps;
+  if (after >= left) return;
+  const bushd_program_entry entry = bushd_program_entry_of(&p->frame, 0, 0);
+  const bool ends_there = after != 0 && bushd_run_retarget(run, after - 1u, entry.shortest_delay);
+  if (!ends_there) bushd_run_ramp_down(run);
+  uint32_t ticks = 0;
+  uint32_t spare_ns;
+  // It is no longer than it was.
+  (void)bushd_mcu_ticks_of_run(run, mcu->tick_ns, &ticks, &spare_ns);
+  motor->made.until = motor->known_until = mcu->tick + 1u + ticks;
+}
+
+static void look_at_input(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  if (p->met || !shows_level(mcu)) return;
+  p->met = true;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    if ((p->moving & motor_bit(m)) != 0 && mcu->motor[m].mode == BUSHD_MCU_TABLE_RUN) {
+      shorten_run(mcu, m);
+    }
+  }
+}
+
+static bool has_moved_until(bushd_mcu* mcu) {
+  bushd_mcu_program* p = mcu->config.program;
+  look_at_input(mcu);
+  look_after_runs(mcu);
+  if (p->moving != 0) return false;
+  if (!p->met) end_now(mcu, BUSHD_PROGRAM_NO_INPUT);
+  return p->met;
+}
+
 // Frames.
 
 // Whether the present frame, or this point of it, is over; it may end the program instead.
@@ -271,6 +312,8 @@ static bool is_over(bushd_mcu* mcu) {
       return false;
     case BUSHD_PROGRAM_TRAVEL:
       return has_travelled(mcu);
+    case BUSHD_PROGRAM_MOVE_UNTIL:
+      return has_moved_until(mcu);
     case BUSHD_PROGRAM_PULSE:
       if (!p->pulsed) p->pulsed = bushd_mcu_pulse_now(mcu, p->frame.us);
       return p->pulsed;
@@ -304,7 +347,7 @@ static void begin_frame(bushd_mcu* mcu) {
   p->frame = bushd_next_program_frame(&p->program, &p->at);
   ++p->next_frame;
   p->point = 0;
-  p->pulsed = false;
+  p->pulsed = p->met = false;
   p->has_frame = true;
   switch (p->frame.kind) {
     case BUSHD_PROGRAM_END:
@@ -328,6 +371,11 @@ static void begin_frame(bushd_mcu* mcu) {
       break;
     case BUSHD_PROGRAM_TRAVEL:
       begin_travel(mcu);
+      break;
+    case BUSHD_PROGRAM_MOVE_UNTIL:
+      // No step where the input shows its level already.
+      p->met = shows_level(mcu);
+      if (!p->met) begin_point(mcu);
       break;
     default:
       begin_point(mcu);

@@ -58,7 +58,7 @@ typedef enum bushd_program_reason {
   BUSHD_PROGRAM_SILENCE = 4,    // no master was heard
   BUSHD_PROGRAM_LIMIT = 5,      // a limit inhibits the direction of a motor
   BUSHD_PROGRAM_RANGE = 6,      // a frame leads beyond what its motor's part allows
-  BUSHD_PROGRAM_NO_INPUT = 7,   // WAIT_INPUT has waited for its longest
+  BUSHD_PROGRAM_NO_INPUT = 7,   // WAIT_INPUT has waited for its longest, MOVE_UNTIL has made all
   BUSHD_PROGRAM_REFUSED = 8,    // a motion that the MCU cannot make: another line is under way
   BUSHD_PROGRAM_DISABLED = 9,   // the drivers are disabled
   BUSHD_PROGRAM_LATE = 10,      // the ticks of the bus have changed before its first tick

@@ -56,6 +56,11 @@ static bushd_program_frame get_frame(reader* r) {
     case BUSHD_PROGRAM_TRAVEL:
       get_travel(r, &frame);
       break;
+    case BUSHD_PROGRAM_MOVE_UNTIL:
+      frame.input = get8(r);
+      frame.level = get8(r) != 0;
+      frame.after_steps = get32(r);
+      break;
     case BUSHD_PROGRAM_WAIT:
     case BUSHD_PROGRAM_PULSE:
       frame.us = get32(r);
@@ -88,12 +93,20 @@ static bool travel_in_range(const bushd_program_frame* frame) {
          frame->us <= BUSHD_TRAVEL_MAX_WAIT_US;
 }
 
+// Levels are in the byte behind the input's.
+static bool input_in_range(const bushd_program_frame* frame, uint8_t level) {
+  return frame->input < BUSHD_PROGRAM_INPUTS && level <= 1;
+}
+
 // `at`: where it begins. A level of 2 is the same as 1 to who reads it, and is refused here.
 static bool in_range(const bushd_program_frame* frame, const uint8_t* at, uint16_t motors) {
   switch (frame->kind) {
     case BUSHD_PROGRAM_MOVE_TO:
     case BUSHD_PROGRAM_MOVE_BY:
       return frame->motors != 0 && (frame->motors & ~motors) == 0;
+    case BUSHD_PROGRAM_MOVE_UNTIL:
+      return (frame->motors & ~motors) == 0 && frame->motor_count == 1 &&
+             frame->after_steps <= INT32_MAX && input_in_range(frame, at[4]);
     case BUSHD_PROGRAM_LINE_TO:
     case BUSHD_PROGRAM_LINE_BY:
       return frame->motors != 0 && (frame->motors & ~motors) == 0 &&
@@ -103,8 +116,7 @@ static bool in_range(const bushd_program_frame* frame, const uint8_t* at, uint16
     case BUSHD_PROGRAM_WAIT:
       return frame->us >= 1 && frame->us <= BUSHD_PROGRAM_MOST_WAIT_US;
     case BUSHD_PROGRAM_WAIT_INPUT:
-      return frame->input < BUSHD_PROGRAM_INPUTS && at[2] <= 1 &&
-             frame->us <= BUSHD_PROGRAM_MOST_WAIT_US;
+      return input_in_range(frame, at[2]) && frame->us <= BUSHD_PROGRAM_MOST_WAIT_US;
     case BUSHD_PROGRAM_PULSE:
       return frame->us >= 1 && frame->us <= BUSHD_PROGRAM_MOST_PULSE_US;
     default:

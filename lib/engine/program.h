@@ -51,11 +51,12 @@ enum {
   FRAME(PULSE, 7, 4, 0)             \
   FRAME(REPEAT, 8, 2, 0)            \
   FRAME(NEXT, 9, 0, 0)              \
-  FRAME(TRAVEL, 10, 12, 4)
+  FRAME(TRAVEL, 10, 12, 4)          \
+  FRAME(MOVE_UNTIL, 11, 8, 6)
 
 #define BUSHD_PROGRAM_KIND(name, code, own, motor) BUSHD_PROGRAM_##name = (code),
 typedef enum bushd_program_kind {
-  BUSHD_PROGRAM_FRAMES(BUSHD_PROGRAM_KIND) BUSHD_PROGRAM_KINDS = 11
+  BUSHD_PROGRAM_FRAMES(BUSHD_PROGRAM_KIND) BUSHD_PROGRAM_KINDS = 12
 } bushd_program_kind;
 #undef BUSHD_PROGRAM_KIND
 
@@ -83,6 +84,7 @@ typedef struct bushd_program_frame {
   bool elementary;          // a line by engine/elementary.h, not by engine/line.h
   uint16_t shortest_delay;  // of a line; of moves each motor has its own
   uint16_t points;          // of a line; 1 of a move and of TRAVEL
+  uint32_t after_steps;     // MOVE_UNTIL: from the input's change on
   uint32_t us;              // WAIT; the longest one of WAIT_INPUT, 0: for ever; PULSE; until the
                             // return of TRAVEL
   uint32_t delay_us;        // from the edge to the first run of TRAVEL
@@ -94,7 +96,7 @@ typedef struct bushd_program_frame {
 } bushd_program_frame;
 
 typedef struct bushd_program_entry {
-  int32_t steps;            // a position, or a distance; the first run of TRAVEL
+  int32_t steps;  // a position, or a distance; the first run of TRAVEL; MOVE_UNTIL: at most
   uint16_t shortest_delay;  // of moves
 } bushd_program_entry;
 
@@ -119,10 +121,16 @@ static inline bool bushd_program_is_line(uint8_t kind) {
   return kind == BUSHD_PROGRAM_LINE_TO || kind == BUSHD_PROGRAM_LINE_BY;
 }
 static inline bool bushd_program_is_move(uint8_t kind) {
-  return kind == BUSHD_PROGRAM_MOVE_TO || kind == BUSHD_PROGRAM_MOVE_BY;
+  return kind == BUSHD_PROGRAM_MOVE_TO || kind == BUSHD_PROGRAM_MOVE_BY ||
+         kind == BUSHD_PROGRAM_MOVE_UNTIL;
+}
+// It has an input and its level.
+static inline bool bushd_program_has_input(uint8_t kind) {
+  return kind == BUSHD_PROGRAM_WAIT_INPUT || kind == BUSHD_PROGRAM_MOVE_UNTIL;
 }
 static inline bool bushd_program_is_relative(uint8_t kind) {
-  return kind == BUSHD_PROGRAM_MOVE_BY || kind == BUSHD_PROGRAM_LINE_BY;
+  return kind == BUSHD_PROGRAM_MOVE_BY || kind == BUSHD_PROGRAM_LINE_BY ||
+         kind == BUSHD_PROGRAM_MOVE_UNTIL;
 }
 
 #ifdef __cplusplus

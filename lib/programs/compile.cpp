@@ -131,9 +131,27 @@ class Compiler {
     return mask;
   }
 
+  Result<void> put_until(const Move& move) {
+    std::size_t i = 0;
+    while (!move.to[i]) ++i;
+    const auto after = steps_of(i, move.until->after, true);
+    if (!after) return fail("after: " + after.error().text());
+    const std::int64_t steps = *after;
+    out_.put(move.until->input, 1);
+    out_.put(move.until->active ? 1 : 0, 1);
+    out_.put(static_cast<std::uint64_t>(std::abs(steps)), 4);
+    return {};
+  }
+
   Result<void> put_move(const Move& move) {
-    out_.put(move.relative ? BUSHD_PROGRAM_MOVE_BY : BUSHD_PROGRAM_MOVE_TO, 1);
+    const auto kind = move.until      ? BUSHD_PROGRAM_MOVE_UNTIL
+                      : move.relative ? BUSHD_PROGRAM_MOVE_BY
+                                      : BUSHD_PROGRAM_MOVE_TO;
+    out_.put(kind, 1);
     out_.put(mask_of(move.to), 2);
+    if (move.until) {
+      if (auto put = put_until(move); !put) return put;
+    }
     for (const std::size_t i : by_output_) {
       if (!move.to[i]) continue;
       const auto steps = steps_of(i, *move.to[i], move.relative);

@@ -69,7 +69,9 @@ class FrameReader {
   }
 
   Result<Move> move(const char* key, bool relative) const {
-    if (auto only = toml_.only({key, "speed"}); !only) return fail(only.error());
+    const auto only = relative ? toml_.only({key, "speed", "until_input", "active", "after"})
+                               : toml_.only({key, "speed"});
+    if (!only) return fail(only.error());
     Move move{.relative = relative, .to = {}};
     auto to = toml_.table(key) != nullptr ? by_name(key) : by_order(key);
     if (!to) return fail(to.error());
@@ -77,7 +79,36 @@ class FrameReader {
     auto given = speed();
     if (!given) return fail(given.error());
     move.speed = *given;
+    auto ends = until(move);
+    if (!ends) return fail(ends.error());
+    move.until = *ends;
     return move;
+  }
+
+  Result<std::optional<Move::Until>> until(const Move& move) const {
+    if (!toml_.has("until_input")) {
+      for (const char* const key : {"active", "after"}) {
+        if (toml_.has(key)) return fail(toml_.error(key, "is beside until_input; add that"));
+      }
+      return std::optional<Move::Until>();
+    }
+    if (std::ranges::count_if(move.to, [](const auto& at) { return at.has_value(); }) != 1) {
+      return fail(toml_.error("until_input", "ends a move of one motor; name one in move_by"));
+    }
+    const auto number = input("until_input");
+    if (!number) return fail(number.error());
+    const auto level = active();
+    if (!level) return fail(level.error());
+    Move::Until until{.input = *number, .active = *level};
+    if (!toml_.has("after")) return std::optional(until);
+    constexpr const char* kAllowed = "a distance of 0 or more";
+    const auto after = toml_.number("after", kAllowed);
+    if (!after) return fail(after.error());
+    if (*after < 0) {
+      return fail(toml_.error("after", std::string("below 0; allowed: ") + kAllowed));
+    }
+    until.after = *after;
+    return std::optional(until);
   }
 
   Result<Line> line(const char* key, bool relative) const {
@@ -252,35 +283,36 @@ class FrameReader {
     return Wait{*us};
   }
 
-  Result<std::uint8_t> input() const {
-    constexpr const char* kKey = "wait_input";
-    if (!toml_.is_string(kKey)) {
-      const auto number = toml_.integer(kKey, 0, BUSHD_PROGRAM_SYSTEM_INPUT - 1);
+  Result<bool> active() const {
+    if (!toml_.has("active")) return true;
+    return toml_.boolean("active");
+  }
+
+  Result<std::uint8_t> input(const char* key) const {
+    if (!toml_.is_string(key)) {
+      const auto number = toml_.integer(key, 0, BUSHD_PROGRAM_SYSTEM_INPUT - 1);
       if (!number) return fail(number.error());
       return static_cast<std::uint8_t>(*number);
     }
-    const auto word = toml_.string(kKey, "");
+    const auto word = toml_.string(key, "");
     if (!word) return fail(word.error());
     for (const auto& [name, number] : kSystemInputs) {
       if (name == *word) return number;
     }
-    return fail(toml_.error(kKey, "\"" + *word +
-                                      "\"; allowed: 0 to 15, \"emergency\", "
-                                      "\"forward\", \"reverse\", \"trigger\""));
+    return fail(toml_.error(key, "\"" + *word +
+                                     "\"; allowed: 0 to 15, \"emergency\", "
+                                     "\"forward\", \"reverse\", \"trigger\""));
   }
 
   Result<WaitInput> wait_input() const {
     if (auto only = toml_.only({"wait_input", "active", "longest_s"}); !only) {
       return fail(only.error());
     }
-    const auto number = input();
+    const auto number = input("wait_input");
     if (!number) return fail(number.error());
-    WaitInput wait{.input = *number};
-    if (toml_.has("active")) {
-      const auto active = toml_.boolean("active");
-      if (!active) return fail(active.error());
-      wait.active = *active;
-    }
+    const auto level = active();
+    if (!level) return fail(level.error());
+    WaitInput wait{.input = *number, .active = *level};
     if (toml_.has("longest_s")) {
       const auto us = us_of("longest_s", BUSHD_PROGRAM_MOST_WAIT_US);
       if (!us) return fail(us.error());

@@ -28,6 +28,11 @@
 //     next = true
 //
 //     [[frame]]
+//     move_by = { x = 500 }          # at most
+//     until_input = "trigger"        # it ends when this is active
+//     after = 2.5                    # and so much farther; left out: it ramps down
+//
+//     [[frame]]
 //     travel_by = [60]               # to its limit switch and back
 //     after_edge_s = 0.15            # of each edge at the trigger input; left out: once, at once
 //     return_s = 0.3
@@ -51,9 +56,16 @@ namespace bushd::programs {
 using Point = std::vector<std::optional<double>>;
 
 struct Move {
+  // Ends a move of one motor by a distance.
+  struct Until {
+    std::uint8_t input = 0;  // as in the MCU (engine/program.h)
+    bool active = true;
+    double after = 0;  // a distance, without a sign; 0: a ramp-down
+  };
   bool relative = false;
   Point to;
   std::optional<double> speed = {};
+  std::optional<Until> until = {};
 };
 // All points have the same motors.
 struct Line {

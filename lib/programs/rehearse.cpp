@@ -24,6 +24,7 @@ class Walk {
         at_(program.frames) {
     for (const MotorPlace& motor : motors_) {
       out_.motors.push_back({motor.at_steps, motor.at_steps, motor.at_steps, 0});
+      behind_.push_back(0);
     }
     for (std::size_t i = 0; i < motors_.size(); ++i) of_output_[motors_[i].output] = i;
   }
@@ -75,6 +76,7 @@ class Walk {
         break;
       case BUSHD_PROGRAM_MOVE_TO:
       case BUSHD_PROGRAM_MOVE_BY:
+      case BUSHD_PROGRAM_MOVE_UNTIL:
         return move(frame);
       case BUSHD_PROGRAM_LINE_TO:
       case BUSHD_PROGRAM_LINE_BY:
@@ -131,14 +133,8 @@ class Walk {
                 " steps");
   }
 
-  Result<std::int64_t> go(const bushd_program_frame& frame, std::uint16_t point, std::uint8_t nth,
-                          std::size_t i) {
-    Rehearsal::Way& way = out_.motors[i];
-    const std::int64_t steps = bushd_program_entry_of(&frame, point, nth).steps;
-    const std::int64_t target =
-        bushd_program_is_relative(frame.kind) || frame.kind == BUSHD_PROGRAM_TRAVEL
-            ? way.end_steps + steps
-            : steps;
+  Result<void> within_limits(const bushd_program_frame& frame, std::uint16_t point, std::size_t i,
+                             std::int64_t target) const {
     const MotorPlace& motor = motors_[i];
     if (target < motor.least_steps || target > motor.most_steps) {
       const std::string of_point =
@@ -148,15 +144,39 @@ class Walk {
                   motor.coordinates.text(motor.least_steps) + " to " +
                   motor.coordinates.text(motor.most_steps));
     }
-    if (auto fits = within_its_range(i, target); !fits) return fail(fits.error());
-    const std::int64_t distance = std::abs(target - way.end_steps);
+    return within_its_range(i, target);
+  }
+
+  // Where an input has ended a move nobody knows where the motor is: between `end_steps` and so
+  // much behind it, until a frame names its position. Both ends are looked at.
+  Result<std::int64_t> go(const bushd_program_frame& frame, std::uint16_t point, std::uint8_t nth,
+                          std::size_t i) {
+    Rehearsal::Way& way = out_.motors[i];
+    const std::int64_t steps = bushd_program_entry_of(&frame, point, nth).steps;
+    const bool relative =
+        bushd_program_is_relative(frame.kind) || frame.kind == BUSHD_PROGRAM_TRAVEL;
+    const bool until = frame.kind == BUSHD_PROGRAM_MOVE_UNTIL;
+    const auto [low, high] = std::minmax({way.end_steps, way.end_steps - behind_[i]});
+    const std::int64_t from_low = relative ? low + steps : steps;
+    const std::int64_t from_high = relative ? high + steps : steps;
+    for (const std::int64_t end : {from_low, from_high}) {
+      if (auto fits = within_limits(frame, point, i, end); !fits) return fail(fits.error());
+      way.least_steps = std::min(way.least_steps, end);
+      way.most_steps = std::max(way.most_steps, end);
+    }
+    const std::int64_t distance = std::max(std::abs(from_low - low), std::abs(from_high - high));
     if (distance > INT32_MAX) {
-      return fail(text_.frames[frame_ - 1].place + ": motor \"" + motor.name +
+      return fail(text_.frames[frame_ - 1].place + ": motor \"" + motors_[i].name +
                   "\" would go more than 2^31 - 1 steps at once");
     }
-    way.end_steps = target;
-    way.least_steps = std::min(way.least_steps, target);
-    way.most_steps = std::max(way.most_steps, target);
+    if (steps >= 0 || !relative) {
+      way.end_steps = from_high;
+      behind_[i] = from_high - (until ? low : from_low);
+    } else {
+      way.end_steps = from_low;
+      behind_[i] = from_low - (until ? high : from_high);
+    }
+    out_.waits_for_inputs |= until;
     way.edges += static_cast<std::uint64_t>(distance);
     return distance;
   }
@@ -261,6 +281,7 @@ class Walk {
   std::uint32_t begun_ = 0;  // in this tick
   bool ended_ = false;
   std::vector<Pass> passes_;
+  std::vector<std::int64_t> behind_;  // by motor
   Rehearsal out_;
 };
 

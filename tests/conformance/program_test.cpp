@@ -115,6 +115,44 @@ TEST_P(ProgramScript, GoesOnInSilenceAsItsTwinDoes) {
   expect_alike();
 }
 
+// A move until an input, twice: at once with a ramp-down, then 60 steps after it.
+TEST_P(ProgramScript, AnInputEndsAMoveAsAtItsTwin) {
+  Bytes bytes = {BUSHD_PROGRAM_FORMAT, 0};
+  append(bytes, 1u << kFirst, 2);
+  bytes.push_back(0);
+  append(bytes, 0u - 5000u, 4);
+  append(bytes, 5000, 4);
+  for (const std::uint8_t after : {0, 60}) {
+    bytes.push_back(BUSHD_PROGRAM_MOVE_UNTIL);
+    append(bytes, 1u << kFirst, 2);
+    for (const std::uint8_t byte :
+         {std::uint8_t{kFirst}, static_cast<std::uint8_t>(after == 0 ? 1 : 0), after}) {
+      bytes.push_back(byte);
+    }
+    append(bytes, 0, 3);
+    append(bytes, 900, 4);
+    append(bytes, 0, 2);
+  }
+  bytes.push_back(BUSHD_PROGRAM_END);
+  ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kFirst}));
+  ASSERT_NO_FATAL_FAILURE(load(bytes));
+  const std::uint32_t first = master_.poll(kReal).tick + 40;
+  ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_RUN, 1, first));
+  // Far enough from the ends of ticks, of which each MCU has its own.
+  pass_ticks(80);
+  set_inputs({1u << kFirst, 0});
+  pass_ticks(60);
+  set_inputs({0, 0});
+  pass_ticks(200);
+  EXPECT_EQ(state(kReal).stage, BUSHD_PROGRAM_ENDED);
+  EXPECT_EQ(state(kReal).reason, BUSHD_PROGRAM_DONE);
+  const std::int32_t position = master_.poll(kReal).motor[kFirst].position_steps;
+  EXPECT_GT(position, 60);
+  EXPECT_LT(position, 1800);
+  expect_the_same_steps(kFirst, static_cast<std::size_t>(position));
+  expect_the_same_times(kFirst);
+}
+
 TEST_P(ProgramScript, StopsOnRequest) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_COARSE, {kFirst, kSecond}));
   ASSERT_NO_FATAL_FAILURE(load(program(0)));

@@ -38,14 +38,15 @@ bushd_status check(const Bytes& bytes, std::uint16_t own = 0xF) {
 
 TEST(Program, IsReadAsItWasWritten) {
   const Bytes bytes = program({
-      3, 3,    0,    7, 0x34, 0x12, 2,    0,    1, 0, 0, 0,
-      2, 0,    0,    0, 0xFF, 0xFF, 0xFF, 0xFF, 4, 0, 0, 0,  //
-      2, 2,    0,    9, 0,    0,    0,    8,    7,           //
-      5, 0x10, 0x27, 0, 0,                                   //
-      6, 19,   1,    1, 0,    0,    0,                       //
-      8, 3,    0,                                            //
-      7, 50,   0,    0, 0,                                   //
-      9,                                                     //
+      3,  3,    0,    7,    0x34, 0x12, 2, 0, 1, 0,    0,    0,    2,    0, 0,
+      0,  0xFF, 0xFF, 0xFF, 0xFF, 4,    0, 0, 0,                                //
+      2,  2,    0,    9,    0,    0,    0, 8, 7,                                //
+      5,  0x10, 0x27, 0,    0,                                                  //
+      6,  19,   1,    1,    0,    0,    0,                                      //
+      8,  3,    0,                                                              //
+      7,  50,   0,    0,    0,                                                  //
+      9,                                                                        //
+      11, 1,    0,    16,   0,    7,    0, 0, 0, 0xF6, 0xFF, 0xFF, 0xFF, 8, 7,  //
       0,
   });
   bushd_program read;
@@ -75,6 +76,13 @@ TEST(Program, IsReadAsItWasWritten) {
   EXPECT_EQ(bushd_next_program_frame(&read, &at).count, 3);
   EXPECT_EQ(bushd_next_program_frame(&read, &at).us, 50u);
   EXPECT_EQ(bushd_next_program_frame(&read, &at).kind, BUSHD_PROGRAM_NEXT);
+  frame = bushd_next_program_frame(&read, &at);
+  EXPECT_EQ(frame.kind, BUSHD_PROGRAM_MOVE_UNTIL);
+  EXPECT_EQ(frame.input, 16);
+  EXPECT_FALSE(frame.level);
+  EXPECT_EQ(frame.after_steps, 7u);
+  EXPECT_EQ(bushd_program_entry_of(&frame, 0, 0).steps, -10);
+  EXPECT_EQ(bushd_program_entry_of(&frame, 0, 0).shortest_delay, 0x0708);
   EXPECT_EQ(bushd_next_program_frame(&read, &at).kind, BUSHD_PROGRAM_END);
   EXPECT_EQ(at, read.end);
 }
@@ -108,7 +116,14 @@ TEST(Program, WhatIsOutOfRangeIsRefused) {
   EXPECT_EQ(check(program({0}), 1), BUSHD_E_FORMAT) << "the MCU has one motor";
   EXPECT_EQ(check({1, 0, 0, 0, 0}), BUSHD_E_FORMAT) << "no motor";
   const std::map<std::string, Bytes> frames = {
-      {"no such frame", {11}},
+      {"no such frame", {12}},
+      {"two motors until an input",
+       {11, 3, 0, 0, 1, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0}},
+      {"a motor that is not the program's, until an input",
+       {11, 4, 0, 0, 1, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0}},
+      {"until input 20", {11, 1, 0, 20, 1, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0}},
+      {"until level 2", {11, 1, 0, 0, 2, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0}},
+      {"too many steps after it", {11, 1, 0, 0, 1, 0, 0, 0, 0x80, 9, 0, 0, 0, 0, 0}},
       {"a travel of two motors", {10, 3, 0, 0, 0, 0, 0, 0, 0, 50, 0, 0, 0, 9, 0, 0, 0, 9, 0, 0, 0}},
       {"a travel of a motor that is not the program's",
        {10, 4, 0, 0, 0, 0, 0, 0, 0, 50, 0, 0, 0, 9, 0, 0, 0}},
@@ -160,7 +175,7 @@ TEST(Program, RandomBytesAreRefusedOrRead) {
   for (int i = 0; i < 200'000; ++i) {
     Bytes frames;
     for (std::size_t left = random() % 30; left > 0; --left) {
-      frames.push_back(static_cast<std::uint8_t>(random() % (random() % 2 == 0 ? 11 : 256)));
+      frames.push_back(static_cast<std::uint8_t>(random() % (random() % 2 == 0 ? 12 : 256)));
     }
     frames.push_back(0);
     const Bytes bytes = program(frames);

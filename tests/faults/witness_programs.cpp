@@ -95,7 +95,8 @@ void Witness::programs_accepted(TimeNs now_ns, const Key& key, Asked& asked) {
   if (i != request.motors.size()) violated(now_ns, "other motors: " + text_of(request));
 }
 
-// Each program is judged by itself, unless something else has been asked of its motors since it ended.
+// Each program is judged by itself, unless something else has been asked of its motors since it
+// ended.
 void Witness::programs_ended(TimeNs now_ns, const Key& key, const Asked& asked,
                              const api::Completed& completed) {
   ++programs_by_result_[std::string(word(completed.outcome))];

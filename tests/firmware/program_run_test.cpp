@@ -171,6 +171,97 @@ TEST_P(ProgramRun, AnInputThatDoesNotComeEndsIt) {
   EXPECT_TRUE(made.empty());
 }
 
+constexpr std::int32_t kLongestMove = 600;
+
+ProgramFrame move_until(std::int32_t steps, std::uint32_t after, std::uint16_t shortest_delay = 0) {
+  return {.kind = Kind::kMoveUntil,
+          .motors = {0},
+          .to = {{steps}},
+          .shortest_delay = shortest_delay,
+          .input = 2,
+          .after = after};
+}
+
+// So many steps a run of the longest move makes, if after `done` of them an input asks for `after`
+// more; by the rule of bushd_run_retarget and bushd_run_ramp_down: the running step, and the fewest
+// that its delay needs.
+std::int32_t steps_in_all(const Law& law, std::size_t done, std::uint32_t after,
+                          std::uint16_t shortest_delay) {
+  const auto run = Reference::move(law, kLongestMove, shortest_delay);
+  if (done >= run.steps()) return kLongestMove;
+  std::size_t to_stop = 0;
+  while (law.decel_at(to_stop) * law.unit_ns * 256 > run.step(done).delay) ++to_stop;
+  const std::size_t in_all = done + std::max<std::size_t>(after, to_stop + 1);
+  return static_cast<std::int32_t>(std::min<std::size_t>(in_all, kLongestMove));
+}
+
+// Whenever the input comes, the edges are those of a move that was so long from the beginning, and
+// the next frame follows it.
+TEST_P(ProgramRun, AnInputEndsAMoveSoManyStepsAfterIt) {
+  int ended = 0;
+  for (const std::uint32_t after : {0u, 1u, 2u, 9u, 40u, 150u, 599u}) {
+    for (const int ticks : {0, 1, 2, 3, 7, 20, 60, 110}) {
+      for (const std::uint16_t shortest_delay : {std::uint16_t{0}, std::uint16_t{60}}) {
+        for (const int sign : {1, -1}) {
+          SCOPED_TRACE(testing::Message() << after << " after tick " << ticks << ", shortest "
+                                          << shortest_delay << ", " << sign);
+          rig.pins({0, 0});
+          ProgramWalk walk(law, Rig::kTickNs, rig.options().slots);
+          for (std::uint8_t m = 0; m < 4; ++m) walk.at[m] = rig.poll().motor[m].position_steps;
+          made.clear();
+          ASSERT_EQ(load({.frames = {move_until(sign * kLongestMove, after, shortest_delay),
+                                     move_by(0, -3 * sign), kProgramEnd}}),
+                    BUSHD_OK);
+          const std::uint32_t first = rig.first_open();
+          ASSERT_EQ(start(first), BUSHD_OK);
+          while (rig.tick() != first + static_cast<std::uint32_t>(ticks)) pass();
+          if (rig.mcu().config.program->moving == 0) {
+            pass_until_ended();
+            continue;  // it had come to its end
+          }
+          rig.pins({4, 0});
+          // It is looked at before the tick after the next one is prepared.
+          pass(2);
+          const std::size_t done = made.size();
+          const std::int32_t steps = steps_in_all(law, done, after, shortest_delay);
+          walk.run({.frames = {{.kind = Kind::kMoveBy,
+                                .motors = {0},
+                                .to = {{sign * steps}},
+                                .shortest_delay = shortest_delay},
+                               move_by(0, -3 * sign),
+                               kProgramEnd}},
+                   first);
+          expect_ended(BUSHD_PROGRAM_DONE);
+          ASSERT_EQ(made, walk.steps());
+          ended += steps < kLongestMove ? 1 : 0;
+        }
+      }
+    }
+  }
+  EXPECT_GT(ended, 80);
+}
+
+TEST_P(ProgramRun, AnInputThatIsThereLetsNoMoveBegin) {
+  rig.pins({4, 0});
+  begin({.frames = {move_until(50, 9), move_by(0, 3), kProgramEnd}});
+  expect_ended(BUSHD_PROGRAM_DONE);
+  EXPECT_EQ(rig.pulses(0), 3);
+}
+
+TEST_P(ProgramRun, AMoveThatNoInputEndsEndsTheProgram) {
+  begin({.frames = {move_until(-50, 9), move_by(0, 3), kProgramEnd}});
+  expect_ended(BUSHD_PROGRAM_NO_INPUT);
+  EXPECT_EQ(rig.pulses(0), -50);
+}
+
+TEST_P(ProgramRun, APauseOfAMoveUntilAnInputEndsIt) {
+  begin({.frames = {move_until(500, 0), move_by(0, 3), kProgramEnd}});
+  pass(20);
+  EXPECT_EQ(control(BUSHD_PROGRAM_PAUSE), BUSHD_E_STATE);
+  EXPECT_EQ(control(BUSHD_PROGRAM_STOP, 0, BUSHD_STOP_RAMP), BUSHD_OK);
+  expect_ended(BUSHD_PROGRAM_STOPPED);
+}
+
 TEST_P(ProgramRun, PausesAndGoesOnToTheSameTargets) {
   const ProgramText text{
       .frames = {{.kind = Kind::kLineTo, .motors = {0, 1, 2}, .to = {{300, -200, 31}, {0, 100, 0}}},

@@ -25,7 +25,8 @@ enum class Kind : std::uint8_t {
   kPulse = 7,
   kRepeat = 8,
   kNext = 9,
-  kTravel = 10
+  kTravel = 10,
+  kMoveUntil = 11
 };
 
 struct ProgramFrame {
@@ -41,6 +42,7 @@ struct ProgramFrame {
   std::uint8_t bank = 0;
   std::uint8_t edge = 0;
   std::uint32_t delay_us = 0;
+  std::uint32_t after = 0;  // steps
 };
 
 struct ProgramText {
@@ -91,6 +93,14 @@ inline Bytes bytes_of(const ProgramText& text) {
             if (!line) append(bytes, frame.shortest_delay, 2);
           }
         }
+        break;
+      case Kind::kMoveUntil:
+        append(bytes, mask, 2);
+        bytes.push_back(frame.input);
+        bytes.push_back(frame.level ? 1 : 0);
+        append(bytes, frame.after, 4);
+        append(bytes, static_cast<std::uint32_t>(frame.to.at(0).at(0)), 4);
+        append(bytes, frame.shortest_delay, 2);
         break;
       case Kind::kTravel:
         append(bytes, mask, 2);

@@ -45,6 +45,20 @@ next = true
   EXPECT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
 }
 
+TEST_F(CompiledPrograms, AMoveMayEndByAnInput) {
+  const auto bytes = compile(
+      parsed("[[frame]]\nmove_by = { theta = -2 }\nuntil_input = \"trigger\"\nactive = false\n"
+             "after = 0.5\nspeed = 2\n[[frame]]\nmove_by = { x = 7 }\nuntil_input = 3\n"));
+  ASSERT_TRUE(bytes) << bytes.error().text();
+  const std::vector<std::uint8_t> expected = {
+      11, 4,    0, 19, 0, 200, 0, 0, 0, 0xE0, 0xFC, 0xFF, 0xFF, 32, 0,  //
+      11, 0x20, 0, 3,  1, 0,   0, 0, 0, 7,    0,    0,    0,    0,  0,  //
+      0};
+  EXPECT_EQ(std::vector<std::uint8_t>(bytes->begin() + 22, bytes->end()), expected);
+  bushd_program read;
+  EXPECT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
+}
+
 TEST_F(CompiledPrograms, TellTheLawOfALineAndItsFeed) {
   const std::string line = "[[frame]]\nline_by = [[3, 1]]\nlaw = \"elementary\"\n";
   const std::size_t at = 4 + 18 + 3;

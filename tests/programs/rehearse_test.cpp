@@ -68,6 +68,26 @@ next = true
   EXPECT_EQ(told->motors[0].end_steps, 10);
 }
 
+// It may be anywhere on its way then: both ends are walked on from, until a position is named.
+TEST_F(Rehearsals, AMoveThatAnInputEndsLeadsToAnyPlaceOfItsWay) {
+  const std::string until = "\nuntil_input = 1\n[[frame]]\n";
+  const auto told = rehearse("[[frame]]\nmove_by = { x = 2000 }" + until +
+                             "move_by = { x = -3000 }" + until + "move_by = { x = 500 }\n");
+  ASSERT_TRUE(told) << told.error().text();
+  EXPECT_TRUE(told->waits_for_inputs);
+  EXPECT_EQ(told->motors[0].least_steps, -3000);
+  EXPECT_EQ(told->motors[0].most_steps, 2500);
+  EXPECT_EQ(told->motors[0].edges, 5500u);
+  EXPECT_EQ(told->ticks, ticks_of(2000) + ticks_of(3000) + ticks_of(500));
+  EXPECT_NE(rehearse("[[frame]]\nmove_by = { x = 4000 }" + until + "move_by = { x = -5001 }\n")
+                .error()
+                .text()
+                .find("would go to -5001 steps"),
+            std::string::npos);
+  EXPECT_TRUE(rehearse("[[frame]]\nmove_by = { x = 4000 }" + until +
+                       "move_to = { x = 3000 }\n[[frame]]\nmove_by = { x = 3000 }\n"));
+}
+
 TEST_F(Rehearsals, AnElementaryLineHasTheStepsOfAll) {
   const auto told = rehearse("[[frame]]\nline_by = [[500, 1]]\nlaw = \"elementary\"\n");
   ASSERT_TRUE(told) << told.error().text();
