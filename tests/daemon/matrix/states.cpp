@@ -39,6 +39,18 @@ void load_shutter(WatchedLab& lab) {
   lab.cycle(7, 0, 26);
 }
 
+// Its name is that of its motor, as in requests.cpp.
+void run_program(WatchedLab& lab) {
+  const auto put =
+      lab.ask(api::PutProgram{.program = "c",
+                              .text = "motors = [\"c\"]\nunit = \"steps\"\n[[frame]]\nrepeat = 3\n"
+                                      "[[frame]]\nmove_by = [500]\n[[frame]]\nwait_s = 0.1\n"
+                                      "[[frame]]\nmove_by = [-300]\n[[frame]]\nnext = true\n"});
+  lab.run_till([&] { return lab.has_result(put); });
+  lab.ask(api::RunPrograms{{"c"}});
+  run_somewhere(lab);
+}
+
 }  // namespace
 
 const std::vector<State>& states() {
@@ -316,6 +328,19 @@ const std::vector<State>& states() {
          run_somewhere(lab);
          lab.press(BUSHD_INPUT_EMERGENCY);
          lab.run(lab.below(500) * 1e-3);
+       }},
+      {"in a program of its MCU", "c", true, "d", run_program},
+      {"paused in a program of its MCU", "c", true, "d",
+       [](WatchedLab& lab) {
+         run_program(lab);
+         lab.ask(api::Pause{{"c"}});
+         lab.run(lab.below(500) * 1e-3);
+       }},
+      {"offline in a program of its MCU", "c", true, "d",
+       [](WatchedLab& lab) {
+         run_program(lab);
+         lab.cut_line();
+         lab.run(lab.below(2500) * 1e-3);
        }},
       {"program", "program", true, "c",
        [](WatchedLab& lab) {
