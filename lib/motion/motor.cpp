@@ -199,6 +199,7 @@ std::vector<Event> Motor::report(const Report& report) {
   const bool by_itself = autonomous_ || has_bit(report.of_mcu.autonomous, output().value);
   // Whoever has asked for homing knows what the position of the motor is.
   if (by_itself) follow_count(before);
+  if (is<InProgram>()) autonomous_ |= position_ != before;  // it may have begun and been cut since
   follow_autonomous(report.of_mcu, free && position_ != before);
   follow_asked_for();
   return events;
@@ -213,7 +214,8 @@ void Motor::follow_asked_for() {
 // No move has led to where it stands.
 void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output().value));
-  if (before && !autonomous_) {
+  // The MCU may still say so in the tick in which it was cut.
+  if (before) {
     if (stops_immediately(report)) trust_.lose_steps(stopped_immediately(report, setup_.mcu));
     if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) trust_.lose_steps(kUnpowered);
   }

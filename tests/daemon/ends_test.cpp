@@ -35,15 +35,17 @@ struct Ends {
 class EndsOfMoves : public testing::TestWithParam<Ends> {};
 
 // From the last edge to the result, at any phase of polls and SYNCs. The tick of the last edge
-// ends, and crystals may have drifted by 0.2 ms; a SYNC may just be on the line; then one poll asks
-// all whose motors end. Where they end apart, a poll that has asked others may have begun just
-// before, and as long again nobody is asked.
+// ends, and crystals may have drifted by 0.2 ms; a SYNC may just be on the line; one poll, whose
+// frame arrives then, asks all whose motors end, and they answer. Where they end apart, a poll that
+// has asked others may have begun just before, and as long again nobody is asked.
 TEST_P(EndsOfMoves, AreHeardOfByOnePoll) {
   const auto& [name, mcus, line, apart_steps] = GetParam();
   constexpr std::size_t kSync = 19;
   const std::int64_t poll_us = hall_poll_us(mcus, answer_in_motion(1));
   const std::int64_t others_us = apart_steps != 0 && !line ? 2 * poll_us : 0;
-  const std::int64_t most_us = kHallTickUs + 200 + hall_line_us(kSync) + others_us + poll_us;
+  const std::int64_t answers_us =
+      poll_us - hall_line_us(1 + static_cast<std::size_t>(mcus) * BUSHD_POLL_ENTRY);
+  const std::int64_t most_us = kHallTickUs + 200 + hall_line_us(kSync) + others_us + answers_us;
   LastStep last;
   Lab lab(hall(mcus, 1), {}, &last);
   lab.connect();

@@ -372,6 +372,25 @@ TEST_F(MotorTest, LocalInputsHaveItAsLongAsTheyMoveIt) {
   EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
 }
 
+// Told in the tick in which it was cut, when the program still has it.
+TEST_F(MotorTest, AnEmergencyStopInAProgramIsDoubtedAtOnce) {
+  motor.enter_program();
+  set(mcu.autonomous, true);
+  report(kStart, 5);
+  mcu.faults = BUSHD_FAULT_EMERGENCY;
+  report(kStart + 10, 9);
+  EXPECT_NE(motor.trust().uncertain_reason(), std::nullopt);
+}
+
+TEST_F(MotorTest, AProgramThatIsCutBeforeItsMotorWasSeenToMoveIsDoubted) {
+  motor.enter_program();
+  mcu.faults = BUSHD_FAULT_EMERGENCY;
+  report(kStart, 0);
+  EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt) << "it has not begun";
+  report(kStart + 10, 2);
+  EXPECT_NE(motor.trust().uncertain_reason(), std::nullopt);
+}
+
 TEST_F(MotorTest, LocalInputsThatCameFirstEndAMove) {
   motor.start(kSteps, kStart);
   set(mcu.autonomous, true);

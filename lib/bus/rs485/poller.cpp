@@ -33,6 +33,7 @@ Poller::Poller(PerMcu<McuRecord>& mcus, Transactions& transactions, const FrameW
 // Those that have news or whose turn comes soon are asked along, and all if one may miss its reply:
 // somebody must answer after it.
 std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
+  const std::int64_t arrives_us = arrival_us(now_us);
   bool doubtful = false;
   for (const McuIndex i : mcus_.indices()) {
     doubtful |= mcus_[i].poll_wanted && polled_[i].missed_replies != 0;
@@ -40,7 +41,7 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   std::vector<McuIndex> asked;
   for (const McuIndex i : mcus_.indices()) {
     // One that will have news soon is asked then, not before and then again.
-    const bool has_news = polled_[i].news_us <= now_us;
+    const bool has_news = polled_[i].news_us <= arrives_us;
     const bool waits = polled_[i].news_us < polled_[i].routine_us && !has_news;
     const bool soon =
         doubtful || has_news || (polled_[i].routine_us <= now_us + kPollPeriodUs / 2 && !waits);
@@ -66,10 +67,27 @@ std::int64_t Poller::news_due_us(McuIndex mcu) const {
   const std::int64_t news_us = polled_[mcu].news_us;
   if (news_us == INT64_MAX) return INT64_MAX;
   std::int64_t last_us = news_us;
+  std::size_t together = 0;
   for (const Polled& other : polled_) {
-    if (other.news_us <= news_us + kNewsTogetherUs) last_us = std::max(last_us, other.news_us);
+    if (other.news_us > news_us + kNewsTogetherUs) continue;
+    last_us = std::max(last_us, other.news_us);
+    ++together;
   }
-  return std::max(last_us, extra_from_us_);
+  return std::max(last_us - poll_frame_us(together), extra_from_us_);
+}
+
+// How long the frame is under way at least: an MCU reports of the time when it has arrived.
+std::int64_t Poller::poll_frame_us(std::size_t entries) const {
+  return std::min(writer_.line_us(2 + entries * BUSHD_POLL_ENTRY + BUSHD_FRAME_OVERHEAD),
+                  kNewsTogetherUs);
+}
+
+// When one arrives that is sent now, and asks all that have news soon.
+std::int64_t Poller::arrival_us(std::int64_t now_us) const {
+  const auto soon = std::ranges::count_if(polled_, [now_us](const Polled& polled) {
+    return polled.news_us <= now_us + kNewsTogetherUs;
+  });
+  return now_us + poll_frame_us(static_cast<std::size_t>(soon));
 }
 
 // A poll that has begun shortly before there is news would keep it waiting: it begins so much
@@ -170,12 +188,13 @@ bool Poller::send_wanted(std::int64_t now_us) {
       bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data());
   transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, windows, kWindowGuardUs);
   extra_sent_us_.reset();
+  const std::int64_t arrives_us = arrival_us(now_us);
   bool extra = false;
   for (const Transactions::ReplyWindow& window : windows) {
     mcus_[window.mcu].poll_wanted = false;
     Polled& polled = polled_[window.mcu];
     polled.routine_us = now_us + kPollPeriodUs;
-    if (polled.news_us > now_us) continue;
+    if (polled.news_us > arrives_us) continue;
     expect_news(window.mcu, INT64_MAX);
     extra = true;
   }

@@ -32,9 +32,10 @@ class Poller {
   std::int64_t longest_cycle_us() const;
   // By one now, if what is likely is told, and these motors are to move.
   std::int64_t expected_cycle_us(std::span<const ToBegin> together) const;
-  // At this time the MCU's report will have something new, and it is asked then. INT64_MAX: nothing
-  // is expected. MCUs that have news at nearly the same time are asked by one poll. Such extra
-  // polls take at most half of the time, so they may come later; no routine poll does.
+  // At this time the MCU's report will have something new, and the poll that asks it arrives then.
+  // INT64_MAX: nothing is expected. MCUs that have news at nearly the same time are asked by one
+  // poll. Such extra polls take at most half of the time, so they may come later; no routine poll
+  // does.
   void expect_news(McuIndex mcu, std::int64_t at_us);
   // Until told otherwise these motors of it move, or are to.
   void expect_motion(McuIndex mcu, std::uint16_t motors) { polled_[mcu].motors = motors; }
@@ -67,6 +68,8 @@ class Poller {
   std::vector<McuIndex> choose(std::int64_t now_us) const;
   void forget_old(std::int64_t now_us);
   std::int64_t news_due_us(McuIndex mcu) const;
+  std::int64_t poll_frame_us(std::size_t entries) const;
+  std::int64_t arrival_us(std::int64_t now_us) const;
   std::int64_t routine_due_us(McuIndex mcu) const;
   std::uint8_t room(McuIndex mcu, std::uint16_t to_move) const;
   std::int64_t reply_us(std::size_t payload) const;

@@ -41,6 +41,9 @@ class Polling : public testing::Test {
     transactions.abandon();
     return addresses;
   }
+  std::int64_t frame_us(std::size_t entries) const {
+    return writer.line_us(2 + 5 * entries + BUSHD_FRAME_OVERHEAD);
+  }
 
   PerMcu<McuRecord> mcus;
   link::FrameWriter writer{kBaud};
@@ -78,15 +81,17 @@ TEST_F(Polling, WantedOneIsAskedAtOnceAndFirst) {
   EXPECT_THAT(asked(), ElementsAre(4, 1, 2)) << "those whose turn comes soon are asked along";
 }
 
+// The frame arrives when there is news.
 TEST_F(Polling, NewsIsAskedForWhenItComes) {
   poller.send_due(1'000'000);
   asked();
   poller.expect_news(kSecond, 1'012'345);
-  EXPECT_EQ(poller.due_us(kSecond), 1'012'345);
-  EXPECT_FALSE(poller.send_due(1'012'344));
-  ASSERT_TRUE(poller.send_due(1'012'345));
+  const std::int64_t due_us = 1'012'345 - frame_us(1);
+  EXPECT_EQ(poller.due_us(kSecond), due_us);
+  EXPECT_FALSE(poller.send_due(due_us - 1));
+  ASSERT_TRUE(poller.send_due(due_us));
   EXPECT_THAT(asked(), ElementsAre(2));
-  EXPECT_EQ(poller.due_us(kSecond), 1'062'345) << "a routine poll next";
+  EXPECT_EQ(poller.due_us(kSecond), due_us + 50'000) << "a routine poll next";
   poller.expect_news(kFirst, 1'070'000);
   EXPECT_EQ(poller.due_us(kFirst), 1'050'000) << "no routine poll is later for it";
 }
@@ -111,9 +116,10 @@ TEST_F(Polling, NewsOfSeveralIsAskedForByOnePoll) {
   asked();
   poller.expect_news(kFirst, 1'010'000);
   poller.expect_news(kSecond, 1'013'000);
-  poller.expect_news(McuIndex{2}, 1'013'001);
-  EXPECT_FALSE(poller.send_due(1'012'999));
-  ASSERT_TRUE(poller.send_due(1'013'000));
+  poller.expect_news(McuIndex{2}, 1'014'000);
+  const std::int64_t due_us = 1'013'000 - frame_us(2);
+  EXPECT_FALSE(poller.send_due(due_us - 1));
+  ASSERT_TRUE(poller.send_due(due_us));
   EXPECT_THAT(asked(), ElementsAre(1, 2));
 }
 
@@ -130,7 +136,7 @@ TEST_F(Polling, ARoutinePollIsOverWhenThereIsNews) {
   EXPECT_FALSE(poller.send_due(due_us - 1));
   ASSERT_TRUE(poller.send_due(due_us));
   EXPECT_THAT(asked(), ElementsAre(1, 2, 3, 4));
-  EXPECT_EQ(poller.due_us(kFirst), 1'051'000);
+  EXPECT_EQ(poller.due_us(kFirst), 1'051'000 - frame_us(1));
   EXPECT_EQ(poller.due_us(kSecond), due_us + 50'000);
 }
 
@@ -141,7 +147,7 @@ TEST_F(Polling, WhoWillHaveNewsIsNotAskedAlongBefore) {
   mcus[McuIndex{2}].poll_wanted = true;
   ASSERT_TRUE(poller.send_wanted(1'030'000));
   EXPECT_THAT(asked(), ElementsAre(3, 1, 4));
-  EXPECT_EQ(poller.due_us(kSecond), 1'045'000);
+  EXPECT_EQ(poller.due_us(kSecond), 1'045'000 - frame_us(1));
 }
 
 TEST_F(Polling, WhoMissedItsReplyAnswersFirstAndNotAlone) {
