@@ -34,6 +34,9 @@ class BoardLine final : public BoardEnd {
   BoardLine(std::uint32_t baud, std::uint32_t start_hz, EdgeSink* edges = nullptr,
             std::size_t mcu = 0)
       : board(start_hz, edges, mcu), byte_ns_(10'000'000'000 / baud) {}
+  BoardLine(std::uint32_t baud, const FrequencyConverter& converter, EdgeSink* edges = nullptr,
+            std::size_t mcu = 0)
+      : board(converter, edges, mcu), byte_ns_(10'000'000'000 / baud) {}
 
   CommutatorBoard board;
 

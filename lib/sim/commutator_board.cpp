@@ -1,5 +1,6 @@
 #include "sim/commutator_board.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace bushd::sim {
@@ -15,6 +16,7 @@ void CommutatorBoard::receive(TimeNs now_ns, std::uint8_t byte) {
   if (byte == 0) {
     selected_ = false;
     step_ns_.reset();
+    if (converter_) converter_->set_code(now_ns, 0);
     return;
   }
   if (!selected_) {
@@ -25,15 +27,45 @@ void CommutatorBoard::receive(TimeNs now_ns, std::uint8_t byte) {
     return;
   }
   if (step_ns_) return;  // it has one timer, which counts
-  step_ns_ = now_ns + TimeNs{byte} * 1'000'000'000 / (250 * TimeNs{start_hz_});
+  count(now_ns, byte);
+}
+
+void CommutatorBoard::count(TimeNs now_ns, std::uint8_t code) {
+  if (converter_) {
+    converter_->set_code(now_ns, code);
+    step_ns_ = now_ns + kConverterWatchNs;
+  } else {
+    step_ns_ = now_ns + TimeNs{code} * 1'000'000'000 / (250 * TimeNs{start_hz_});
+  }
+}
+
+TimeNs CommutatorBoard::next_event_ns() const {
+  if (!step_ns_) return kNever;
+  return converter_ ? std::min(*step_ns_, converter_->next_pulse_ns()) : *step_ns_;
+}
+
+// What it waited for is over: with a step, unless it was a pulse that did not come.
+bool CommutatorBoard::over(TimeNs now_ns) {
+  step_ns_.reset();
+  if (!converter_) return true;
+  const std::uint64_t before = converter_->pulses();
+  converter_->set_code(now_ns, 0);
+  return converter_->pulses() != before;
 }
 
 void CommutatorBoard::advance(TimeNs now_ns) {
-  if (!step_ns_ || *step_ns_ > now_ns) return;
-  const TimeNs due_ns = *std::exchange(step_ns_, std::nullopt);
-  const bool can = supply && motor(number_).connected;
-  if (can) make_step(due_ns);
-  if (!cut && !loses_answers) answers_.push_back(status(can));
+  const TimeNs due_ns = next_event_ns();
+  if (due_ns <= now_ns) {
+    const bool has_pulse = over(due_ns);
+    const bool can = has_pulse && supply && motor(number_).connected;
+    if (can) make_step(due_ns);
+    const unsigned no_pulse = has_pulse ? 0 : 32;
+    if (!cut && !loses_answers) {
+      answers_.push_back(static_cast<std::uint8_t>(status(can) | no_pulse));
+    }
+  }
+  // Pulses for which nothing waits.
+  if (converter_) converter_->advance(now_ns);
 }
 
 void CommutatorBoard::make_step(TimeNs now_ns) {
