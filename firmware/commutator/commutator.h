@@ -38,8 +38,10 @@ typedef enum bushd_commutator_bit {
 } bushd_commutator_bit;
 
 typedef struct bushd_commutator {
-  uint32_t unit;  // of a code, in 256ths of the port's counts, rounded up
-  uint32_t due;   // the step, if it counts
+  // That of a code in 256ths of the port's counts, rounded up; 0 where codes are no delays
+  // (converter.h).
+  uint32_t unit;
+  uint32_t due;  // the step, if it counts
   uint8_t phase[BUSHD_COMMUTATOR_MOTORS];
   uint8_t motor;  // the last that was selected
   bool left;
