@@ -28,7 +28,8 @@ if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_images(avr_image AVR avr atmega2560 -500000.elf -1000000.elf -switch-500000.elf)
   bushd_images(atmega1284p_image ATMEGA1284P atmega1284p atmega1284p -500000.elf -1000000.elf)
   bushd_images(keypad_image KEYPAD keypad keypad .elf -switch.elf)
-  bushd_images(commutator_image COMMUTATOR commutator commutator -9600.elf -57600.elf -500000.elf)
+  bushd_images(commutator_image COMMUTATOR commutator commutator -9600.elf -57600.elf -500000.elf
+    -converter-9600.elf -converter-57600.elf -converter-500000.elf)
   set(AVR_DEFINITIONS AVR_IMAGES="${AVR_IMAGES}"
     AVR_MEMORY_OWNERS="${PROJECT_SOURCE_DIR}/firmware/ports/atmega2560/memory_owners"
     ATMEGA1284P_IMAGES="${ATMEGA1284P_IMAGES}"
@@ -43,7 +44,7 @@ if(TARGET bushd_sim_avr AND AVR_GCC)
   bushd_check(keypad_stack_is_bounded LABEL slow NEEDS keypad_image COMMAND ${Python3_EXECUTABLE}
     ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega328p avr-objdump ${KEYPAD_IMAGES}.elf ${KEYPAD_IMAGES}-switch.elf)
   bushd_check(commutator_stack_is_bounded LABEL slow NEEDS commutator_image COMMAND ${Python3_EXECUTABLE}
-    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega328p avr-objdump ${COMMUTATOR_IMAGES}-500000.elf)
+    ${PROJECT_SOURCE_DIR}/tests/ports/stack_bound_test.py atmega328p avr-objdump ${COMMUTATOR_IMAGES}-500000.elf ${COMMUTATOR_IMAGES}-converter-500000.elf)
 else()
   message(STATUS "The image for ATmega2560 is not tested: it needs gcc-avr, libsimavr-dev and libdw-dev (tools/setup)")
 endif()

@@ -9,9 +9,17 @@ namespace {
 // the latch of that motor takes them; and two inputs, as port B has three.
 constexpr std::uint8_t kWindingsC = 0x0F;
 constexpr int kNumberShift = 2;
-constexpr std::uint8_t kStrobeD = 0x20;
 constexpr std::uint8_t kSupplyD = 0x40;
-constexpr std::uint8_t kSwitchD = 0x80;
+// Without a converter the strobe is the first and the input of switches the other; with one the
+// input of its pulses is the first and the strobe the other.
+constexpr std::uint8_t kFirstD = 0x20;
+constexpr std::uint8_t kOtherD = 0x80;
+// The code for the DAC, and the clock at whose rising edge its latch takes it.
+constexpr std::uint8_t kLowCodeC = 0x3F;
+constexpr std::uint8_t kHighCodeB = 0x18;
+constexpr std::uint8_t kCodeClockB = 0x20;
+// A pulse of the converter lasts so long.
+constexpr std::uint64_t kPulseCycles = 80;
 constexpr std::uint8_t kRightB = 1;
 constexpr std::uint8_t kLeftB = 2;
 constexpr std::uint8_t kConnectedB = 4;
@@ -19,19 +27,24 @@ constexpr std::uint8_t kConnectedB = 4;
 }  // namespace
 
 AvrBoard::AvrBoard(const std::string& image, std::uint32_t baud, std::uint32_t start_hz,
-                   EdgeSink* edges, std::size_t mcu)
+                   const std::optional<FrequencyConverter>& converter, EdgeSink* edges,
+                   std::size_t mcu)
     : byte_ns_(10'000'000'000 / baud),
       motors_(edges, mcu),
       switches_(start_hz),
-      port_d_(kStrobeD),
+      converter_(converter),
+      port_b_(kCodeClockB),
+      port_d_(converter ? kOtherD : kFirstD),
       node_(image,
             [this](TimeNs end_ns, std::uint8_t byte) { from_board_.push_back({end_ns, byte}); }) {
   for (std::size_t i = 0; i < pins_.size(); ++i) {
-    const bool is_c = i < 8;
-    pins_[i] = {this, is_c ? &port_c_ : &port_d_, static_cast<std::uint8_t>(1 << i % 8)};
-    node_.watch(is_c ? 'C' : 'D', static_cast<int>(i % 8), on_pin, &pins_[i]);
+    const std::size_t port = i / 8;
+    pins_[i] = {this, std::array{&port_b_, &port_c_, &port_d_}[port],
+                static_cast<std::uint8_t>(1 << i % 8)};
+    node_.watch("BCD"[port], static_cast<int>(i % 8), on_pin, &pins_[i]);
   }
   present();
+  if (converter_) await_pulse();
 }
 
 void AvrBoard::enqueue(TimeNs now_ns, int value) {
@@ -74,9 +87,48 @@ void AvrBoard::on_pin(avr_irq_t*, std::uint32_t value, void* param) {
   const bool level = (value & 1) != 0;
   if (level == ((*pin.port & pin.bit) != 0)) return;
   *pin.port ^= pin.bit;
-  if (pin.port != &pin.board->port_d_) return;
-  if (pin.bit == kStrobeD && level) pin.board->take_windings();
-  if ((pin.bit & 7 << kNumberShift) != 0) pin.board->present();
+  AvrBoard& board = *pin.board;
+  if (pin.port == &board.port_b_ && board.converter_) {
+    if (pin.bit == kCodeClockB && level) board.take_code();
+  }
+  if (pin.port != &board.port_d_) return;
+  if (pin.bit == (board.converter_ ? kOtherD : kFirstD) && level) board.take_windings();
+  if ((pin.bit & 7 << kNumberShift) != 0) board.present();
+}
+
+void AvrBoard::take_code() {
+  const unsigned high = (port_b_ & kHighCodeB) >> 3;
+  converter_->set_code(node_.time_ns(),
+                       static_cast<std::uint8_t>(high << 6 | (port_c_ & kLowCodeC)));
+  await_pulse();
+}
+
+void AvrBoard::set_converter(const FrequencyConverter::Character& character) {
+  converter_.value().set_character(node_.time_ns(), character);
+  await_pulse();
+}
+
+// While one lasts, its end is awaited.
+void AvrBoard::await_pulse() {
+  if (pulse_is_high_) return;
+  const TimeNs next_ns = converter_->next_pulse_ns();
+  if (next_ns != FrequencyConverter::kNever) node_.wake_at(next_ns, on_time, this);
+}
+
+std::uint64_t AvrBoard::on_time(avr_t*, std::uint64_t cycle, void* param) {
+  return static_cast<AvrBoard*>(param)->pulse(cycle);
+}
+
+std::uint64_t AvrBoard::pulse(std::uint64_t cycle) {
+  const std::uint64_t before = converter_->pulses();
+  converter_->advance(node_.time_ns());
+  if (pulse_is_high_ || converter_->pulses() != before) {
+    pulse_is_high_ = !pulse_is_high_;
+    present();
+    if (pulse_is_high_) return cycle + kPulseCycles;
+  }
+  await_pulse();
+  return 0;
 }
 
 unsigned AvrBoard::number() const {
@@ -102,12 +154,15 @@ void AvrBoard::present() {
   if (motors_.at_right_limit(motor)) closed |= kRightB;
   if (motors_.at_left_limit(motor)) closed |= kLeftB;
   if (motors_.motor(motor).connected) closed |= kConnectedB;
-  node_.drive('B', kRightB | kLeftB | kConnectedB, static_cast<std::uint8_t>(~closed));
+  // Resistors hold the strobe, and the clock of the code, high while nobody drives them.
+  node_.drive('B', kRightB | kLeftB | kConnectedB | kCodeClockB,
+              static_cast<std::uint8_t>(~closed));
   closed = 0;
   if (motors_.supply) closed |= kSupplyD;
-  if ((switches_ >> motor & 1) != 0) closed |= kSwitchD;
-  // A resistor holds the strobe high while nobody drives it.
-  node_.drive('D', kSupplyD | kSwitchD | kStrobeD, static_cast<std::uint8_t>(~closed));
+  if (converter_ && !pulse_is_high_) closed |= kFirstD;
+  if ((switches_ >> motor & 1) != 0) closed |= kOtherD;
+  node_.drive('D', kSupplyD | kOtherD | kFirstD, static_cast<std::uint8_t>(~closed),
+              converter_ ? kFirstD : 0);
 }
 
 }  // namespace bushd::sim

@@ -1,17 +1,19 @@
 // The commutator board that one can build: its image for the ATmega328P runs in simavr, with
 // decoder, latches, multiplexers and switches at its pins (docs/firmware.md), and motors behind
-// them.
+// them. Or the one with a voltage-to-frequency converter, which has a latch and a DAC before it.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <deque>
 #include <exception>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sim/avr/avr_node.h"
 #include "sim/board_line.h"
+#include "sim/frequency_converter.h"
 
 namespace bushd::sim {
 
@@ -21,7 +23,12 @@ class AvrBoard final : public BoardEnd {
   // std::runtime_error if the image cannot be read, and, when time goes on, if it crashes or
   // switches windings that turn no motor. It boots at time 0, with latches that are cleared.
   AvrBoard(const std::string& image, std::uint32_t baud, std::uint32_t start_hz,
-           EdgeSink* edges = nullptr, std::size_t mcu = 0);
+           EdgeSink* edges = nullptr, std::size_t mcu = 0)
+      : AvrBoard(image, baud, start_hz, std::nullopt, edges, mcu) {}
+  // With a converter; the latch before its DAC is cleared.
+  AvrBoard(const std::string& image, std::uint32_t baud, const FrequencyConverter& converter,
+           EdgeSink* edges = nullptr, std::size_t mcu = 0)
+      : AvrBoard(image, baud, 0, converter, edges, mcu) {}
 
   // From its boot until it hears, with the time of the chip's start-up left out.
   static constexpr TimeNs kBootNs = 1'000'000;
@@ -42,6 +49,10 @@ class AvrBoard final : public BoardEnd {
   std::uint8_t latch(unsigned motor) const { return latches_.at(motor); }
   std::uint64_t latched() const { return latched_; }
 
+  // Precondition: the board has one. A character that is set applies from now on.
+  const FrequencyConverter& converter() const { return converter_.value(); }
+  void set_converter(const FrequencyConverter::Character& character);
+
  private:
   static constexpr TimeNs kLookNs = 200'000;
   static constexpr int kBreak = -1;
@@ -54,16 +65,25 @@ class AvrBoard final : public BoardEnd {
     std::uint8_t* port;
     std::uint8_t bit;
   };
+  AvrBoard(const std::string& image, std::uint32_t baud, std::uint32_t start_hz,
+           const std::optional<FrequencyConverter>& converter, EdgeSink* edges, std::size_t mcu);
   void enqueue(TimeNs now_ns, int value);
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
   void take_windings();
+  void take_code();
+  void await_pulse();
+  static std::uint64_t on_time(avr_t* avr, std::uint64_t cycle, void* param);
+  std::uint64_t pulse(std::uint64_t cycle);
   void present();
   unsigned number() const;
 
   const TimeNs byte_ns_;
   BoardMotors motors_;
   const std::uint32_t switches_;
-  std::array<Pin, 16> pins_{};
+  std::optional<FrequencyConverter> converter_;
+  bool pulse_is_high_ = false;
+  std::array<Pin, 24> pins_{};
+  std::uint8_t port_b_;
   std::uint8_t port_c_ = 0;
   std::uint8_t port_d_;
   std::array<std::uint8_t, BoardMotors::kMotors> latches_{};

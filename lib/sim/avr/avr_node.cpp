@@ -80,8 +80,14 @@ void AvrNode::watch(char port, int bit, Notify notify, void* param) {
       param);
 }
 
+void AvrNode::wake_at(TimeNs time_ns, Wake wake, void* param) {
+  const TimeNs wait_ns = std::max(time_ns - this->time_ns(), TimeNs{0});
+  const auto cycles = static_cast<avr_cycle_count_t>((wait_ns * 2 + 124) / 125);
+  avr_cycle_timer_register(avr_, std::max(cycles, avr_cycle_count_t{1}), wake, param);
+}
+
 // For what the image reads, and for what simavr makes of the pins when the image writes to them.
-void AvrNode::drive(char port, std::uint8_t mask, std::uint8_t levels) {
+void AvrNode::drive(char port, std::uint8_t mask, std::uint8_t levels, std::uint8_t counting) {
   avr_ioport_external_t external{};
   external.name = port & 0x7F;
   external.mask = mask;
@@ -93,7 +99,7 @@ void AvrNode::drive(char port, std::uint8_t mask, std::uint8_t levels) {
     avr_irq_t* const pin =
         avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(port)), bit);
     // After a reset the register has lost a level of which simavr thinks that it is told already.
-    pin->value = level ^ 1;
+    if ((counting >> bit & 1) == 0) pin->value = level ^ 1;
     avr_raise_irq(pin, level);
   }
 }

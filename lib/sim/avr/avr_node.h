@@ -36,8 +36,13 @@ class AvrNode {
   using Notify = void (*)(avr_irq_t* irq, std::uint32_t value, void* param);
   // Changes of a pin; an edge calls twice, with other bits above the level.
   void watch(char port, int bit, Notify notify, void* param);
-  // Drives those of the pins of a port that the mask has, from now on.
-  void drive(char port, std::uint8_t mask, std::uint8_t levels);
+  // Calls `wake` at this time, or at once if that is over, and again at each later cycle that it
+  // returns; 0: no more. Asked for again: in place of the time before. A reset forgets it.
+  using Wake = std::uint64_t (*)(avr_t* avr, std::uint64_t cycle, void* param);
+  void wake_at(TimeNs time_ns, Wake wake, void* param);
+  // Drives those of the pins of a port that the mask has, and no others, from now on. A pin that
+  // counts edges is among `counting`: it is not told its level anew.
+  void drive(char port, std::uint8_t mask, std::uint8_t levels, std::uint8_t counting = 0);
 
   // Jumps into an endless loop, until the watchdog ends it. Throws std::runtime_error if the image
   // has none.

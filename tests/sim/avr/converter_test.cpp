@@ -1,0 +1,253 @@
+// The image of the board with a voltage-to-frequency converter in simavr, against the board of
+// lib/sim, which shares no code with it. Each has a converter of its own, of the same character.
+//
+//     BUSHD_STREAMS=10000 BUSHD_SEED=1 sim_avr_test --gtest_filter='ConverterRandomStreams.*'
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "sim/avr/avr_board.h"
+#include "sim/board_line.h"
+#include "sim/random.h"
+#include "sim/random_streams.h"
+
+namespace bushd::sim::converter_test {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using Character = FrequencyConverter::Character;
+
+constexpr std::uint32_t kFastBaud = 500'000;
+constexpr TimeNs kMs = 1'000'000;
+constexpr TimeNs kWatchdogNs = 130 * kMs;  // 120 ms, and the boot
+constexpr std::uint8_t kDone = 0x10;
+constexpr std::uint8_t kNoPulse = 0x20;
+constexpr Character kPlain{.hz_per_code = 10};
+
+// Between the end of a byte and its K: a loop, and what it does with the byte. Between a pulse and
+// its step: the counter's synchroniser, a loop with a byte in it, and the way to the strobe.
+constexpr TimeNs kLoop = 90;
+constexpr TimeNs kByte = 150;
+constexpr TimeNs kToStrobe = 230;
+constexpr TimeNs kToCodeNs = (kLoop + kByte) * 125 / 2;
+constexpr TimeNs kToStepNs = (3 + kLoop + kByte + kToStrobe) * 125 / 2;
+constexpr TimeNs kLateNs = kToCodeNs + kToStepNs;
+// From a pulse to K = 0 the converter goes on; what it gains by that is less than the two bytes
+// take on the fastest line, before the next K.
+constexpr TimeNs kToRestNs = (3 + kLoop + kByte) * 125 / 2;
+static_assert(kToRestNs < 40'000);
+
+std::string image_of(std::uint32_t baud) {
+  return COMMUTATOR_IMAGES "-converter-" + std::to_string(baud) + ".elf";
+}
+
+// A board that has booted.
+class Image {
+ public:
+  explicit Image(const Character& character = kPlain, std::uint32_t baud = kFastBaud)
+      : board(image_of(baud), baud, FrequencyConverter(character)) {
+    pass(AvrBoard::kBootNs);
+  }
+  void pass(TimeNs ns) {
+    for (const std::uint8_t byte : board.advance(board.advanced_to_ns() + ns)) {
+      answers.push_back(byte);
+    }
+  }
+  void send(const std::vector<std::uint8_t>& bytes) { board.send(board.advanced_to_ns(), bytes); }
+
+  AvrBoard board;
+  std::vector<std::uint8_t> answers;
+};
+
+TEST(ConverterImage, SwitchesEachMotorToItsFirstPhaseWhenPowerComes) {
+  Image image;
+  for (unsigned motor = 0; motor < BoardMotors::kMotors; ++motor) {
+    EXPECT_EQ(image.board.latch(motor), 0b0011) << motor;
+  }
+  EXPECT_EQ(image.board.latched(), BoardMotors::kMotors);
+  EXPECT_EQ(image.board.converter().code(), 0);
+}
+
+TEST(ConverterImage, EachCodeGoesOutWholeAndItsPulseIsTheStep) {
+  Image image;
+  image.send({0, 0x83});
+  for (int code = 255; code > 0; --code) {
+    image.send({static_cast<std::uint8_t>(code)});
+    image.pass(3 * 20'000 + kToCodeNs);
+    ASSERT_EQ(image.board.converter().code(), code);
+    const TimeNs begin_ns = image.board.advanced_to_ns();
+    image.answers.clear();
+    while (image.answers.empty() && image.board.advanced_to_ns() < begin_ns + 200 * kMs) {
+      image.pass(100'000);
+    }
+    ASSERT_THAT(image.answers, ElementsAre(kDone)) << code;
+    ASSERT_EQ(image.board.converter().code(), 0);
+    ASSERT_EQ(image.board.motors().position(3), 256 - code);
+    ASSERT_EQ(image.board.converter().pulses(), static_cast<std::uint64_t>(256 - code));
+  }
+}
+
+TEST(ConverterImage, TellsWhatItsInputsSay) {
+  Image image;
+  BoardMotors& motors = image.board.motors();
+  motors.motor(3).right_limit_at = 2;
+  image.send({0, 0x83, 250});
+  image.pass(kMs);
+  image.send({250});
+  image.pass(kMs);
+  motors.supply = false;
+  image.send({250});
+  image.pass(kMs);
+  motors.supply = true;
+  motors.motor(3).connected = false;
+  image.send({250});
+  image.pass(kMs);
+  EXPECT_THAT(image.answers, ElementsAre(kDone, kDone | 1, 1 | 4, 1 | 8));
+  EXPECT_EQ(motors.position(3), 2);
+}
+
+TEST(ConverterImage, SaysAfterASecondThatNoPulseCame) {
+  Image image({.hz_per_code = 10, .gives_pulses = false});
+  image.send({0, 0x83, 250});
+  image.pass(1016 * kMs);
+  EXPECT_THAT(image.answers, IsEmpty());
+  EXPECT_EQ(image.board.converter().code(), 250);
+  image.pass(17 * kMs);
+  EXPECT_THAT(image.answers, ElementsAre(kNoPulse));
+  EXPECT_EQ(image.board.converter().code(), 0);
+  EXPECT_EQ(image.board.motors().position(3), 0);
+  image.board.set_converter(kPlain);
+  image.send({250});
+  image.pass(kMs);
+  EXPECT_THAT(image.answers, ElementsAre(kNoPulse, kDone));
+}
+
+TEST(ConverterImage, AHundredHzOfItsOwnMoveNothing) {
+  Image image({.hz_per_code = 10, .offset_codes = 10});
+  image.send({0, 0x81});
+  image.pass(1000 * kMs);
+  EXPECT_THAT(image.answers, IsEmpty());
+  EXPECT_GE(image.board.converter().pulses(), 99u);
+  image.send({50});
+  image.pass(30 * kMs);
+  EXPECT_THAT(image.answers, ElementsAre(kDone));
+  EXPECT_EQ(image.board.motors().position(1), 1);
+}
+
+// Windings stay as they are in a reset by the watchdog; K is 0 after it.
+TEST(ConverterImage, StandsAfterItHasHung) {
+  Image image;
+  image.send({0, 0x86, 250});
+  image.pass(kMs);
+  image.send({1});
+  image.pass(kMs);
+  EXPECT_EQ(image.board.converter().code(), 1);
+  image.board.node().hang();
+  image.pass(kWatchdogNs);
+  EXPECT_EQ(image.board.converter().code(), 0);
+  EXPECT_EQ(image.board.motors().position(6), 1);
+  image.pass(200 * kMs);
+  EXPECT_THAT(image.answers, ElementsAre(kDone));
+  image.send({0, 0x86, 250});
+  image.pass(kMs);
+  EXPECT_EQ(image.board.motors().position(6), 2);
+  EXPECT_THAT(image.answers, ElementsAre(kDone, kDone));
+}
+
+TEST(ConverterImage, TakesABrokenLineForAZero) {
+  Image image;
+  image.send({0, 0x81, 5});
+  image.pass(kMs);
+  image.board.send_break(image.board.advanced_to_ns());
+  image.pass(kMs);
+  EXPECT_EQ(image.board.converter().code(), 0);
+  image.send({0x82, 250});
+  image.pass(10 * kMs);
+  EXPECT_THAT(image.answers, ElementsAre(kDone));
+  EXPECT_EQ(image.board.motors().position(1), 0);
+  EXPECT_EQ(image.board.motors().position(2), 1);
+}
+
+// Bytes, inputs and pauses at random: to both boards the same.
+TEST(ConverterRandomStreams, AreTakenAsTheModelTakesThem) {
+  constexpr std::array<std::uint32_t, 3> kBauds = {9600, 57'600, 500'000};
+  const std::uint64_t seed = from_environment("BUSHD_SEED", std::random_device{}());
+  const std::uint64_t streams = from_environment("BUSHD_STREAMS", 400);
+  const std::string again = "BUSHD_SEED=" + std::to_string(seed) +
+                            " BUSHD_STREAMS=" + std::to_string(streams) +
+                            " sim_avr_test --gtest_filter='ConverterRandomStreams.*'";
+  std::printf("%s\n", again.c_str());
+  SCOPED_TRACE(again);
+  Random random(seed, 0);
+  TimeNs latest_ns = 0;
+  TimeNs earliest_ns = 0;
+  std::size_t steps = 0;
+  for (std::uint64_t done = 0; done < streams && !testing::Test::HasFailure();) {
+    const std::uint32_t baud = random.pick(kBauds);
+    // No offset: what goes on while the image is late to set K is a period that is shorter there.
+    const Character character{.hz_per_code = static_cast<double>(random.between(2, 40)),
+                              .drift_per_s = static_cast<double>(random.between(-20, 20)) / 1000};
+    AvrBoard board(image_of(baud), baud, FrequencyConverter(character));
+    BoardLine model(baud, FrequencyConverter(character));
+    board.advance(AvrBoard::kBootNs);
+    model.advance(AvrBoard::kBootNs);
+    TimeNs now_ns = AvrBoard::kBootNs;
+    std::vector<std::uint8_t> answers;
+    std::vector<std::uint8_t> foretold;
+    std::vector<double> ratios;  // of the steps: the code of the pulse before, to theirs
+    double before = 0;
+    const auto advance = [&] {
+      for (const std::uint8_t byte : board.advance(now_ns)) answers.push_back(byte);
+      for (const std::uint8_t byte : model.advance(now_ns)) foretold.push_back(byte);
+    };
+    const TimeNs byte_ns = 10'000'000'000 / baud;
+    for (int left = 20; left > 0; --left, ++done) {
+      // What comes while a pulse is awaited is another test's.
+      const bool begins = random.one_in(3);
+      const auto header = static_cast<std::uint8_t>(random.between(0x80, 0x8F));
+      const auto code = static_cast<std::uint8_t>(random.magnitude(1, 255));
+      std::vector<std::uint8_t> bytes;
+      if (begins) bytes = {0, header};
+      bytes.push_back(code);
+      if (random.one_in(4)) board.motors().supply = model.motors().supply = !random.one_in(2);
+      board.send(now_ns, bytes);
+      model.send(now_ns, bytes);
+      now_ns += static_cast<TimeNs>(bytes.size()) * byte_ns;
+      advance();
+      const TimeNs due_ns = model.board.next_event_ns();
+      if (due_ns == CommutatorBoard::kNever) continue;
+      // The watch of the image has a coarse clock.
+      now_ns = due_ns + (due_ns - now_ns > 990 * kMs ? 40 * kMs : 0) + kLateNs + 2 * byte_ns +
+               random.between(0, 5) * kMs;
+      advance();
+      ratios.resize(model.board.steps().size(), before / code);
+      before = code;
+    }
+    EXPECT_EQ(answers, foretold);
+    const auto& made = board.motors().steps();
+    const auto& expected = model.motors().steps();
+    ASSERT_EQ(made.size(), expected.size());
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      ASSERT_EQ(made[i].motor, expected[i].motor) << i;
+      ASSERT_EQ(made[i].left, expected[i].left) << i;
+      const TimeNs late_ns = made[i].time_ns - expected[i].time_ns;
+      ASSERT_LE(late_ns, kLateNs) << i;
+      // What the converter has gained before K = 0, at the speed of the pulse before, is a part of
+      // a period of this one. Its drift between both is less than a tenth.
+      ASSERT_GE(late_ns, -static_cast<TimeNs>(1.1 * ratios[i] * kToRestNs)) << i;
+      latest_ns = std::max(latest_ns, late_ns);
+      earliest_ns = std::min(earliest_ns, late_ns);
+    }
+    EXPECT_EQ(board.converter().code(), model.board.converter().code());
+    steps += made.size();
+  }
+  std::printf("%zu steps, %lld to %lld ns late\n", steps, static_cast<long long>(earliest_ns),
+              static_cast<long long>(latest_ns));
+}
+
+}  // namespace
+}  // namespace bushd::sim::converter_test
