@@ -32,7 +32,8 @@ std::unique_ptr<link::BusMaster> new_master(const config::Bus& bus, link::BusSet
               .name = bus.name,
               .board = {.start_hz = bus.start_hz,
                         .baud = bus.baud,
-                        .answer_us = bus.answer_ms * std::int64_t{1000}}},
+                        .answer_us = bus.answer_ms * std::int64_t{1000},
+                        .converter = bus.converter}},
           std::move(setup), source);
   }
   return std::make_unique<link::Rs485Master>(std::move(setup), source);

@@ -51,8 +51,8 @@ Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
 
 // Reads the keys of a bus of kind "commutator".
 Result<void> read_commutator(const TomlReader& reader, Bus* bus) {
-  if (auto known =
-          reader.only({"name", "kind", "port", "baud", "start_hz", "answer_ms", "emergency_stop"});
+  if (auto known = reader.only(
+          {"name", "kind", "port", "baud", "start_hz", "converter", "answer_ms", "emergency_stop"});
       !known) {
     return known;
   }

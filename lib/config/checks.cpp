@@ -183,7 +183,7 @@ Result<void> check_speed(const Loading& loading, std::size_t index) {
                   BUSHD_MAX_STEPS_PER_TICK, remedy)));
 }
 
-// A board makes no step sooner than after one code.
+// A board makes no step sooner than after one code, or one period of its converter.
 Result<void> check_board_speed(const Loading& loading, std::size_t index) {
   const Config& config = loading.config;
   const Motor& motor = config.motors[index];
@@ -191,6 +191,17 @@ Result<void> check_board_speed(const Loading& loading, std::size_t index) {
   if (bus.kind != BusKind::kCommutator) return {};
   const bushd_table& view = config.table_of(motor).view();
   const std::uint64_t fastest_ns = std::uint64_t{view.time_unit_ns} * bushd_table_fastest(&view);
+  if (bus.converter) {
+    const Converter& converter = *bus.converter;
+    if (converter_period_ns(converter, converter.max_code) <= fastest_ns) return {};
+    return fail(loading.motors[index].error(
+        "group", fmt::format("the table \"{}\" has steps {} ns apart; allowed: {} ns and more, one "
+                             "period at max_hz = {} of the converter of board \"{}\". Use a slower "
+                             "table, or a converter with a higher max_hz",
+                             config.table_of(motor).name(), fastest_ns,
+                             converter_period_ns(converter, converter.max_code), converter.max_hz,
+                             bus.name)));
+  }
   const std::uint64_t code_ns = 1'000'000'000 / (250 * std::uint64_t{bus.start_hz});
   if (fastest_ns >= code_ns) return {};
   return fail(loading.motors[index].error(

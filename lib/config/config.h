@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/converter.h"
 #include "base/ids.h"
 #include "base/result.h"
 #include "base/units/coordinates.h"
@@ -86,8 +87,9 @@ struct Bus {
   bushd_stop_mode emergency_stop = BUSHD_STOP_RAMP;
   SerialPulse serial_pulse = {};
   // The settings of a commutator board.
-  std::uint32_t start_hz = 0;   // F_start
-  std::uint32_t answer_ms = 0;  // for an answer, beyond twice its delay
+  std::uint32_t start_hz = 0;            // F_start; 0: it has a converter
+  std::optional<Converter> converter{};  // by whose pulses it steps
+  std::uint32_t answer_ms = 0;           // for an answer, beyond twice its delay
 
   KeyPlaces places{};  // of `port`, `format`, `tick_us`
 

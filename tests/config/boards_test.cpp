@@ -40,11 +40,42 @@ TEST(ConfigBoards, BoardStandsForAnMcuOfItsName) {
   EXPECT_TRUE(ConfigFile(kBoard + "limit_action = \"immediate\"\n").load());
 }
 
+const std::string kConverter = "converter = { max_hz = 2500, max_code = 250 }\n";
+
+TEST(ConfigBoards, BoardMayHaveAConverterInPlaceOfDelayCodes) {
+  const std::string text = changed(kBoard, "start_hz = 100\n", kConverter);
+  const auto config = ConfigFile(text).load();
+  ASSERT_TRUE(config) << config.error().text();
+  EXPECT_EQ(config->buses[0].converter, (Converter{.max_hz = 2500, .max_code = 250}));
+  EXPECT_EQ(config->buses[0].start_hz, 0u);
+  EXPECT_EQ(config->buses[0].answer_ms, 100u);
+  const auto refused = [&text](const std::string& from, const std::string& to) {
+    return board_error(changed(text, from, to));
+  };
+  EXPECT_THAT(refused("baud", "start_hz = 100\nbaud"), HasSubstr("Remove one of both lines"));
+  EXPECT_THAT(refused(kConverter, "converter = 5\n"),
+              HasSubstr("a table such as { max_hz = 2500, max_code = 250 }"));
+  EXPECT_THAT(refused("max_hz = 2500, ", ""), HasSubstr("max_hz"));
+  EXPECT_THAT(refused("2500", "10001"), HasSubstr("2..10000 Hz"));
+  EXPECT_THAT(refused("250 }", "256 }"), HasSubstr("1..255"));
+  EXPECT_THAT(refused("250 }", "250, gain = 1 }"), HasSubstr("unknown key"));
+  // The table's fastest code is 10 of 40 us.
+  EXPECT_THAT(refused("2500", "2499"),
+              HasSubstr("has steps 400000 ns apart; allowed: 400161 ns and more, one period at "
+                        "max_hz = 2499 of the converter of board \"board\""));
+  EXPECT_THAT(
+      refused("max_hz = 2500, max_code = 250", "max_hz = 400, max_code = 201"),
+      HasSubstr("is 400 Hz, which gives code 1 less than 2 Hz; allowed with max_code = 201: "
+                "402 Hz and more. Use a smaller max_code"));
+}
+
 TEST(ConfigBoards, WhatABoardDoesNotHaveIsRefused) {
   EXPECT_THAT(board_error(changed(kBoard, "start_hz = 100\n", "")), HasSubstr("start_hz"));
   EXPECT_THAT(board_error(changed(kBoard, "= 100\n", "= 101\n")), HasSubstr("1..100 Hz"));
-  EXPECT_THAT(board_error(changed(kBoard, "baud", "tick_us = 2560\nbaud")),
-              HasSubstr("unknown key; allowed here: name, kind, port, baud, start_hz, answer_ms"));
+  EXPECT_THAT(
+      board_error(changed(kBoard, "baud", "tick_us = 2560\nbaud")),
+      HasSubstr(
+          "unknown key; allowed here: name, kind, port, baud, start_hz, converter, answer_ms"));
   EXPECT_THAT(board_error(changed(kBoard, "output = 7", "output = 8")),
               HasSubstr("is 8; allowed: 0..7 on commutator board \"board\""));
   EXPECT_THAT(board_error(kBoard + "limit = \"both\"\n"), HasSubstr("limit switches of its own"));

@@ -99,6 +99,18 @@ class Lab::Client final : public api::Session {
   std::map<std::int64_t, api::Configuration> configurations;
 };
 
+namespace {
+
+// A converter does what the configuration says of it, to the last digit.
+std::unique_ptr<sim::BoardLine> new_board(const config::Bus& bus, sim::EdgeSink* sink) {
+  if (!bus.converter) return std::make_unique<sim::BoardLine>(bus.baud, bus.start_hz, sink);
+  const sim::FrequencyConverter exact(
+      {.hz_per_code = static_cast<double>(bus.converter->max_hz) / bus.converter->max_code});
+  return std::make_unique<sim::BoardLine>(bus.baud, exact, sink);
+}
+
+}  // namespace
+
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink,
          std::uint32_t disabled_capabilities, bool keeps)
     : client_(std::make_shared<Client>()) {
@@ -117,7 +129,7 @@ Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sin
         {.bus = std::make_unique<sim::Bus>(pulses ? 115'200 : bus.baud, sink), .received = {}});
     if (pulses) buses_.back().drive = std::make_unique<sim::PulseDrive>(sink);
     if (bus.kind == config::BusKind::kCommutator) {
-      buses_.back().board = std::make_unique<sim::BoardLine>(bus.baud, bus.start_hz, sink);
+      buses_.back().board = new_board(bus, sink);
     }
   }
   for (std::size_t b = 0; b < config_.buses.size(); ++b) {

@@ -21,6 +21,11 @@
 // A delay longer than 255 codes is waited here for as long as it is longer; delays that are no
 // whole number of codes are rounded up. So no step comes earlier after the one before than it is
 // asked for; the line and the program's own pauses come on top.
+//
+// A board with a converter (firmware/commutator/converter.h) takes K of its DAC in place of delay
+// codes (base/converter.h), and makes the step at the next pulse. A delay longer than that of K = 1
+// is waited here but for that one. The board says with bit 6, without a step, that no pulse came
+// within a second.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +33,8 @@
 #include <span>
 #include <string>
 #include <vector>
+
+#include "base/converter.h"
 
 namespace bushd::commutator {
 
@@ -42,10 +49,11 @@ struct Status {
   bool supply_missing = false;
   bool not_connected = false;
   bool step_done = false;
+  bool no_pulse = false;  // of a converter
   friend bool operator==(const Status&, const Status&) = default;
 };
 // None: a bit is set that has no meaning, so the byte is not what a board has sent.
-std::optional<Status> status_of(std::uint8_t byte);
+std::optional<Status> status_of(std::uint8_t byte, bool has_converter = false);
 std::uint8_t header_of(unsigned motor, bool left);  // motor < kMotors
 
 class Exchange {
@@ -54,6 +62,7 @@ class Exchange {
     std::uint32_t start_hz = 40;  // F_start of the board, 1..100
     std::uint32_t baud = 9600;    // > 0
     std::int64_t answer_us = kAnswerUs;
+    std::optional<Converter> converter{};  // then start_hz means nothing
   };
   explicit Exchange(Setup setup) : setup_(setup) {}
 
@@ -96,13 +105,30 @@ class Exchange {
   static std::int64_t line_ns(std::uint32_t baud) {
     return 2 * std::int64_t{kBitsPerByte} * 1'000'000'000 / baud;
   }
-  std::uint64_t unit_ns() const {  // of a code, rounded up: none is shorter than this
+  std::uint64_t unit_ns() const {  // of a delay code, rounded up: none is shorter than this
     const std::uint64_t codes = std::uint64_t{kCodesPerStartPeriod} * setup_.start_hz;
     return (1'000'000'000 + codes - 1) / codes;
   }
+  // What a board can do, whatever its codes are. Nothing of a code is left after the longest time.
+  std::uint64_t most_steps_per_s() const {
+    return setup_.converter ? setup_.converter->max_hz
+                            : std::uint64_t{kCodesPerStartPeriod} * setup_.start_hz;
+  }
+  std::int64_t longest_us() const;
 
  private:
   static constexpr int kBitsPerByte = 10;  // 8N1
+
+  struct Code {
+    std::uint8_t code;
+    std::int64_t held_us;  // before it is sent
+  };
+  Code code_of(std::uint64_t delay_ns) const;
+  // From when on an answer to this code can be one, and when there must be one; after it was sent,
+  // without the line.
+  std::int64_t earliest_us(std::uint8_t code) const;
+  std::int64_t latest_us(std::uint8_t code) const;
+  std::int64_t delay_us(std::uint8_t code) const;
 
   struct Asked {
     std::uint8_t header;

@@ -41,10 +41,8 @@ void name_it(bushd_identity& identity, const std::string& name) {
 
 CommutatorMaster::CommutatorMaster(Setup setup, link::BusSetup bus, link::TickSource& source)
     : tick_ns_(bus.tick_ns),
-      codes_per_s_(std::uint64_t{kCodesPerStartPeriod} * setup.board.start_hz),
-      settle_us_(std::max<std::int64_t>(
-          kMaxCode * static_cast<std::int64_t>(Exchange(setup.board).unit_ns()) / 1000 + 1,
-          kLeastSettleUs)),
+      has_converter_(setup.board.converter.has_value()),
+      settle_us_(std::max(Exchange(setup.board).longest_us(), kLeastSettleUs)),
       source_(source),
       exchange_(setup.board) {
   board_.setup = std::move(bus.mcus.front());
@@ -228,7 +226,8 @@ void CommutatorMaster::answered(std::int64_t now_us, const Status& status) {
   if (!status.step_done || status.supply_missing || status.not_connected) {
     const std::string what = status.supply_missing  ? "the motor's supply is missing"
                              : status.not_connected ? "the motor is not connected"
-                                                    : "the board did not make a step";
+                             : status.no_pulse ? "the board's converter gave no pulse within 1 s"
+                                               : "the board did not make a step";
     uncertain(motor, what + ", and it stopped without its ramp");
     end_motion();
     // Until it is tried again.
@@ -381,14 +380,16 @@ void CommutatorMaster::reconfigure(link::McuIndex, link::McuSetup setup) {
 }
 
 Result<void> CommutatorMaster::check_room(link::McuIndex, const link::McuSetup& setup) const {
+  const std::uint64_t per_s = exchange_.most_steps_per_s();
   for (const link::TableRef& ref : setup.tables) {
     const std::uint64_t fastest_ns =
         std::uint64_t{ref.table->time_unit_ns} * bushd_table_fastest(ref.table);
-    if (fastest_ns * codes_per_s_ >= 1'000'000'000) continue;
+    if (fastest_ns * per_s >= 1'000'000'000) continue;
     return fail(fmt::format(
-        "makes steps no closer together than one delay code, {} ns by its start_hz, and its "
-        "motors' tables have steps {} ns apart: use a slower table",
-        1'000'000'000 / codes_per_s_, fastest_ns));
+        "makes steps no closer together than one {}, {} ns by its {}, and its motors' tables have "
+        "steps {} ns apart: use a slower table",
+        has_converter_ ? "period of its converter" : "delay code", 1'000'000'000 / per_s,
+        has_converter_ ? "max_hz" : "start_hz", fastest_ns));
   }
   return {};
 }

@@ -67,7 +67,8 @@ class CommutatorMaster final : public link::BusMaster {
   void bind_to_stop(link::McuIndex, bushd_stop_mode mode) override { emergency_stop(mode); }
 
   void reconfigure(link::McuIndex mcu, link::McuSetup setup) override;
-  // Refuses a table with steps that come sooner than one delay code: the board could not keep it.
+  // Refuses a table with steps that come sooner than the board can make them: sooner than one delay
+  // code, or than a period of its converter.
   Result<void> check_room(link::McuIndex mcu, const link::McuSetup& setup) const override;
   void control(link::McuIndex mcu, std::uint8_t actions) override;
   void set_position(link::McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) override;
@@ -104,7 +105,7 @@ class CommutatorMaster final : public link::BusMaster {
   void take_report(std::int64_t now_us);
 
   const std::int64_t tick_ns_;
-  const std::uint64_t codes_per_s_;
+  const bool has_converter_;
   const std::int64_t settle_us_;  // a code of the board's that nobody waits for is over by then
   link::TickSource& source_;
   link::McuRecord board_;
