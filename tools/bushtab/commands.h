@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/converter.h"
 #include "engine/message.h"
 #include "open_table.h"
 #include "tables/profiles/diagnostics.h"
@@ -39,8 +40,12 @@ struct MotorOptions {
 bushd::Result<std::optional<bushd::tables::profiles::Motor>> load_motor(
     const MotorOptions& options);
 
-// With `steps`, every step of the move that just comes to cruise.
-int show(const Places& places, const std::string& table, bool steps, bool json);
+struct Show {
+  bool steps = false;  // every step of the move that just comes to cruise
+  bool json = false;
+  std::optional<bushd::Converter> converter{};  // with its codes K of these steps
+};
+int show(const Places& places, const std::string& table, const Show& wanted);
 // What a command that wrote a table says: its revision; with `json`, what show says of it.
 int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool json);
 

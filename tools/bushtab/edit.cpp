@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 int unchanged(const Home& home, bool json) {
   const std::string path = home.store.path_of(home.name).string();
-  if (json) return show(Places{}, path, false, true);
+  if (json) return show(Places{}, path, {.json = true});
   fmt::print("{}: nothing to change\n", bushd::printable(path));
   return kDone;
 }

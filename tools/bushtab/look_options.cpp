@@ -13,22 +13,39 @@ namespace {
 
 using bushd::tables::profiles::Quantity;
 
+std::optional<bushd::Converter> converter_of(const std::string& text) {
+  bushd::Converter converter{};
+  const char* const end = text.data() + text.size();
+  const auto hz = std::from_chars(text.data(), end, converter.max_hz);
+  if (hz.ec != std::errc{} || hz.ptr == end || *hz.ptr != ':') return std::nullopt;
+  const auto code = std::from_chars(hz.ptr + 1, end, converter.max_code);
+  if (code.ec != std::errc{} || code.ptr != end) return std::nullopt;
+  return converter;
+}
+
 void add_show(CLI::App& app, const Places& places, const Run& run) {
   struct Options {
     std::string table;
-    bool steps = false;
-    bool json = false;
+    Show wanted;
   };
   const auto options = std::make_shared<Options>();
   CLI::App* show = app.add_subcommand("show", "Show speeds, times and sizes of a table");
   show->add_option("TABLE", options->table, kTable)->required();
-  show->add_flag(
-      "--steps", options->steps,
+  auto* const steps = show->add_flag(
+      "--steps", options->wanted.steps,
       "Print every step of the move that just reaches cruise: delay, time, speed, acceleration");
-  show->add_flag("--json", options->json, "Print JSON");
-  run(show, [&places, options] {
-    return bushtab::show(places, options->table, options->steps, options->json);
-  });
+  show->add_option_function<std::string>(
+          "--converter",
+          [options](const std::string& text) { options->wanted.converter = converter_of(text); },
+          "With --steps, print the code K of each step too, for a voltage-to-frequency converter "
+          "that gives MAX_HZ at the code MAX_CODE")
+      ->type_name("MAX_HZ:MAX_CODE")
+      ->check([](const std::string& text) -> std::string {
+        return converter_of(text) ? "" : text + " is not MAX_HZ:MAX_CODE, such as 2500:250";
+      })
+      ->needs(steps);
+  show->add_flag("--json", options->wanted.json, "Print JSON");
+  run(show, [&places, options] { return bushtab::show(places, options->table, options->wanted); });
 }
 
 void add_check(CLI::App& app, const Places& places, const Run& run) {

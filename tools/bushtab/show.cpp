@@ -64,7 +64,9 @@ const char* word_of(CurveStep::Part part) {
   return "decel";
 }
 
-ordered_json steps_json(const std::vector<CurveStep>& curve) {
+using WantedConverter = std::optional<bushd::Converter>;
+
+ordered_json steps_json(const std::vector<CurveStep>& curve, const WantedConverter& converter) {
   ordered_json steps = ordered_json::array();
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const CurveStep& step = curve[i];
@@ -76,24 +78,29 @@ ordered_json steps_json(const std::vector<CurveStep>& curve) {
                      {"steps_per_s", step.speed_hz()},
                      {"steps_per_s2", nullptr}});
     if (i > 0) steps.back()["steps_per_s2"] = acceleration(curve[i - 1], step);
+    if (converter) {
+      steps.back()["converter_code"] = bushd::converter_code(*converter, step.delay_ns);
+    }
   }
   return steps;
 }
 
-void print_steps(const std::vector<CurveStep>& curve) {
-  fmt::print("\n{:>6}  {:<6} {:>6} {:>14} {:>14} {:>12} {:>14}\n", "step", "part", "index",
-             "delay us", "time ms", "steps/s", "steps/s²");
+void print_steps(const std::vector<CurveStep>& curve, const WantedConverter& converter) {
+  fmt::print("\n{:>6}  {:<6} {:>6} {:>14} {:>14} {:>12} {:>14}{}\n", "step", "part", "index",
+             "delay us", "time ms", "steps/s", "steps/s²", converter ? "    K" : "");
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const CurveStep& step = curve[i];
     const std::string change =
         i == 0 ? "-" : fmt::format("{:.6g}", acceleration(curve[i - 1], step));
-    fmt::print("{:>6}  {:<6} {:>6} {:>14.3f} {:>14.6f} {:>12.6g} {:>14}\n", i + 1,
+    const std::string code =
+        converter ? fmt::format(" {:>4}", bushd::converter_code(*converter, step.delay_ns)) : "";
+    fmt::print("{:>6}  {:<6} {:>6} {:>14.3f} {:>14.6f} {:>12.6g} {:>14}{}\n", i + 1,
                word_of(step.part), step.index, static_cast<double>(step.delay_ns) * 1e-3,
-               static_cast<double>(step.time_ns) * 1e-6, step.speed_hz(), change);
+               static_cast<double>(step.time_ns) * 1e-6, step.speed_hz(), change, code);
   }
 }
 
-void print_as_json(const Table& table, bool steps) {
+void print_as_json(const Table& table, bool steps, const WantedConverter& converter) {
   const bushd_table& view = table.view();
   ordered_json json = {
       {"name", table.name()},
@@ -108,7 +115,7 @@ void print_as_json(const Table& table, bool steps) {
       {"cruise", {{"code", view.cruise}, {"steps_per_s", steps_per_s(table, view.cruise)}}},
       {"shortest_cruising_move_steps", shortest_cruising_move(view)},
       {"longest_tick_us", longest_tick_us(view)}};
-  if (steps) json["steps"] = steps_json(curve_of(table));
+  if (steps) json["steps"] = steps_json(curve_of(table), converter);
   print_json(json);
 }
 
@@ -142,16 +149,39 @@ void print_text(const Table& table) {
   }
 }
 
+// As the configuration of a bus that has it is refused.
+bushd::Result<void> keeps(const Table& table, const bushd::Converter& converter) {
+  if (converter.max_code == 0 || converter.max_code > bushd::kMaxConverterCode ||
+      converter.max_hz > bushd::kMaxConverterHz ||
+      converter.max_hz < bushd::kLeastHzPerCode * converter.max_code) {
+    return bushd::fail(fmt::format(
+        "--converter {}:{}: allowed is a MAX_CODE of 1..{}, and a MAX_HZ of {} times it to {}",
+        converter.max_hz, converter.max_code, bushd::kMaxConverterCode, bushd::kLeastHzPerCode,
+        bushd::kMaxConverterHz));
+  }
+  const bushd_table& view = table.view();
+  const std::uint64_t fastest_ns = std::uint64_t{view.time_unit_ns} * bushd_table_fastest(&view);
+  if (bushd::converter_period_ns(converter, converter.max_code) <= fastest_ns) return {};
+  return bushd::fail(
+      fmt::format("the table has steps {} ns apart, and the converter gives no more than {} "
+                  "pulses/s: use a slower table, or a converter with a higher MAX_HZ",
+                  fastest_ns, converter.max_hz));
+}
+
 }  // namespace
 
-int show(const Places& places, const std::string& name, bool steps, bool json) {
+int show(const Places& places, const std::string& name, const Show& wanted) {
   const auto table = open_table(places, name);
   if (!table) return refuse(table.error());
-  if (json) {
-    print_as_json(**table, steps);
+  if (wanted.converter) {
+    const auto kept = keeps(**table, *wanted.converter);
+    if (!kept) return refuse(kept.error());
+  }
+  if (wanted.json) {
+    print_as_json(**table, wanted.steps, wanted.converter);
   } else {
     print_text(**table);
-    if (steps) print_steps(curve_of(**table));
+    if (wanted.steps) print_steps(curve_of(**table), wanted.converter);
   }
   return kDone;
 }
@@ -159,7 +189,7 @@ int show(const Places& places, const std::string& name, bool steps, bool json) {
 int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool json) {
   if (!revision) return refuse(revision.error());
   const std::string path = home.store.path_of(home.name).string();
-  if (json) return show(Places{}, path, false, true);
+  if (json) return show(Places{}, path, {.json = true});
   fmt::print("{}: revision {}\n", bushd::printable(path), *revision);
   return kDone;
 }

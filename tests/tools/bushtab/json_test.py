@@ -8,6 +8,7 @@ import re
 import subprocess
 import tempfile
 import unittest
+from fractions import Fraction
 
 TABLE = 'name = "t"\ntime_unit_ns = 1000\naccel = [90, 70, 50]\n'
 WITHOUT_DATA = {"plot", "tui", "wizard"}  # what they print is for people
@@ -59,6 +60,34 @@ class Json(unittest.TestCase):
         self.assertEqual(self.json("tag", "t", "good", "2"), {"name": "t", "revision": 2, "tag": "good"})
         self.assertEqual(self.json("revert", "t", "good")["accel"]["slowest_code"], 90)
         self.assertEqual(self.json("log", "t")[-2]["tags"], ["good"])
+
+    def test_codes_of_a_converter_are_the_largest_that_are_not_too_fast(self):
+        for max_hz, max_code in ((2500, 250), (2500, 255), (9999, 1), (2500, 7)):
+            per_code = Fraction(max_hz, max_code)
+            shown = self.json("show", "bushd2-constant", "--steps", "--converter", f"{max_hz}:{max_code}")
+            for step in shown["steps"]:
+                speed = Fraction(10**9, step["delay_ns"])
+                code = step["converter_code"]
+                self.assertLessEqual(code * per_code, speed)
+                self.assertTrue(code == max_code or (code + 1) * per_code > speed)
+        self.assertNotIn("converter_code", self.json("show", "t", "--steps")["steps"][0])
+
+    def test_converter_that_no_board_has_is_refused(self):
+        for converter, said in (
+            ("2500:256", "allowed is a MAX_CODE of 1..255"),
+            ("2500:0", "allowed is a MAX_CODE of 1..255"),
+            ("400:201", "a MAX_HZ of 2 times it to 10000"),
+            ("10001:250", "a MAX_HZ of 2 times it to 10000"),
+            ("2499:250", "the table has steps 400000 ns apart"),
+        ):
+            done = self.bushtab("show", "bushd2-constant", "--steps", "--converter", converter)
+            self.assertEqual((done.returncode, done.stdout), (1, ""))
+            self.assertIn(said, done.stderr)
+        self.assertEqual(self.bushtab("show", "t", "--converter", "2500:250").returncode, 2)
+        for bad in ("2500", "2500:", ":250", "2500:250x", "-1:2", "2500:99999999999"):
+            done = self.bushtab("show", "t", "--steps", "--converter", bad)
+            self.assertEqual(done.returncode, 2, bad)
+            self.assertIn("is not MAX_HZ:MAX_CODE, such as 2500:250", done.stderr)
 
     def test_refusal_prints_no_data(self):
         done = self.bushtab("set", "t", "1", "95", "--json")

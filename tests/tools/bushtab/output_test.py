@@ -14,6 +14,7 @@ COMMANDS = [
     ["show", "t"],
     ["show", "t", "--json"],
     ["show", "t", "--steps"],
+    ["show", "bushd2-constant", "--steps", "--converter", "2500:250"],
     ["check", "t"],
     ["list"],
     ["time", "t", "--steps", "5"],
