@@ -110,6 +110,29 @@ class Heritage(EndToEndTest):
         self.assertEqual(judged.returncode, 0, judged.stdout + judged.stderr)
         self.assertIn("2 runs, 700 steps", judged.stdout)
 
+    def test_voltage_to_frequency_converter(self):
+        self.moves_a_motor_by_a_converter()
+
+    def test_converter_at_a_board_that_one_can_build(self):
+        image = pathlib.Path(os.environ.get("CONVERTER_IMAGE", ""))
+        if not image.is_file():
+            self.skipTest("no image of a board with a converter")
+        os.symlink(image, self.file(image.name))
+        words = f"--mcu 1=atmega328p:{image.name}"
+        self.assertIn(f"`{words}`", PAGE.read_text())
+        self.moves_a_motor_by_a_converter(words)
+
+    def moves_a_motor_by_a_converter(self, with_image=""):
+        self.run_section("Voltage-to-frequency converter", with_image)
+        self.assertEqual(self.position("m0"), 250)
+        self.assertEqual(self.programs[1].end(), 0)
+        self.assertEqual(self.programs[0].end(), 0)
+        self.assertIn("step0 550 (at +250)", self.programs[0].said())
+        judge = [sys.executable, "-B", TOP / "tools/check-pulses", "--bus", "board", "--moves", "moves.jsonl", "--trace", "board.vcd"]
+        judged = subprocess.run(judge, cwd=self.folder, capture_output=True, text=True, check=False)
+        self.assertEqual(judged.returncode, 0, judged.stdout + judged.stderr)
+        self.assertIn("2 runs, 550 steps", judged.stdout)
+
     def test_keypads(self):
         files, commands = sections()["Keypads"]
         self.write_files(files)

@@ -40,6 +40,19 @@ BoardSimulator::BoardSimulator(const Options& options, Waiter waiter, Pty pty,
 std::unique_ptr<bushd::sim::BoardEnd> BoardSimulator::make_board(const Options& options,
                                                                  bushd::sim::EdgeSink* trace) {
   const Setup& setup = options.setup;
+  if (setup.converter) {
+    const bushd::sim::FrequencyConverter converter(
+        {.hz_per_code =
+             options.converter.gain * setup.converter->max_hz / setup.converter->max_code,
+         .offset_codes = options.converter.offset_codes,
+         .drift_per_s = options.converter.drift_per_s});
+#ifdef BUSHSIM_AVR
+    if (!options.image.empty()) {
+      return std::make_unique<bushd::sim::AvrBoard>(options.image, setup.baud, converter, trace);
+    }
+#endif
+    return std::make_unique<bushd::sim::BoardLine>(setup.baud, converter, trace);
+  }
 #ifdef BUSHSIM_AVR
   if (!options.image.empty()) {
     return std::make_unique<bushd::sim::AvrBoard>(options.image, setup.baud, setup.board_start_hz,

@@ -17,6 +17,13 @@
 
 namespace bushsim {
 
+// How the converter of a board differs from what the configuration says of it.
+struct ConverterErrors {
+  double gain = 1;          // times that of the configuration
+  double offset_codes = 0;  // sim::FrequencyConverter::Character, as the next one
+  double drift_per_s = 0;
+};
+
 class BoardSimulator {
  public:
   struct Options {
@@ -25,6 +32,7 @@ class BoardSimulator {
     std::vector<std::string> links;  // as of Simulator
     std::string trace;
     std::string image = {};  // that it runs in simavr; "": it is a model of one
+    ConverterErrors converter = {};
   };
   // Makes all that can fail, and takes the signals of Waiter.
   static bushd::Result<std::unique_ptr<BoardSimulator>> create(const Options& options);

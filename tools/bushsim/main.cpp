@@ -127,6 +127,20 @@ int run(int argc, char** argv) {
   auto* const seed = app.add_option("--seed", options.adapter.seed,
                                     "Of the bits that are flipped (default: new; it is printed)")
                          ->needs(bit_errors);
+  bushsim::ConverterErrors converter;
+  auto* const gain =
+      app.add_option("--converter-gain", converter.gain,
+                     "Of a commutator board with a converter: its gain, times that which the "
+                     "configuration has (default 1)")
+          ->check(CLI::Range(0.0, 10.0));
+  auto* const offset = app.add_option("--converter-offset", converter.offset_codes,
+                                      "The same: offset of the converter, in codes (default 0)")
+                           ->check(CLI::Range(-255.0, 255.0));
+  auto* const drift =
+      app.add_option(
+             "--converter-drift", converter.drift_per_s,
+             "The same: by how much its gain grows in a second, 0.001 for 0.1 % (default 0)")
+          ->check(CLI::Range(-1.0, 1.0));
   bool keypad = false;
   app.add_flag("--keypad", keypad,
                "A keypad instead of a bus: what is typed are its keys (f, r, s, x), and what it "
@@ -158,20 +172,25 @@ int run(int argc, char** argv) {
   const auto wired = bushsim::parse_switches(switches, *setup, *images);
   if (!wired) return refuse(wired.error());
   options.switches = *wired;
-  if (options.console && (setup->pulses || setup->board_start_hz != 0)) {
+  if (options.console && (setup->pulses || setup->board)) {
     return refuse(
         {"this bus has no MCUs, where somebody could press something: leave out --console"});
   }
-  if ((latency_ms != 0 || *bit_errors) && (setup->pulses || setup->board_start_hz != 0)) {
+  if ((latency_ms != 0 || *bit_errors) && (setup->pulses || setup->board)) {
     return refuse({"this bus has no MCUs: leave out --latency-ms and --bit-errors"});
   }
-  if (setup->board_start_hz != 0) {
+  if ((*gain || *offset || *drift) && !setup->converter) {
+    return refuse(
+        {"this bus is no board with a converter: leave out --converter-gain, --converter-offset "
+         "and --converter-drift"});
+  }
+  if (setup->board) {
     if (!doubled.empty()) {
       return refuse({"a commutator board is alone on its line: leave out --doubled"});
     }
     const std::string image = images->empty() ? "" : images->begin()->second.path;
     return simulate<bushsim::BoardSimulator>(bushsim::BoardSimulator::Options{
-        options.setup, options.switches, options.links, options.trace, image});
+        options.setup, options.switches, options.links, options.trace, image, converter});
   }
   options.setup.addresses.insert(options.setup.addresses.end(), doubled.begin(), doubled.end());
   if (setup->pulses) return simulate<bushsim::PulseSimulator>(options);

@@ -32,7 +32,9 @@ Result<Setup> load_setup(const std::string& config_path, const std::string& bus)
                 .addresses = {},
                 .measuring = {},
                 .emergency_open = {},
+                .board = candidate.kind == bushd::config::BusKind::kCommutator,
                 .board_start_hz = candidate.start_hz,
+                .converter = candidate.converter,
                 .first_unique_id = (std::uint64_t{i} << 32) + 1};
     for (const auto& mcu : config->mcus) {
       if (mcu.bus.value != i) continue;
@@ -90,7 +92,7 @@ Result<Images> parse_images(const std::vector<std::string>& choices, const Setup
     if (kind == "virtual") continue;
     const std::size_t colon = std::min(kind.find(':'), kind.size());
     const Image image{kind.substr(0, colon), kind.substr(std::min(colon + 1, kind.size()))};
-    const auto missing = missing_for(image.chip, setup.board_start_hz != 0);
+    const auto missing = missing_for(image.chip, setup.board);
     if (!missing) return fault(missing.error().message);
     if (!missing->empty()) return fault("this bushsim was built without " + *missing);
     if (!std::filesystem::exists(image.path)) return fault("there is no such file");
@@ -130,7 +132,7 @@ Result<std::vector<SwitchAt>> parse_switches(const std::vector<std::string>& cho
     if (std::ranges::find(setup.addresses, one.address) == setup.addresses.end()) {
       return fault(fmt::format("bus \"{}\" has no MCU of this address", setup.bus));
     }
-    if (images.contains(one.address) && setup.board_start_hz == 0) {
+    if (images.contains(one.address) && !setup.board) {
       return fault("only virtual MCUs can have one");
     }
     one.options.input = input;

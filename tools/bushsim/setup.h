@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "base/converter.h"
 #include "base/result.h"
 #include "sim/switch.h"
 
@@ -21,7 +23,9 @@ struct Setup {
   std::set<std::uint8_t> measuring;     // of these, the MCUs that measure their supply current
   // Those whose emergency input is active when it is open: closed unless somebody presses.
   std::set<std::uint8_t> emergency_open{};
-  std::uint32_t board_start_hz = 0;   // F_start of a commutator board; 0: it is none
+  bool board = false;                // a bus of kind "commutator"
+  std::uint32_t board_start_hz = 0;  // F_start of it; 0: it has a converter
+  std::optional<bushd::Converter> converter{};
   std::uint64_t first_unique_id = 1;  // of its MCUs: other buses have others
 };
 

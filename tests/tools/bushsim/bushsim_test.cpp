@@ -243,6 +243,8 @@ TEST_F(Bushsim, ImagesAreThoseOfTheirBus) {
   };
   EXPECT_THAT(refused("1=atmega2560:/dev/null"), HasSubstr("which a commutator board has"));
   EXPECT_THAT(refused("2=virtual"), HasSubstr("no MCU of this address"));
+  EXPECT_THAT(refusal({"--config", board, "--link", link, "--converter-gain", "1.1"}),
+              HasSubstr("this bus is no board with a converter"));
 }
 
 #ifdef LM3S_IMAGE
