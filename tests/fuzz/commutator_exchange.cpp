@@ -2,7 +2,8 @@
 // asked for ends once, in an answer, a loss or a cancel; and what is sent is what boards
 // understand.
 //
-// Input: operations of four bytes, what, which and a number of 16 bits.
+// Input: F_start, or the converter that the board has, then operations of four bytes, what, which
+// and a number of 16 bits.
 #include "fuzz/fuzz.h"
 #include "heritage/commutator/exchange.h"
 
@@ -31,13 +32,20 @@ class Listener {
   int selected_ = -1;
 };
 
+Exchange::Setup setup_of(std::uint8_t byte) {
+  if (byte < 200) return {.start_hz = 1u + byte % 100u, .baud = 9600};
+  const std::uint32_t max_code = 1u + (byte - 200u) * 254u / 55u;
+  return {
+      .start_hz = 0, .baud = 9600, .converter = Converter{.max_hz = 10'000, .max_code = max_code}};
+}
+
 }  // namespace
 }  // namespace bushd::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace bushd::fuzz;
   Input input(data, size);
-  Exchange exchange({.start_hz = 1u + input.u8() % 100u, .baud = 9600});
+  Exchange exchange(setup_of(input.u8()));
   Listener board;
   std::int64_t now_us = 0;
   unsigned motor = 0;
