@@ -124,10 +124,10 @@ class Heritage(EndToEndTest):
 
     def moves_a_motor_by_a_converter(self, with_image=""):
         self.run_section("Voltage-to-frequency converter", with_image)
-        self.assertEqual(self.position("m0"), 250)
+        self.assertEqual((self.position("m0"), self.position("m5")), (400, -150))
         self.assertEqual(self.programs[1].end(), 0)
         self.assertEqual(self.programs[0].end(), 0)
-        self.assertIn("step0 550 (at +250)", self.programs[0].said())
+        self.assertIn("step0 400 (at +400), step5 150 (at -150)", self.programs[0].said())
         judge = [sys.executable, "-B", TOP / "tools/check-pulses", "--bus", "board", "--moves", "moves.jsonl", "--trace", "board.vcd"]
         judged = subprocess.run(judge, cwd=self.folder, capture_output=True, text=True, check=False)
         self.assertEqual(judged.returncode, 0, judged.stdout + judged.stderr)
