@@ -40,6 +40,14 @@ Answer answer_of(const api::Reply& reply) {
   return answer;
 }
 
+// A converter does what the configuration says of it, to the last digit.
+std::unique_ptr<sim::BoardLine> new_board(const config::Bus& bus, sim::EdgeSink* sink) {
+  if (!bus.converter) return std::make_unique<sim::BoardLine>(bus.baud, bus.start_hz, sink);
+  const sim::FrequencyConverter exact(
+      {.hz_per_code = static_cast<double>(bus.converter->max_hz) / bus.converter->max_code});
+  return std::make_unique<sim::BoardLine>(bus.baud, exact, sink);
+}
+
 }  // namespace
 
 std::vector<api::MotorAmount> motor_steps(const std::vector<std::string>& motors,
@@ -98,18 +106,6 @@ class Lab::Client final : public api::Session {
   bool has_left = false;
   std::map<std::int64_t, api::Configuration> configurations;
 };
-
-namespace {
-
-// A converter does what the configuration says of it, to the last digit.
-std::unique_ptr<sim::BoardLine> new_board(const config::Bus& bus, sim::EdgeSink* sink) {
-  if (!bus.converter) return std::make_unique<sim::BoardLine>(bus.baud, bus.start_hz, sink);
-  const sim::FrequencyConverter exact(
-      {.hz_per_code = static_cast<double>(bus.converter->max_hz) / bus.converter->max_code});
-  return std::make_unique<sim::BoardLine>(bus.baud, exact, sink);
-}
-
-}  // namespace
 
 Lab::Lab(const std::string& toml, const std::string& glacier, sim::EdgeSink* sink,
          std::uint32_t disabled_capabilities, bool keeps)
