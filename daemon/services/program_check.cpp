@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
 #include "config/words.h"
 #include "engine/frame.h"
 #include "engine/run.h"
+#include "motion/zone_run.h"
 #include "tables/any_line.h"
 
 namespace bushd::daemon {
@@ -97,6 +99,38 @@ Result<tables::TablePtr> written_codes(const Installation& installation, const M
   return made;
 }
 
+constexpr double kSameScale = 1e-9;
+
+// The delays of its envelope, by the table that the motor has now.
+Result<tables::TableContent> envelope_codes(const Installation& installation,
+                                            const CheckedProgram& program) {
+  const tables::SpeedZones& zones = *program.text.envelope;
+  const MotorId id = program.motors.front();
+  const motion::Motor& motor = installation[id];
+  const tables::TablePtr table = installation.table_of(id);
+  if (table->name() != zones.table) {
+    return fail(fmt::format("its envelope is for the table \"{}\", and {} goes by \"{}\"; write "
+                            "an envelope for that one",
+                            zones.table, motor.name(), table->name()));
+  }
+  const units::Scale& scale = motor.scale().coordinates().scale();
+  const double own = static_cast<double>(scale.steps_per_unit.numerator) /
+                     static_cast<double>(scale.steps_per_unit.denominator);
+  if (zones.steps_per_unit && !(std::fabs(own / *zones.steps_per_unit - 1) < kSameScale)) {
+    return fail(fmt::format("its envelope has {:.10g} steps per unit, and {} has {} per {}; write "
+                            "an envelope for this motor",
+                            *zones.steps_per_unit, motor.name(), to_text(scale.steps_per_unit),
+                            scale.unit));
+  }
+  const auto shortest = motor.scale().shortest_delay_at({}, table->view().time_unit_ns);
+  if (!shortest) return fail(motor.name() + ": " + shortest.error().text());
+  const auto run = motion::zone_run(zones, table->view(), *shortest);
+  if (!run) return fail("its envelope: " + run.error().text());
+  auto codes = motion::written_codes(*run, "envelope of " + motor.name());
+  if (!codes) return fail("its envelope " + codes.error().text());
+  return codes;
+}
+
 // The table of its lines: one that the MCU has, or one that it will get.
 Result<void> find_line_table(const Installation& installation, const Mcu& mcu,
                              CheckedProgram& program, programs::McuPlace& place) {
@@ -156,6 +190,11 @@ Result<CheckedProgram> compile_and_walk(const Installation& installation, const 
     if (!its) return fail(its.error());
     places.push_back(std::move(*its));
     program.tables.push_back(installation.table_of(motor)->content_hash());
+  }
+  if (program.text.envelope) {
+    auto codes = envelope_codes(installation, program);
+    if (!codes) return fail(codes.error());
+    program.text.codes = std::move(*codes);
   }
   if ((has_lines(program.text) || program.text.codes) && place.lines) {
     if (auto found = find_line_table(installation, mcu, program, place); !found) {

@@ -92,12 +92,16 @@ class Compiler {
   }
 
   Result<std::int32_t> steps_of(std::size_t i, double value, bool relative) const {
+    return steps_of(i, value, relative, program_.steps);
+  }
+  Result<std::int32_t> steps_of(std::size_t i, double value, bool relative,
+                                bool in_steps) const {
     const MotorPlace& motor = motors_[i];
     const units::Coordinates plain;
-    const units::Coordinates& scale = program_.steps ? plain : motor.coordinates;
+    const units::Coordinates& scale = in_steps ? plain : motor.coordinates;
     const auto steps = relative ? scale.steps_of_distance(value) : scale.steps_of_user(value);
     if (!steps) return fail("motor \"" + motor.name + "\": " + steps.error().message);
-    if (program_.steps && static_cast<double>(*steps) != value) {
+    if (in_steps && static_cast<double>(*steps) != value) {
       return fail("motor \"" + motor.name + "\": not a whole number of steps; allowed: whole ones");
     }
     return static_cast<std::int32_t>(*steps);
@@ -232,10 +236,11 @@ class Compiler {
     out_.put(mcu_.line_bank | (line.elementary ? 0x80u : 0u), 1);
     out_.put(shortest_delay, 2);
     out_.put(line.points.size(), 2);
+    const bool in_steps = line.envelope ? !line.envelope->steps_per_unit : program_.steps;
     for (const Point& point : line.points) {
       for (const std::size_t i : by_output_) {
         if (!point[i]) continue;
-        const auto steps = steps_of(i, *point[i], line.relative);
+        const auto steps = steps_of(i, *point[i], line.relative, in_steps);
         if (!steps) return fail(steps.error());
         out_.put(static_cast<std::uint32_t>(*steps), 4);
       }

@@ -10,6 +10,7 @@
 #include "engine/program.h"
 #include "programs/parse_head.h"
 #include "programs/program.h"
+#include "tables/speed_zones.h"
 #include "tables/table.h"
 #include "tables/toml_file.h"
 #include "tables/toml_reader.h"
@@ -57,6 +58,7 @@ class FrameReader {
       if (toml_.has(line_key)) return put(frame, line(line_key, relative));
     }
     if (toml_.has("travel_by")) return put(frame, travel());
+    if (toml_.has("envelope")) return put(frame, envelope());
     if (toml_.has("wait_s")) return put(frame, wait());
     if (toml_.has("wait_input")) return put(frame, wait_input());
     if (toml_.has("pulse_us")) return put(frame, pulse());
@@ -64,7 +66,7 @@ class FrameReader {
     if (toml_.has("next")) return put(frame, next());
     return fail(toml_.error("",
                             "no frame; allowed: one of move_to, move_by, line_to, line_by, "
-                            "travel_by, wait_s, wait_input, "
+                            "travel_by, envelope, wait_s, wait_input, "
                             "pulse_us, repeat, next"));
   }
 
@@ -137,6 +139,29 @@ class FrameReader {
       line.feed = *feed;
     }
     return line;
+  }
+
+  Result<Line> envelope() const {
+    constexpr const char* kKey = "envelope";
+    if (auto only = toml_.only({kKey}); !only) return fail(only.error());
+    if (program_.motors.size() != 1) {
+      return fail(toml_.error(kKey, "for several motors; allowed: in programs of one motor"));
+    }
+    if (program_.codes) {
+      return fail(toml_.error(kKey, "has delays of its own, beside `codes`; remove one of them"));
+    }
+    const auto name = toml_.string(kKey, "the name of a file");
+    if (!name) return fail(name.error());
+    const auto text = points_(*name);
+    if (!text) return fail(text.error());
+    auto zones = tables::parse_zones(*text, *name);
+    if (!zones) return fail(zones.error());
+    if (zones->by == tables::SpeedZones::By::kPosition) {
+      return fail(toml_.error(kKey, "\"" + *name +
+                                        "\" goes by positions; allowed: by = \"distance\", and "
+                                        "move_to before it"));
+    }
+    return Line{.relative = true, .points = {{zones->end}}, .envelope = std::move(*zones)};
   }
 
   Result<std::optional<double>> speed() const {
@@ -364,6 +389,28 @@ Result<void> check_nesting(const Program& program) {
   return fail("a `repeat` has no `next`; add a frame with next = true where it ends");
 }
 
+// Lines and travels of a program go by one list of delays.
+Result<void> take_envelope(Program& program) {
+  for (const Frame& frame : program.frames) {
+    const Line* const line = std::get_if<Line>(&frame.what);
+    if (line != nullptr && line->envelope && !program.envelope) program.envelope = line->envelope;
+  }
+  if (!program.envelope) return {};
+  for (const Frame& frame : program.frames) {
+    const Line* const line = std::get_if<Line>(&frame.what);
+    if (line != nullptr && line->envelope && *line->envelope != *program.envelope) {
+      return fail(frame.place +
+                  ": a second envelope; a program has one: write another program for it");
+    }
+    if (std::holds_alternative<Travel>(frame.what) || (line != nullptr && !line->envelope)) {
+      return fail(frame.place +
+                  ": a line or a travel, in a program with an envelope, by whose delays it would "
+                  "go; allowed: move_to and move_by");
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Program> parse(std::string_view text, const std::string& file, const ReadPoints& points) {
@@ -388,6 +435,7 @@ Result<Program> parse(std::string_view text, const std::string& file, const Read
     program.frames.push_back(std::move(*frame));
   }
   if (auto nested = check_nesting(program); !nested) return fail(nested.error());
+  if (auto taken = take_envelope(program); !taken) return fail(taken.error());
   if (auto fits = check_power_on(toml, program); !fits) return fail(fits.error());
   return program;
 }

@@ -37,6 +37,9 @@
 //     after_edge_s = 0.15            # of each edge at the trigger input; left out: once, at once
 //     return_s = 0.3
 //
+//     [[frame]]
+//     envelope = "in.envelope"       # a motion of several speeds (tables/speed_zones.h)
+//
 // END is what the file's end is.
 #pragma once
 
@@ -48,6 +51,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "tables/speed_zones.h"
 #include "tables/table.h"
 
 namespace bushd::programs {
@@ -74,6 +78,8 @@ struct Line {
   std::optional<double> speed = {};
   bool elementary = false;  // by engine/elementary.h
   std::optional<double> feed = {};
+  // By these speeds; then its only point is the end, in the unit of these.
+  std::optional<tables::SpeedZones> envelope = {};
 };
 // For one motor.
 struct Travel {
@@ -118,10 +124,12 @@ struct Program {
   bool steps = false;             // positions are steps, not user units
   // In place of tables, for lines and travels of its only motor; in any order.
   std::optional<tables::TableContent> codes{};
+  // That of all its lines. Whoever knows the table of its motor makes `codes` of it.
+  std::optional<tables::SpeedZones> envelope{};
   std::vector<Frame> frames;
 };
 
-// Reads a file of points that the text names, relative to wherever the caller keeps such files.
+// Reads a file of points, or of an envelope, that the text names, relative to wherever the caller keeps such files.
 using ReadPoints = std::function<Result<std::string>(const std::string& file)>;
 
 // `file` is what errors say. Errors name file, line, key and what is allowed.

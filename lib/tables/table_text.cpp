@@ -20,21 +20,6 @@ constexpr std::size_t kCommentColumns = 98;
 
 using Codes = std::vector<std::uint16_t>;
 
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
-      out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
-}
-
 std::string joined(std::span<const std::uint16_t> codes) {
   std::string out;
   for (std::size_t i = 0; i < codes.size(); ++i) {
@@ -191,8 +176,8 @@ class Rewriter {
 
   void set_text(std::string_view key, const std::string& before, const std::string& after) {
     if (before == after) return;
-    if (!document_.contains(key)) return add(key, quoted(after), "name");
-    patch_.replace(value_offset(key), value_end(key), quoted(after));
+    if (!document_.contains(key)) return add(key, quoted_toml(after), "name");
+    patch_.replace(value_offset(key), value_end(key), quoted_toml(after));
   }
 
   std::string text() { return patch_.applied(); }
@@ -214,12 +199,27 @@ class Rewriter {
 
 }  // namespace
 
+std::string quoted_toml(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
+      out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
 std::string to_text(const TableContent& content, const std::vector<std::string>& comments) {
   std::string text;
   for (const std::string& comment : comments) text += wrapped(comment);
-  text += fmt::format("name = {}\n", quoted(content.name));
+  text += fmt::format("name = {}\n", quoted_toml(content.name));
   if (!content.description.empty()) {
-    text += fmt::format("description = {}\n", quoted(content.description));
+    text += fmt::format("description = {}\n", quoted_toml(content.description));
   }
   if (content.revision > 0) text += fmt::format("revision = {}\n", content.revision);
   text += fmt::format("time_unit_ns = {}\n", content.time_unit_ns);

@@ -10,6 +10,9 @@
 
 namespace bushd::tables {
 
+// A string of TOML in its quotes.
+std::string quoted_toml(const std::string& text);
+
 // A new file. Comments come first, a line each, wrapped to 100 columns.
 // Precondition: check(content) finds nothing.
 std::string to_text(const TableContent& content, const std::vector<std::string>& comments = {});

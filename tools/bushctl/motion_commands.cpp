@@ -1,12 +1,15 @@
 // Subcommands that move motors, stop them, and say where they stand.
 #include <fmt/format.h>
 
+#include <chrono>
 #include <memory>
 
 #include "commands.h"
+#include "envelope_move.h"
 #include "move_arguments.h"
 #include "path_file.h"
 #include "render.h"
+#include "where.h"
 
 namespace bushctl {
 namespace {
@@ -45,17 +48,48 @@ int show_plan(const Connection& connection, Move move, bool as_json) {
   });
 }
 
+struct MoveOptions {
+  bool wait = false;
+  bool steps = false;
+  bool dry_run = false;
+  bool json = false;
+  bool line = false;
+  std::string speed;
+  std::string envelope;
+  LineOptions along;
+  std::vector<std::string> words;
+};
+
+constexpr std::chrono::milliseconds kStatusPatience{4000};
+
+// Where its motor stands, and what its scale is, the daemon knows.
+int move_by_envelope(const Connection& connection, const MoveOptions& options) {
+  if (options.words.size() != 1 || options.line || options.steps) {
+    return wrong_usage(bushd::Error{
+        "--envelope is for one motor, and says where it goes: write NAME --envelope ENVELOPE, "
+        "without --line and --steps"});
+  }
+  const auto envelope = read_envelope(options.envelope);
+  if (!envelope) return failed(envelope.error());
+  std::vector<api::MovePath> path;
+  const int code = with_client(connection, [&](Client& client) {
+    const auto status = client.status(kStatusPatience);
+    if (!status) return failure(client, status.error());
+    const auto motors = where(*status, options.words, unix_us());
+    if (!motors) return failed(motors.error());
+    if (motors->size() != 1) return failed(bushd::Error{"--envelope is for one motor"});
+    auto made = envelope_path(*envelope, motors->front(), options.speed);
+    if (!made) return failed(made.error());
+    path = std::move(*made);
+    return static_cast<int>(kDone);
+  });
+  if (code != kDone) return code;
+  return options.dry_run ? show_plan(connection, path, options.json, {})
+                         : send_parts(connection, path, until(options.wait), {});
+}
+
 void add_move(CommandLine& commands) {
-  struct Options {
-    bool wait = false;
-    bool steps = false;
-    bool dry_run = false;
-    bool json = false;
-    bool line = false;
-    std::string speed;
-    LineOptions along;
-    std::vector<std::string> words;
-  };
+  using Options = MoveOptions;
   const auto options = std::make_shared<Options>();
   const auto carry_out = [&commands, options](auto move) {
     const auto speed = parse_speed(options->speed, numbers(options->steps));
@@ -79,7 +113,9 @@ void add_move(CommandLine& commands) {
           "that of these steps.\n"
           "NAME --to POSITION --speed-at AT:SPEED [--speed-at AT:SPEED...] moves one motor, from "
           "each of these positions on not faster than that, until the next one; it makes no last "
-          "approach for backlash.")
+          "approach for backlash.\n"
+          "NAME --envelope ENVELOPE moves one motor by an envelope of 'bushtab envelope': a name in "
+          "/etc/bushd/tables, or a file NAME.envelope with its table beside it.")
       .flag("--line", &options->line,
             "Along a straight line; all motors on one bus, or each at a serial port of its own")
       .flag("--wait", &options->wait, "Wait for the result")
@@ -91,12 +127,15 @@ void add_move(CommandLine& commands) {
       .option_with("--line", "--feed", &options->along.feed,
                    "With --line: not faster along the way than this, per second, in the unit that "
                    "the motors share")
+      .option("--envelope", &options->envelope,
+              "By the speeds of this envelope, to where it ends")
       .flag("--steps", &options->steps, kSteps)
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")
       .flag_with("--dry-run", "--json", &options->json, "With --dry-run: print JSON")
       .raw_words(&options->words, "NAME DISTANCE|NAME --to POSITION...")
       .run([&commands, carry_out, options] {
+        if (!options->envelope.empty()) return move_by_envelope(commands.connection(), *options);
         const Numbers as = numbers(options->steps);
         const auto profile = parse_speed_profile(options->words, as, options->speed);
         if (!profile) return wrong_usage(profile.error());

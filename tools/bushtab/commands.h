@@ -10,10 +10,12 @@
 #include <vector>
 
 #include "base/converter.h"
+#include "curve.h"
 #include "engine/message.h"
 #include "open_table.h"
 #include "tables/profiles/diagnostics.h"
 #include "tables/profiles/make.h"
+#include "tables/speed_zones.h"
 
 namespace bushtab {
 
@@ -147,12 +149,34 @@ int plot(const Places& places, const std::vector<std::string>& tables);
 // Precondition: as many names as tables.
 void draw_in_terminal(const std::vector<bushd::tables::TablePtr>& tables,
                       const std::vector<std::string>& names);
+// Under a title that says what is drawn; over the steps of the move, or over time.
+enum class Over { kSteps, kTime };
+void draw_in_terminal(const std::string& title, const std::vector<Curve>& curves, Over over);
 struct Plot {
   std::vector<std::string> tables;
   std::string svg;  // files; empty: none
   std::string png;
 };
 int draw_pictures(const Places& places, const Plot& wanted);
+// `heading` stands above the legends.
+bushd::Result<void> write_pictures(const std::string& heading, const std::vector<Curve>& curves,
+                                   const std::string& svg, const std::string& png);
+
+// An envelope: its figures and its drawing. With changes it is written before.
+struct Envelope {
+  std::string name;  // or a path
+  std::optional<std::string> table{};
+  std::optional<std::string> by{};
+  std::optional<double> steps_per_unit{};
+  std::vector<bushd::tables::SpeedZones::Zone> zones{};  // none: those of the file
+  std::optional<double> end{};
+  std::optional<std::string> description{};
+  bool replace = false;  // what is given, in an envelope that is there
+  bool json = false;
+  std::string svg{};  // files; empty: none
+  std::string png{};
+};
+int envelope(const Places& places, const Envelope& wanted);
 int time(const Places& places, const std::string& table, const std::vector<std::uint32_t>& steps,
          bool json);
 int diff(const Places& places, const std::string& before, const std::string& after, bool json);

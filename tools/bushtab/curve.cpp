@@ -12,7 +12,7 @@ std::vector<CurveStep> curve_of(const bushd::tables::Table& table) {
   const auto add = [&](CurveStep::Part part, std::uint32_t index, std::uint16_t code) {
     const std::uint64_t delay_ns = std::uint64_t{std::max(code, view.cruise)} * view.time_unit_ns;
     time_ns += delay_ns;
-    curve.push_back({part, index, delay_ns, time_ns});
+    curve.push_back({part, index, delay_ns, time_ns, curve.size() + 1});
   };
   for (std::uint32_t i = 0; i < view.accel.count; ++i) {
     add(CurveStep::Part::kAccel, i, view.accel.code[i]);

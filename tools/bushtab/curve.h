@@ -1,8 +1,9 @@
 // The steps of a table's move that just comes to cruise: up one side, one step at cruise, down the
-// other. What show, plot and the pictures tell of a table.
+// other. What show, plot and the pictures tell of a table, and of an envelope.
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "tables/table.h"
@@ -15,12 +16,19 @@ struct CurveStep {
   std::uint32_t index = 0;     // of the code in its side, in the order of the file
   std::uint64_t delay_ns = 0;  // before the step; never shorter than the cruise delay
   std::uint64_t time_ns = 0;   // at which the step falls
+  std::uint64_t step = 0;      // of the move, from 1
 
   double speed_hz() const { return 1e9 / static_cast<double>(delay_ns); }
   // The speed of a delay is that in its middle.
   double middle_s() const {
     return static_cast<double>(time_ns) * 1e-9 - static_cast<double>(delay_ns) * 0.5e-9;
   }
+};
+
+// What is drawn, with its name.
+struct Curve {
+  std::string legend;
+  std::vector<CurveStep> steps;  // not empty
 };
 
 std::vector<CurveStep> curve_of(const bushd::tables::Table& table);

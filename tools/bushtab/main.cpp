@@ -34,6 +34,7 @@ int run(int argc, char** argv) {
   };
   bushtab::add_new_options(app, places, on);
   bushtab::add_wizard_options(app, places, on);
+  bushtab::add_envelope_options(app, places, on);
   bushtab::add_edit_options(app, places, on);
   bushtab::add_look_options(app, places, on);
   if (const auto words = bushd::completion_asked(argc, argv)) {

@@ -21,6 +21,7 @@ inline constexpr const char* kTable = "A table's file or name";
 void add_look_options(CLI::App& app, const Places& places, const Run& run);
 void add_edit_options(CLI::App& app, const Places& places, const Run& run);
 void add_new_options(CLI::App& app, const Places& places, const Run& run);
+void add_envelope_options(CLI::App& app, const Places& places, const Run& run);
 void add_wizard_options(CLI::App& app, const Places& places, const Run& run);
 
 void add_motor_options(CLI::App* command, MotorOptions& motor);

@@ -38,11 +38,6 @@ constexpr std::array<std::uint32_t, 7> kColours{0x0072B2, 0xD55E00, 0x009E73, 0x
 // over this share of the longest move shows what a motor feels.
 constexpr int kAccelerationWindows = 120;
 
-struct Curve {
-  std::string legend;
-  std::vector<CurveStep> steps;
-};
-
 struct Range {
   double low = 0;
   double high = 0;
@@ -161,9 +156,8 @@ std::vector<Panel> panels_of(const std::vector<Curve>& curves) {
   for (const Curve& curve : curves) {
     auto& steps = over_steps.curves.emplace_back();
     auto& times = over_time.curves.emplace_back();
-    for (std::size_t i = 0; i < curve.steps.size(); ++i) {
-      const CurveStep& step = curve.steps[i];
-      steps.push_back({static_cast<double>(i + 1), step.speed_hz()});
+    for (const CurveStep& step : curve.steps) {
+      steps.push_back({static_cast<double>(step.step), step.speed_hz()});
       times.push_back({step.middle_s() * 1e3, step.speed_hz()});
     }
     acceleration.curves.push_back(accelerations(curve.steps, longest_s / kAccelerationWindows));
@@ -178,9 +172,10 @@ std::vector<Panel> panels_of(const std::vector<Curve>& curves) {
   return panels;
 }
 
-void draw(Drawing& drawing, const std::vector<Curve>& curves, const std::vector<Panel>& panels) {
+void draw(Drawing& drawing, const std::string& heading, const std::vector<Curve>& curves,
+          const std::vector<Panel>& panels) {
   double top = kMargin;
-  drawing.text({kPlotLeft, top + kTextSize}, Anchor::kStart, "Moves that just come to cruise:");
+  drawing.text({kPlotLeft, top + kTextSize}, Anchor::kStart, heading);
   top += kLegendLine;
   for (std::size_t i = 0; i < curves.size(); ++i) {
     const double middle = top + kLegendLine / 2.0;
@@ -205,20 +200,26 @@ int draw_pictures(const Places& places, const Plot& wanted) {
     if ((*table)->revision() > 0) legend += fmt::format(", revision {}", (*table)->revision());
     curves.push_back({legend, curve_of(**table)});
   }
+  const auto written =
+      write_pictures("Moves that just come to cruise:", curves, wanted.svg, wanted.png);
+  return written ? kDone : refuse(written.error());
+}
+
+bushd::Result<void> write_pictures(const std::string& heading, const std::vector<Curve>& curves,
+                                   const std::string& svg, const std::string& png) {
   const std::vector<Panel> panels = panels_of(curves);
   const int height = kMargin + kLegendLine * static_cast<int>(1 + curves.size()) +
                      kPanelHeight * static_cast<int>(panels.size());
   const auto write = [&](const std::string& path, auto make_drawing) -> bushd::Result<void> {
     if (path.empty()) return {};
     const auto drawing = make_drawing(kWidth, height);
-    draw(*drawing, curves, panels);
+    draw(*drawing, heading, curves, panels);
     const auto bytes = drawing->finish();
     if (!bytes) return bushd::fail(bytes.error());
     return bushd::tables::store::replace_file(path, *bytes);
   };
-  if (auto written = write(wanted.svg, svg_drawing); !written) return refuse(written.error());
-  if (auto written = write(wanted.png, png_drawing); !written) return refuse(written.error());
-  return kDone;
+  if (auto written = write(svg, svg_drawing); !written) return written;
+  return write(png, png_drawing);
 }
 
 }  // namespace bushtab

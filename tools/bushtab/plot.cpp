@@ -1,4 +1,5 @@
-// plot: the speed over time of a table's two sides, in the terminal.
+// plot: the speed over time of a table's two sides, or that of an envelope over its way, in the
+// terminal.
 #include <fmt/core.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -69,28 +70,37 @@ int plot(const Places& places, const std::vector<std::string>& names) {
 
 void draw_in_terminal(const std::vector<bushd::tables::TablePtr>& all,
                       const std::vector<std::string>& names) {
-  std::vector<std::vector<CurveStep>> curves;
+  std::vector<Curve> curves;
+  for (std::size_t i = 0; i < all.size(); ++i) curves.push_back({names[i], curve_of(*all[i])});
+  draw_in_terminal("steps/s of a move that just comes to cruise", curves, Over::kTime);
+}
+
+void draw_in_terminal(const std::string& title, const std::vector<Curve>& curves, Over over) {
   double end_s = 0;
   double top_hz = 0;
-  for (const bushd::tables::TablePtr& table : all) {
-    curves.push_back(curve_of(*table));
-    for (const CurveStep& step : curves.back()) top_hz = std::max(top_hz, step.speed_hz());
-    end_s = std::max(end_s, static_cast<double>(curves.back().back().time_ns) * 1e-9);
+  std::uint64_t end_step = 1;
+  for (const Curve& curve : curves) {
+    for (const CurveStep& step : curve.steps) top_hz = std::max(top_hz, step.speed_hz());
+    end_s = std::max(end_s, static_cast<double>(curve.steps.back().time_ns) * 1e-9);
+    end_step = std::max(end_step, curve.steps.back().step);
   }
   const int width = columns() - kLabelColumns;
   const bool coloured = isatty(STDOUT_FILENO) == 1 && std::getenv("NO_COLOR") == nullptr;
   Canvas canvas(width, kRows);
   const auto place = [&](const CurveStep& step) {
-    return Canvas::Place{step.middle_s() / end_s, step.speed_hz() / top_hz};
+    const double across = over == Over::kTime
+                              ? step.middle_s() / end_s
+                              : static_cast<double>(step.step) / static_cast<double>(end_step);
+    return Canvas::Place{across, step.speed_hz() / top_hz};
   };
   for (std::size_t i = 0; i < curves.size(); ++i) {
-    const auto& curve = curves[i];
+    const auto& curve = curves[i].steps;
     for (std::size_t step = 0; step < curve.size(); ++step) {
       canvas.line(place(curve[step == 0 ? 0 : step - 1]), place(curve[step]), static_cast<int>(i));
     }
   }
 
-  fmt::print("steps/s of a move that just comes to cruise\n");
+  fmt::print("{}\n", bushd::printable(title));
   constexpr int kRowsPerLabel = 5;
   for (int row = 0; row < kRows; ++row) {
     const double speed_hz = top_hz * (1 - static_cast<double>(row) / (kRows - 1));
@@ -100,13 +110,15 @@ void draw_in_terminal(const std::vector<bushd::tables::TablePtr>& all,
   }
   std::string axis;
   for (int i = 0; i < width; ++i) axis += "─";
-  const std::string end = fmt::format("{:.6g} ms", end_s * 1e3);
+  const std::string end = over == Over::kTime ? fmt::format("{:.6g} ms", end_s * 1e3)
+                                              : fmt::format("{} steps", end_step);
   fmt::print("{:>9} └{}\n{:>11}0{:>{}}\n", "", axis, "", end, width - 1);
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    const std::string name = bushd::printable(curves[i].legend);
     if (coloured) {
-      fmt::print("\033[{}m{}\033[0m\n", colour_of(static_cast<int>(i)), bushd::printable(names[i]));
+      fmt::print("\033[{}m{}\033[0m\n", colour_of(static_cast<int>(i)), name);
     } else {
-      fmt::print("{}\n", bushd::printable(names[i]));
+      fmt::print("{}\n", name);
     }
   }
 }
