@@ -109,18 +109,19 @@ Result<tables::TableContent> envelope_codes(const Installation& installation,
   const motion::Motor& motor = installation[id];
   const tables::TablePtr table = installation.table_of(id);
   if (table->name() != zones.table) {
-    return fail(fmt::format("its envelope is for the table \"{}\", and {} goes by \"{}\"; write "
-                            "an envelope for that one",
-                            zones.table, motor.name(), table->name()));
+    return fail(
+        fmt::format("its envelope is for the table \"{}\", and {} goes by \"{}\"; write "
+                    "an envelope for that one",
+                    zones.table, motor.name(), table->name()));
   }
   const units::Scale& scale = motor.scale().coordinates().scale();
   const double own = static_cast<double>(scale.steps_per_unit.numerator) /
                      static_cast<double>(scale.steps_per_unit.denominator);
   if (zones.steps_per_unit && !(std::fabs(own / *zones.steps_per_unit - 1) < kSameScale)) {
-    return fail(fmt::format("its envelope has {:.10g} steps per unit, and {} has {} per {}; write "
-                            "an envelope for this motor",
-                            *zones.steps_per_unit, motor.name(), to_text(scale.steps_per_unit),
-                            scale.unit));
+    return fail(fmt::format(
+        "its envelope has {:.10g} steps per unit, and {} has {} per {}; write "
+        "an envelope for this motor",
+        *zones.steps_per_unit, motor.name(), to_text(scale.steps_per_unit), scale.unit));
   }
   const auto shortest = motor.scale().shortest_delay_at({}, table->view().time_unit_ns);
   if (!shortest) return fail(motor.name() + ": " + shortest.error().text());

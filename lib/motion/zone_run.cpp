@@ -49,8 +49,8 @@ Result<ZoneRun> zone_run(const SpeedZones& zones, const bushd_table& table,
     if (to == from) {
       return at_zone(i, "has no step: it ends at the step at which it begins; make it longer");
     }
-    const auto delay = units::Coordinates().delay_at(zones.steps_of(zones.zones[i].speed),
-                                                     table.time_unit_ns);
+    const auto delay =
+        units::Coordinates().delay_at(zones.steps_of(zones.zones[i].speed), table.time_unit_ns);
     if (!delay) return at_zone(i, delay.error().message);
     path.add(std::array{to}, std::array<bushd_delay, 1>{*delay});
     from = to;
@@ -85,9 +85,10 @@ Result<tables::TableContent> written_codes(const ZoneRun& run, const std::string
   };
   for (auto part = parts.begin(); part != parts.end(); ++part) {
     if (part->delay > UINT16_MAX) {
-      return fail(fmt::format("has a step of {} time units of its table; allowed: 65535. Use a "
-                              "higher speed, or a table with a longer time unit",
-                              part->delay));
+      return fail(
+          fmt::format("has a step of {} time units of its table; allowed: 65535. Use a "
+                      "higher speed, or a table with a longer time unit",
+                      part->delay));
     }
     if (part < cruise) append(content.accel, part->steps, part->delay);
     if (part > cruise) append(*content.decel, part->steps, part->delay);
@@ -113,14 +114,15 @@ Result<tables::TableContent> written_codes(const ZoneRun& run, const std::string
     decel.insert(decel.begin(), cruise_code);
     --left;
   }
-  content.cruise = left > 0 ? cruise_code
-                            : std::min(*std::ranges::min_element(accel),
-                                       *std::ranges::min_element(decel));
+  content.cruise =
+      left > 0 ? cruise_code
+               : std::min(*std::ranges::min_element(accel), *std::ranges::min_element(decel));
   const std::size_t codes = accel.size() + decel.size();
   if (codes <= tables::kMaxCodes) return content;
-  return fail(fmt::format("changes its speed in {} of its steps; allowed: {}. Use a shorter "
-                          "envelope, or a table with fewer codes",
-                          codes, tables::kMaxCodes));
+  return fail(
+      fmt::format("changes its speed in {} of its steps; allowed: {}. Use a shorter "
+                  "envelope, or a table with fewer codes",
+                  codes, tables::kMaxCodes));
 }
 
 }  // namespace bushd::motion

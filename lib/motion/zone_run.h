@@ -20,8 +20,8 @@ struct ZoneRun {
     std::uint64_t end_ns = 0;
   };
   std::uint32_t unit_ns = 1;
-  bool negative = false;  // towards falling numbers
-  Profile delays{};       // of all steps, in units
+  bool negative = false;      // towards falling numbers
+  Profile delays{};           // of all steps, in units
   std::vector<Part> parts{};  // by zone
 
   std::uint32_t steps() const;

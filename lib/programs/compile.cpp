@@ -94,8 +94,7 @@ class Compiler {
   Result<std::int32_t> steps_of(std::size_t i, double value, bool relative) const {
     return steps_of(i, value, relative, program_.steps);
   }
-  Result<std::int32_t> steps_of(std::size_t i, double value, bool relative,
-                                bool in_steps) const {
+  Result<std::int32_t> steps_of(std::size_t i, double value, bool relative, bool in_steps) const {
     const MotorPlace& motor = motors_[i];
     const units::Coordinates plain;
     const units::Coordinates& scale = in_steps ? plain : motor.coordinates;

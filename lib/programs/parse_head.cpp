@@ -164,8 +164,9 @@ Result<void> check_power_on(const TomlReader& toml, const Program& program) {
     return fail(toml.error("codes", "are not kept over a power cut; allowed: without at_power_on"));
   }
   if (program.envelope) {
-    return fail(toml.error("at_power_on", "true, and an envelope is not kept over a power cut; "
-                                          "allowed: move_by and line_by"));
+    return fail(toml.error("at_power_on",
+                           "true, and an envelope is not kept over a power cut; "
+                           "allowed: move_by and line_by"));
   }
   for (const Frame& frame : program.frames) {
     const auto* const move = std::get_if<Move>(&frame.what);

@@ -129,7 +129,8 @@ struct Program {
   std::vector<Frame> frames;
 };
 
-// Reads a file of points, or of an envelope, that the text names, relative to wherever the caller keeps such files.
+// Reads a file of points, or of an envelope, that the text names, relative to wherever the caller
+// keeps such files.
 using ReadPoints = std::function<Result<std::string>(const std::string& file)>;
 
 // `file` is what errors say. Errors name file, line, key and what is allowed.

@@ -15,8 +15,7 @@ namespace bushd::tables {
 namespace {
 
 constexpr std::string_view kExtension = ".envelope";
-constexpr TextLimit kEnvelopeLimit = {.bytes = 64 * 1024,
-                                      .told = "100 zones need a tenth of that"};
+constexpr TextLimit kEnvelopeLimit = {.bytes = 64 * 1024, .told = "100 zones need a tenth of that"};
 constexpr const char* kZonesAllowed =
     "1 to 100 pairs, each [from, speed], as in [[0, 1000], [2500, 500]]";
 // Codes are rounded up, so a table that was made for 4000 steps/s may reach a little less.
@@ -37,8 +36,7 @@ Result<SpeedZones::Zone> read_zone(const TomlReader& toml, std::size_t index,
   const auto speed = toml.number(kKey, index, (*pair)[1], "a speed above 0");
   if (!speed) return fail(speed.error());
   if (*speed > 0) return SpeedZones::Zone{*from, *speed};
-  return fail(
-      toml.error(kKey, index, fmt::format("has the speed {}; allowed: above 0", *speed)));
+  return fail(toml.error(kKey, index, fmt::format("has the speed {}; allowed: above 0", *speed)));
 }
 
 // Each zone, and then the end, lies further on in one direction.
@@ -69,9 +67,9 @@ Result<void> check_order(const TomlReader& toml, const SpeedZones& read) {
   }
   for (const double place : {first, read.end}) {
     if (std::fabs(read.steps_of(place)) <= SpeedZones::kMostSteps) continue;
-    return fail(toml.error(place == read.end ? "end" : "zones",
-                           fmt::format("leads to {}; allowed: up to {} steps from 0", place,
-                                       SpeedZones::kMostSteps)));
+    return fail(toml.error(
+        place == read.end ? "end" : "zones",
+        fmt::format("leads to {}; allowed: up to {} steps from 0", place, SpeedZones::kMostSteps)));
   }
   return {};
 }
@@ -132,9 +130,9 @@ Result<SpeedZones> parse_zones(std::string_view text, const std::string& file) {
     const auto scale = toml.number("steps_per_unit", "a number above 0");
     if (!scale) return fail(scale.error());
     if (*scale <= 0) {
-      return fail(toml.error("steps_per_unit",
-                             fmt::format("is {}; allowed: a number above 0, that of the motor",
-                                         *scale)));
+      return fail(
+          toml.error("steps_per_unit",
+                     fmt::format("is {}; allowed: a number above 0, that of the motor", *scale)));
     }
     read.steps_per_unit = *scale;
   }
@@ -158,8 +156,8 @@ std::string to_text(const SpeedZones& zones) {
     text += fmt::format("description = {}\n", quoted_toml(zones.description));
   }
   text += fmt::format("table = {}\n", quoted_toml(zones.table));
-  text += fmt::format("by = \"{}\"\n",
-                      zones.by == SpeedZones::By::kDistance ? "distance" : "position");
+  text +=
+      fmt::format("by = \"{}\"\n", zones.by == SpeedZones::By::kDistance ? "distance" : "position");
   if (zones.steps_per_unit) text += fmt::format("steps_per_unit = {}\n", *zones.steps_per_unit);
   text += "zones = [\n";
   for (const SpeedZones::Zone& zone : zones.zones) {

@@ -46,8 +46,8 @@ std::vector<std::uint32_t> as_zones_say(const TableContent& content, const Speed
   for (std::size_t i = 0; i < zones.zones.size(); ++i) {
     const double to = i + 1 < zones.zones.size() ? zones.zones[i + 1].from : zones.end;
     const auto steps = static_cast<std::size_t>(std::fabs(to - zones.zones[i].from));
-    const auto delay = static_cast<std::uint32_t>(
-        std::ceil(1e9 / (zones.zones[i].speed * content.time_unit_ns)));
+    const auto delay =
+        static_cast<std::uint32_t>(std::ceil(1e9 / (zones.zones[i].speed * content.time_unit_ns)));
     slowest.insert(slowest.end(), steps, delay);
   }
   const std::uint32_t cruise = content.cruise.value_or(content.accel.back());
@@ -167,8 +167,7 @@ TEST(ZoneRun, WhatCannotBeMadeIsRefused) {
               HasSubstr("zones[0]: has 6000 steps/s, and the table \"t\" reaches 5000"));
   EXPECT_THAT(refusal({.table = "t", .zones = {{0, 100}, {1.2, 200}, {1.4, 100}}, .end = 9}),
               HasSubstr("zones[1]: has no step"));
-  EXPECT_THAT(refusal({.table = "t", .zones = {{0, 1e-4}}, .end = 9}),
-              HasSubstr("zones[0]: "));
+  EXPECT_THAT(refusal({.table = "t", .zones = {{0, 1e-4}}, .end = 9}), HasSubstr("zones[0]: "));
   EXPECT_THAT(refusal({.table = "t", .zones = {{0, 10}}, .end = 9}),
               HasSubstr("has a step of 100000 time units of its table; allowed: 65535"));
   EXPECT_THAT(refusal({.table = "t", .zones = {{0, 1000}}, .end = 1}),

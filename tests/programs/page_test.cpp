@@ -64,14 +64,18 @@ const std::string kFrameRow = "| key | value | allowed | and beside it |";
 const std::string kBesideRow = "| key beside it | value | allowed |";
 
 std::string why_not(const std::string& text) {
-  const auto program = programs::parse(text, "page.toml", [](const std::string&) {
-    return Result<std::string>(blocks("csv").front());
+  const auto program = programs::parse(text, "page.toml", [](const std::string& file) {
+    const bool envelope = file.ends_with(".envelope");
+    return Result<std::string>(envelope ? "table = \"feed\"\nzones = [[0, 5]]\nend = 9\n"
+                                        : blocks("csv").front());
   });
   return program ? std::string() : program.error().text();
 }
 
 std::string frame(const std::string& keys) {
-  return "motors = [\"theta\", \"phi\"]\n[[frame]]\n" + keys + "\n";
+  const bool one_motor = keys.starts_with("envelope");
+  return std::string("motors = [\"theta\"") + (one_motor ? "" : ", \"phi\"") + "]\n[[frame]]\n" +
+         keys + "\n";
 }
 
 // Both numbers of a text such as "0.000001 to 3600 s; as many ...".
@@ -96,6 +100,7 @@ TEST(ProgramsPage, TheKeysBesideAnotherAreTakenWithItAlone) {
                                                    {"wait_s", "1"},
                                                    {"wait_input", "\"trigger\""},
                                                    {"travel_by", "{ phi = 60 }"},
+                                                   {"envelope", "\"in.envelope\""},
                                                    {"pulse_us", "5"},
                                                    {"repeat", "2"},
                                                    {"next", "true"}};

@@ -30,14 +30,13 @@ double steps_per_unit(const units::Scale& scale) {
 
 tl::unexpected<bushd::Error> wrong(const EnvelopeFile& envelope, std::string key,
                                    std::string message) {
-  return fail(bushd::Error{
-      .message = std::move(message), .file = envelope.file, .key = std::move(key)});
+  return fail(
+      bushd::Error{.message = std::move(message), .file = envelope.file, .key = std::move(key)});
 }
 
 Result<void> fits(const EnvelopeFile& envelope, const Whereabouts& motor) {
   const api::MotorDescription& is = motor.description;
-  if (is.table.name != envelope.table->name() ||
-      is.table.hash != envelope.table->short_hash()) {
+  if (is.table.name != envelope.table->name() || is.table.hash != envelope.table->short_hash()) {
     return wrong(envelope, "table",
                  fmt::format("is \"{}\", content {}, and {} goes by \"{}\", content {}; draw it "
                              "by that table, or put the other one in service",
@@ -67,8 +66,7 @@ Result<void> stands(const Whereabouts& motor) {
 }  // namespace
 
 Result<EnvelopeFile> read_envelope(const std::string& envelope) {
-  const std::filesystem::path path =
-      tables::envelope_path(envelope, tables::store::kMachineTables);
+  const std::filesystem::path path = tables::envelope_path(envelope, tables::store::kMachineTables);
   auto zones = tables::load_zones(path);
   if (!zones) return fail(zones.error());
   std::vector<tables::store::Place> places{tables::store::place_of(
@@ -108,8 +106,7 @@ Result<std::vector<api::MovePath>> envelope_path(const EnvelopeFile& envelope,
   const auto add = [&](double place, double to_there) -> Result<void> {
     const auto steps = by_distance ? scale.steps_of_distance(place) : scale.steps_of_user(place);
     if (!steps) return fail(steps.error());
-    path.positions.push_back(
-        own->user_of(*steps + (by_distance ? motor.state.position_steps : 0)));
+    path.positions.push_back(own->user_of(*steps + (by_distance ? motor.state.position_steps : 0)));
     path.speeds.push_back(to_there * speed_factor);
     return {};
   };

@@ -114,7 +114,8 @@ void add_move(CommandLine& commands) {
           "NAME --to POSITION --speed-at AT:SPEED [--speed-at AT:SPEED...] moves one motor, from "
           "each of these positions on not faster than that, until the next one; it makes no last "
           "approach for backlash.\n"
-          "NAME --envelope ENVELOPE moves one motor by an envelope of 'bushtab envelope': a name in "
+          "NAME --envelope ENVELOPE moves one motor by an envelope of 'bushtab envelope': a name "
+          "in "
           "/etc/bushd/tables, or a file NAME.envelope with its table beside it.")
       .flag("--line", &options->line,
             "Along a straight line; all motors on one bus, or each at a serial port of its own")
@@ -127,8 +128,7 @@ void add_move(CommandLine& commands) {
       .option_with("--line", "--feed", &options->along.feed,
                    "With --line: not faster along the way than this, per second, in the unit that "
                    "the motors share")
-      .option("--envelope", &options->envelope,
-              "By the speeds of this envelope, to where it ends")
+      .option("--envelope", &options->envelope, "By the speeds of this envelope, to where it ends")
       .flag("--steps", &options->steps, kSteps)
       .flag("--dry-run", &options->dry_run,
             "Say how long it would take, how fast it would be and what would go out; moves nothing")

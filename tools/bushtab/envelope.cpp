@@ -54,9 +54,9 @@ Result<SpeedZones> envelope_of(const fs::path& path, const Envelope& wanted) {
   const bool is_there = fs::exists(path, error);
   if (!changes(wanted)) return tables::load_zones(path);
   if (is_there && !wanted.replace) {
-    return bushd::fail(bushd::Error{
-        .message = "exists; with --replace it gets what is given, and keeps the rest",
-        .file = path.string()});
+    return bushd::fail(
+        bushd::Error{.message = "exists; with --replace it gets what is given, and keeps the rest",
+                     .file = path.string()});
   }
   SpeedZones zones;
   if (is_there) {
@@ -138,8 +138,7 @@ void show_text(const Drawn& drawn) {
   }
   fmt::print("  by {}, in {}, table {}, {} steps, {:.3f} ms\n\n",
              drawn.zones.by == SpeedZones::By::kDistance ? "distance" : "position",
-             steps ? "steps"
-                   : fmt::format("units of {} steps", *drawn.zones.steps_per_unit),
+             steps ? "steps" : fmt::format("units of {} steps", *drawn.zones.steps_per_unit),
              bushd::printable(drawn.zones.table), drawn.run.steps(),
              static_cast<double>(drawn.run.end_ns()) * kMsPerNs);
   fmt::print("{:>12} {:>12} {:>12} {:>12} {:>16}\n", "from", "speed", "steps", "until ms",

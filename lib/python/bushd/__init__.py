@@ -11,6 +11,7 @@
 
 from . import aio
 from .client import Client, Jog, Motion, Tables, connect
+from .envelopes import Envelope
 from .errors import (
     BushdError,
     MoveFailed,
@@ -61,6 +62,7 @@ __all__ = [
     "CamacResult",
     "Client",
     "Configuration",
+    "Envelope",
     "Inhibited",
     "Jog",
     "Mcu",
