@@ -337,6 +337,9 @@ void Installation::put(MotorId id, const config::Drive& drive) {
   moved_by_people_ -= drives_[id].moved_by_people();
   moved_by_people_ += drive.moved_by_people();
   drives_[id] = drive;
+  for (const MotorId other : motors_.ids()) {
+    if (config_[other].mcu == config_[id].mcu) drives_[other].phase_sequence = drive.phase_sequence;
+  }
   if (other_table) motors_[id].set_axis(new_axis(id));
 }
 

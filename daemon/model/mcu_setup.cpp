@@ -119,6 +119,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const TableOf& t
       setup.local.keypad_ticks = keypad_ticks(config, mcu);
     }
     if (setup.emission.settings.mode == BUSHD_EMISSION_PHASES) {
+      setup.emission.settings.sequence = drive_of(motor).phase_sequence;
       const config::Currents its = drive_of(motor).currents.value_or(config::Currents{});
       setup.currents.push_back(
           {motor->output.value, its.fast_decay, its.ramp_ma, its.cruise_ma, its.hold_ma});

@@ -128,7 +128,8 @@ void Journal::started(MotorId id, std::int64_t steps, motion::Tick start, std::u
     line["dir_setup_us"] = emission.dir_setup_us;
     if (bushd_emission_is_staggered(emission.mode)) line["settle_us"] = emission.settle_us;
     if (emission.mode == BUSHD_EMISSION_PHASES) {
-      line["phase_sequence"] = fieldbus::kSequenceNames.at(emission.sequence);
+      line["phase_sequence"] =
+          fieldbus::kSequenceNames.at(installation_.drives()[id].phase_sequence);
     }
   }
   outputs_.move_log(json_text(line));

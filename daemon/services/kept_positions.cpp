@@ -127,6 +127,15 @@ void KeptPositions::keep_confirmed(MotorId id) {
   keeper_->stands(id, record);
 }
 
+void KeptPositions::keep_uncertain(MotorId id) {
+  if (!keeper_ || !keeper_->kept(id).record) return;
+  state::Record record = *keeper_->kept(id).record;
+  record.trust = state::Trust::kUncertain;
+  record.reason = *installation_[id].trust().uncertain_reason();
+  if (record.at_rest) return keeper_->stands(id, std::move(record));
+  keeper_->moves(id, std::move(record));
+}
+
 void KeptPositions::answer_when_kept(const api::Asker& asker, api::Completed done) {
   if (!keeper_) return asker.answer(done);
   open_.push_back({asker, std::move(done)});

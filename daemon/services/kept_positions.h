@@ -53,6 +53,8 @@ class KeptPositions final : public Service {
   // The same of what is no motor (state::is_no_motor), or is not configured any more.
   state::Settings settings(const std::string& name) const;
   void keep(const std::string& name, const state::Settings& settings);
+  // At rest its position has become uncertain, by no motion.
+  void keep_uncertain(MotorId motor);
   std::map<std::string, state::Settings> settings_of_others() const { return others_; }
   // How much there was to keep so far, and how much of that is on the disk; why no more is.
   std::uint64_t told() const { return keeper_ ? keeper_->told() : 0; }

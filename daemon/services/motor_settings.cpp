@@ -80,25 +80,46 @@ Result<MotorSettings::Plan> MotorSettings::plan_of(
       return fail(name + ": \"" + word + "\" cannot be changed in operation" +
                   did_you_mean(word, known) +
                   "; allowed: offset, direction, soft_limits, "
-                  "input_active, local, keypad, velocity, currents, max_speed, acceleration. Edit "
+                  "input_active, local, keypad, velocity, currents, max_speed, acceleration, "
+                  "phase_sequence. Edit "
                   "bushd.toml and restart "
                   "bushd for other keys");
     }
-    auto at = static_cast<std::size_t>(std::ranges::find(plan.motors, *id) - plan.motors.begin());
-    if (at == plan.motors.size()) {
-      plan.motors.push_back(*id);
-      plan.settings.push_back(from ? (*from)[*id] : settings_of(*id));
+    for (const MotorId motor : changed_by(*id, *key)) {
+      if (auto added = add(plan, motor, *key, value, from); !added) return fail(added.error());
     }
-    auto changed = config::with(plan.settings[at], *key, value);
-    if (!changed) return fail(name + ": " + changed.error().message);
-    Change change{.motor = *id,
-                  .key = *key,
-                  .before = config::text_of(plan.settings[at], *key),
-                  .after = config::text_of(*changed, *key)};
-    plan.settings[at] = std::move(*changed);
-    plan.changes.push_back(std::move(change));
   }
   return plan;
+}
+
+Result<void> MotorSettings::add(Plan& plan, MotorId id, SettingKey key, const std::string& value,
+                                const ById<MotorId, config::Settings>* from) const {
+  const auto at =
+      static_cast<std::size_t>(std::ranges::find(plan.motors, id) - plan.motors.begin());
+  if (at == plan.motors.size()) {
+    plan.motors.push_back(id);
+    plan.settings.push_back(from ? (*from)[id] : settings_of(id));
+  }
+  auto changed = config::with(plan.settings[at], key, value);
+  if (!changed) return fail(installation_[id].name() + ": " + changed.error().message);
+  Change change{.motor = id,
+                .key = key,
+                .before = config::text_of(plan.settings[at], key),
+                .after = config::text_of(*changed, key)};
+  plan.settings[at] = std::move(*changed);
+  plan.changes.push_back(std::move(change));
+  return {};
+}
+
+// The named one first.
+std::vector<MotorId> MotorSettings::changed_by(MotorId id, SettingKey key) const {
+  std::vector<MotorId> motors{id};
+  if (!config::is_of_mcu(key)) return motors;
+  for (const MotorId other : installation_.motors()) {
+    const bool beside = &installation_.mcu_of(other) == &installation_.mcu_of(id);
+    if (beside && other != id) motors.push_back(other);
+  }
+  return motors;
 }
 
 Result<void> MotorSettings::may_be_changed(MotorId id) const {
@@ -165,6 +186,13 @@ void MotorSettings::carry_out(const Plan& plan, const api::Asker& asker) {
     if (change.before == change.after) continue;
     const motion::Motor& motor = installation_[change.motor];
     journal_.configured(change.motor, config::name_of(change.key), change.after, asker);
+    // An MCU begins another sequence with its first phase, to which windings draw the rotor.
+    if (change.key == SettingKey::kPhaseSequence) {
+      installation_[change.motor].trust().is_uncertain(
+          "its phases began anew when phase_sequence became " + change.after + ", and was " +
+          change.before);
+      kept_.keep_uncertain(change.motor);
+    }
     outputs_.log(LogLevel::kInfo, change.motor,
                  motor.name() + ": " + assignment(change.key, change.after) + ", was " +
                      change.before + ", by " + who);
@@ -283,6 +311,14 @@ std::string MotorSettings::text_of(const Plan& plan) const {
       if (change.motor != id) continue;
       text += separator + assignment(change.key, change.after);
       separator = ", ";
+    }
+    const bool begins_anew = std::ranges::any_of(plan.changes, [id](const Change& change) {
+      return change.motor == id && change.key == SettingKey::kPhaseSequence &&
+             change.before != change.after;
+    });
+    if (begins_anew) text += "; its position is uncertain until it is set or homed";
+    if (begins_anew && motor.scale().coordinates().has_unit()) {
+      text += ", and steps_per_unit stays as bushd.toml has it";
     }
     // Where nobody has heard of it there is nothing to be said.
     if (!installation_.mcu_of(id).online()) continue;

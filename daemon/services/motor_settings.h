@@ -1,6 +1,6 @@
 // What may be changed of motors in operation: their offsets, directions, soft limits and greatest
-// speeds, and what their MCU keeps of velocity loop and currents. Kept in the state store, where
-// each counts until its key in bushd.toml is edited.
+// speeds, what their MCU keeps of velocity loop and currents, and its sequence of phases. Kept in
+// the state store, where each counts until its key in bushd.toml is edited.
 //
 // This daemon reads bushd.toml when it starts and never writes it: clients do, with the rights of
 // those who use them, and say so (docs/decisions/0033-settings-in-operation.md).
@@ -61,6 +61,9 @@ class MotorSettings final : public Service {
     std::optional<std::int64_t> until_us{};  // no longer is the disk waited for
   };
   config::Settings settings_of(MotorId motor) const;
+  Result<void> add(Plan& plan, MotorId motor, config::SettingKey key, const std::string& value,
+                   const ById<MotorId, config::Settings>* from) const;
+  std::vector<MotorId> changed_by(MotorId motor, config::SettingKey key) const;
   Result<Plan> plan_of(const api::Configure& request,
                        const ById<MotorId, config::Settings>* from) const;
   Result<void> may_be_changed(MotorId motor) const;

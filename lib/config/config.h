@@ -121,6 +121,7 @@ struct Mcu {
   bool programs_without_host = false;  // its programs may go on when no host is heard
   bool programs_at_power_on = false;   // and begin by themselves when the power comes
   bool ready_after_homing = false;     // not before its motors with `home` have been homed
+  bool has_phase_sequence = false;     // written in the file
   bool stand_in = false;               // for a bus that has no MCUs
   KeyPlaces places{};                  // of `address`, `ready`
 };

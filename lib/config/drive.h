@@ -32,6 +32,7 @@ struct Drive {
   bool local = false;                     // the MCU's FORWARD and REVERSE inputs move it
   bool keypad = false;                    // the keypad at the MCU moves it
   bool input_open = false;                // its one input is active when open
+  std::uint8_t phase_sequence = 0;        // bushd_phase_sequence; all motors of an MCU have one
   double acceleration = 1;                // of that of its table, above 0 and at most 1
 
   bool moved_by_people() const { return local || keypad; }

@@ -34,7 +34,8 @@ tl::unexpected<Error> cannot(const std::string& motor, SettingKey key, const std
 
 // What a value is in TOML.
 std::string toml_text(SettingKey key, const std::string& value) {
-  const bool is_word = key == SettingKey::kDirection || key == SettingKey::kInputActive;
+  const bool is_word = key == SettingKey::kDirection || key == SettingKey::kInputActive ||
+                       key == SettingKey::kPhaseSequence;
   return is_word ? "\"" + value + "\"" : value;
 }
 
@@ -57,13 +58,20 @@ toml::table* motor_in(toml::table& document, const std::string& name) {
   return nullptr;
 }
 
+// MCUs have no name; they are counted as in the file.
+toml::table* mcu_in(toml::table& document, McuId mcu) {
+  toml::array* const mcus = document["mcu"].as_array();
+  if (mcus == nullptr || mcu.value >= mcus->size()) return nullptr;
+  return mcus->get(mcu.value)->as_table();
+}
+
 // One edit of a text.
 class Editing {
  public:
-  Editing(std::string_view text, const toml::table& motor) : toml_(text), motor_(motor) {}
+  Editing(std::string_view text, const toml::table& section) : toml_(text), section_(section) {}
 
   std::optional<std::string> set(SettingKey key, const std::string& value) const {
-    const toml::node* node = motor_.get(name_of(key));
+    const toml::node* node = section_.get(name_of(key));
     const bool none = is_none(key, value);
     if (node == nullptr) return none ? std::string(toml_.text()) : add(key, value);
     if (none) return remove(key, *node);
@@ -78,9 +86,9 @@ class Editing {
 
   // A line behind the last one of the section's own keys.
   std::optional<std::string> add(SettingKey key, const std::string& value) const {
-    if (motor_.is_inline()) return std::nullopt;
+    if (section_.is_inline()) return std::nullopt;
     std::size_t at = 0;
-    for (const auto& [name, node] : motor_) {
+    for (const auto& [name, node] : section_) {
       if (const toml::table* table = node.as_table(); table != nullptr && !table->is_inline()) {
         continue;
       }
@@ -98,10 +106,10 @@ class Editing {
 
   // Its lines, but for what people have written beside it.
   std::optional<std::string> remove(SettingKey key, const toml::node& node) const {
-    if (motor_.is_inline()) return std::nullopt;
+    if (section_.is_inline()) return std::nullopt;
     const std::string_view text = toml_.text();
     const Span whole{
-        toml_.line_begin(toml_.offset(motor_.find(name_of(key))->first.source().begin)),
+        toml_.line_begin(toml_.offset(section_.find(name_of(key))->first.source().begin)),
         toml_.line_end(value_span(toml_, node).end)};
     std::string comments;
     for (std::size_t at = whole.begin; at < whole.end; ++at) {
@@ -114,31 +122,31 @@ class Editing {
   }
 
   TomlText toml_;
-  const toml::table& motor_;
+  const toml::table& section_;
 };
 
 // What the document has to be afterwards.
-Result<void> put(toml::table& motor, const Edit& edit) {
+Result<void> put(toml::table& section, const Edit& edit) {
   if (is_none(edit.key, edit.value)) {
-    motor.erase(name_of(edit.key));
+    section.erase(name_of(edit.key));
     return {};
   }
   const std::string key(name_of(edit.key));
   const auto value = tables::parse_toml(key + " = " + toml_text(edit.key, edit.value), key);
   if (!value) return fail(value.error());
-  motor.insert_or_assign(key, *value->get(key));
+  section.insert_or_assign(key, *value->get(key));
   return {};
 }
 
-Result<std::string> edited_once(const std::string& text, const Edit& edit,
+Result<std::string> edited_once(const std::string& text, const Edit& edit, McuId mcu,
                                 const std::string& path) {
   auto before = tables::parse_toml(text, path);
   if (!before) return fail(before.error());
-  toml::table* motor = motor_in(*before, edit.motor);
-  if (motor == nullptr) return cannot(edit.motor, edit.key, path);
-  auto out = Editing(text, *motor).set(edit.key, edit.value);
+  toml::table* section = is_of_mcu(edit.key) ? mcu_in(*before, mcu) : motor_in(*before, edit.motor);
+  if (section == nullptr) return cannot(edit.motor, edit.key, path);
+  auto out = Editing(text, *section).set(edit.key, edit.value);
   if (!out) return cannot(edit.motor, edit.key, path);
-  if (const auto done = put(*motor, edit); !done) return fail(done.error());
+  if (const auto done = put(*section, edit); !done) return fail(done.error());
   const auto after = tables::parse_toml(*out, path);
   if (!after || *after != *before) return cannot(edit.motor, edit.key, path);
   return std::move(*out);
@@ -168,7 +176,7 @@ Result<std::string> edited(std::string_view text, std::span<const Edit> edits,
     if (!settings) return fail(edit.motor + ": " + settings.error().message);
     now = std::move(*settings);
     edit.value = text_of(now, edit.key);
-    auto next = edited_once(out, edit, path);
+    auto next = edited_once(out, edit, motor->mcu, path);
     if (!next) return next;
     out = std::move(*next);
   }

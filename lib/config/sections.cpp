@@ -240,6 +240,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     auto emission = read_emission(reader);
     if (!emission) return fail(emission.error());
     mcu.emission = std::move(*emission);
+    mcu.has_phase_sequence = reader.has("phase_sequence");
     if (auto read = read_output_levels(reader, &mcu); !read) return read;
     const std::string what =
         fmt::format("address {} of bus \"{}\"", *address, config->buses[bus->value].name);
@@ -417,9 +418,12 @@ Result<void> read_motors(Loading* loading) {
     const bool has_mcu = !config.mcus[mcu->value].stand_in;
     motor.has_one_input = has_mcu && motor.inputs.own && !reader.has("inputs");
     motor.drive.input_open = motor.has_one_input && motor.inputs.own->active_open;
+    motor.drive.phase_sequence = config.mcus[mcu->value].emission.settings.sequence;
     for (std::size_t i = 0; i < kSettingKeys.size(); ++i) {
       motor.written[i] = reader.has(name_of(kSettingKeys[i]));
     }
+    motor.written[static_cast<std::size_t>(SettingKey::kPhaseSequence)] =
+        config.mcus[mcu->value].has_phase_sequence;
     config.motors.push_back(std::move(motor));
   }
   for (Motor& motor : config.motors) {

@@ -20,8 +20,8 @@ constexpr std::string_view kNone = "none";
 
 // In the order of the enumeration.
 constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {
-    "offset", "direction", "soft_limits", "input_active", "local",
-    "keypad", "velocity",  "currents",    "max_speed",    "acceleration"};
+    "offset",   "direction", "soft_limits", "input_active", "local",         "keypad",
+    "velocity", "currents",  "max_speed",   "acceleration", "phase_sequence"};
 constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
     "a number of user units",
     "negative, positive",
@@ -33,7 +33,8 @@ constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
     "steps/s^2, or none",
     "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or none",
     "a number above 0, of units per second (of steps per second without a unit), or none",
-    "a number above 0 and at most 1, of the acceleration of its table"};
+    "a number above 0 and at most 1, of the acceleration of its table",
+    "wave, full, half; three-phase is for other windings"};
 // What an inline table of these keys has, in order.
 constexpr std::array<std::string_view, 3> kVelocityNames = {"min_steps_per_s", "max_steps_per_s",
                                                             "steps_per_s2"};
@@ -228,6 +229,19 @@ Result<Settings> with_acceleration(Settings settings, std::string_view text) {
   return settings;
 }
 
+Result<Settings> with_phase_sequence(Settings settings, std::string_view text) {
+  const std::string_view word = trimmed(text);
+  const auto& names = fieldbus::kSequenceNames;
+  const auto found = std::ranges::find(names, word);
+  const auto sequence = static_cast<std::uint8_t>(found - names.begin());
+  if (found == names.end()) return refuse(SettingKey::kPhaseSequence, text);
+  const bool other_windings =
+      (sequence == BUSHD_PHASES_THREE) != (settings.drive.phase_sequence == BUSHD_PHASES_THREE);
+  if (other_windings) return refuse(SettingKey::kPhaseSequence, text);
+  settings.drive.phase_sequence = sequence;
+  return settings;
+}
+
 std::string_view why_not(SettingKey key) {
   switch (key) {
     case SettingKey::kVelocity:
@@ -239,6 +253,7 @@ std::string_view why_not(SettingKey key) {
     case SettingKey::kKeypad:
       return "its bus has no MCU with local inputs or a keypad";
     case SettingKey::kCurrents:
+    case SettingKey::kPhaseSequence:
       return "its MCU does not drive it by phases; give that `steps = \"phases\"` in bushd.toml "
              "first";
     default:
@@ -290,6 +305,7 @@ bool applies(const Settings& settings, SettingKey key) {
     case SettingKey::kVelocity:
       return settings.drive.moved_by_people();
     case SettingKey::kCurrents:
+    case SettingKey::kPhaseSequence:
       return settings.phases;
     default:
       return settings.coordinates.has_unit();
@@ -324,6 +340,8 @@ std::string text_of(const Settings& settings, SettingKey key) {
       return text_of(settings.drive.currents);
     case SettingKey::kAcceleration:
       return fmt::format("{}", settings.drive.acceleration);
+    case SettingKey::kPhaseSequence:
+      return std::string(fieldbus::kSequenceNames.at(settings.drive.phase_sequence));
     case SettingKey::kMaxSpeed:
       return settings.max_speed ? fmt::format("{}", *settings.max_speed) : std::string(kNone);
     case SettingKey::kSoftLimits:
@@ -350,6 +368,7 @@ Result<Settings> with(Settings settings, SettingKey key, std::string_view text) 
   if (key == SettingKey::kCurrents) return with_currents(std::move(settings), text);
   if (key == SettingKey::kMaxSpeed) return with_max_speed(std::move(settings), text);
   if (key == SettingKey::kAcceleration) return with_acceleration(std::move(settings), text);
+  if (key == SettingKey::kPhaseSequence) return with_phase_sequence(std::move(settings), text);
   units::Scale scale = settings.coordinates.scale();
   if (key == SettingKey::kDirection) {
     const std::string_view word = trimmed(text);

@@ -24,15 +24,16 @@ enum class SettingKey {
   kVelocity,
   kCurrents,
   kMaxSpeed,
-  kAcceleration
+  kAcceleration,
+  kPhaseSequence
 };
 // In the order in which they may be taken: a velocity is of a motor that people move. What goes
 // before all others is said by goes_first().
-inline constexpr std::array kSettingKeys = {SettingKey::kOffset,     SettingKey::kDirection,
-                                            SettingKey::kSoftLimits, SettingKey::kInputActive,
-                                            SettingKey::kLocal,      SettingKey::kKeypad,
-                                            SettingKey::kVelocity,   SettingKey::kCurrents,
-                                            SettingKey::kMaxSpeed,   SettingKey::kAcceleration};
+inline constexpr std::array kSettingKeys = {
+    SettingKey::kOffset,       SettingKey::kDirection,    SettingKey::kSoftLimits,
+    SettingKey::kInputActive,  SettingKey::kLocal,        SettingKey::kKeypad,
+    SettingKey::kVelocity,     SettingKey::kCurrents,     SettingKey::kMaxSpeed,
+    SettingKey::kAcceleration, SettingKey::kPhaseSequence};
 
 // By SettingKey.
 using WrittenKeys = std::bitset<kSettingKeys.size()>;
@@ -42,6 +43,10 @@ std::string_view name_of(SettingKey key);  // as in bushd.toml
 // more may have one. `value` is one that text_of() makes.
 bool goes_first(SettingKey key, std::string_view value);
 std::optional<SettingKey> setting_key_of(std::string_view name);
+// It is a key of the motor's MCU, and of all motors there.
+inline bool is_of_mcu(SettingKey key) {
+  return key == SettingKey::kPhaseSequence;
+}
 
 // What the settings of one motor stand for.
 struct Settings {
@@ -62,15 +67,15 @@ struct Mcu;
 Settings settings_of(const Motor& motor, const Mcu& mcu);  // as bushd.toml has them
 
 // Whether the motor has this setting. Offset, direction and soft limits need a unit, velocity needs
-// local inputs or a keypad, currents need a motor that is driven by phases.
+// local inputs or a keypad, currents and phase_sequence need a motor that is driven by phases.
 bool applies(const Settings& settings, SettingKey key);
 // Whether it is listed when all settings are asked for. The defaults of `local`, `keypad`,
 // `input_active`, `max_speed` and `acceleration` are not.
 bool is_reported(const Settings& settings, SettingKey key);
 
 // "12.5"; "negative"; "[-5, 30]" or "none"; "true" or "false"; velocity and currents as an inline
-// table of TOML, or "none"; max_speed "2.5" or "none"; acceleration "0.5". The same value has one
-// text.
+// table of TOML, or "none"; max_speed "2.5" or "none"; acceleration "0.5"; phase_sequence "half".
+// The same value has one text.
 std::string text_of(const Settings& settings, SettingKey key);
 
 // "offset = 12.5"; "" if it was left out.

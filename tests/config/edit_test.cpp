@@ -67,6 +67,20 @@ TEST(Edit, VelocityAndCurrentsAreInlineTables) {
               HasSubstr("its MCU does not drive it by phases"));
 }
 
+TEST(Edit, ASequenceOfPhasesIsAKeyOfTheMcu) {
+  const std::string address = "address = 1\n";
+  const auto with_mcu = [&](const std::string& keys) {
+    return replaced(with_theta(""), address, address + keys);
+  };
+  const SettingKey key = SettingKey::kPhaseSequence;
+  EXPECT_EQ(after(with_mcu("steps = \"phases\"\n"), {{"theta", key, "half"}}),
+            replaced(with_mcu("steps = \"phases\"\n"), "steps = \"phases\"\n",
+                     "steps = \"phases\"\nphase_sequence = \"half\"\n"));
+  const std::string full = "phase_sequence = \"full\" # of the stage\nsteps = \"phases\"\n";
+  const std::string wave = "phase_sequence = \"wave\" # of the stage\nsteps = \"phases\"\n";
+  EXPECT_EQ(after(with_mcu(full), {{"theta", key, "wave"}}), with_mcu(wave));
+}
+
 TEST(Edit, AGreatestSpeedIsANumberOrHasNoKey) {
   constexpr SettingKey kMaxSpeed = SettingKey::kMaxSpeed;
   expect("max_speed = 5 # mm/s\n", {{"theta", kMaxSpeed, "2.50"}}, "max_speed = 2.5 # mm/s\n");

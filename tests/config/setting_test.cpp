@@ -6,6 +6,8 @@
 
 #include <random>
 
+#include "engine/message.h"
+
 namespace bushd::config {
 namespace {
 
@@ -140,6 +142,27 @@ TEST(Setting, AnAccelerationIsAShareOfThatOfTheTable) {
   for (const char* text : {"", "0", "-1", "1.001", "nan", "none", "50 %"}) {
     EXPECT_THAT(with(half, key, text).error().message, HasSubstr("above 0 and at most 1")) << text;
   }
+}
+
+TEST(Setting, ASequenceOfPhasesIsOneForTheSameWindings) {
+  const auto key = SettingKey::kPhaseSequence;
+  EXPECT_FALSE(applies(blade(), key));
+  EXPECT_TRUE(is_of_mcu(key));
+  Settings settings = unipolar();
+  settings.drive.phase_sequence = BUSHD_PHASES_FULL;
+  EXPECT_TRUE(is_reported(settings, key));
+  EXPECT_EQ(text_of(settings, key), "full");
+  const Settings half = with(settings, key, " half ").value();
+  EXPECT_EQ(half.drive.phase_sequence, BUSHD_PHASES_HALF);
+  EXPECT_EQ(text_of(with(half, key, "wave").value(), key), "wave");
+  for (const char* text : {"", "quarter", "none", "\"half\"", "three-phase"}) {
+    EXPECT_THAT(with(half, key, text).error().message, HasSubstr("allowed: wave, full, half"))
+        << text;
+  }
+  Settings three = settings;
+  three.drive.phase_sequence = BUSHD_PHASES_THREE;
+  EXPECT_FALSE(with(three, key, "half"));
+  EXPECT_TRUE(with(three, key, "three-phase"));
 }
 
 TEST(Setting, AnyTextOfVelocityAndCurrentsIsTakenWholeOrRefused) {

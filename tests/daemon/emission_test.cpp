@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <vector>
 
 #include "daemon/lab.h"
 
@@ -160,6 +161,47 @@ TEST(EmissionPhases, MovesTurnTheWindings) {
     EXPECT_EQ(windings.position[0], -137);
     EXPECT_EQ(windings.position[3], 137);
   }
+}
+
+// What the windings of the first motor are when all edges of a moment have been made.
+class Levels final : public sim::EdgeSink {
+ public:
+  void edge(const sim::Edge& edge) override {
+    if (edge.signal != sim::Signal::kStep || edge.index >= 4) return;
+    const int winding = 1 << edge.index;
+    now_ = edge.level ? now_ | winding : now_ & ~winding;
+  }
+  void settled(sim::TimeNs) override {
+    if (seen.empty() || seen.back() != now_) seen.push_back(now_);
+  }
+  std::vector<int> seen;
+
+ private:
+  int now_ = 0;
+};
+
+TEST(EmissionPhases, AnotherSequenceInOperationIsThatOfTheNextMoves) {
+  Levels levels;
+  Lab lab(with_keys("fine", "steps = \"phases\"\n"), {}, &levels);
+  lab.connect();
+  const auto move = [&](std::int64_t steps) {
+    levels.seen.clear();
+    const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {steps}));
+    EXPECT_EQ(result.result, "reached") << result.reason;
+    return levels.seen;
+  };
+  EXPECT_THAT(move(5), testing::IsSupersetOf({3, 6, 12, 9}));
+  const auto change = [&](const char* sequence) {
+    const Answer changed = lab.wait(lab.send(api::Configure{
+        .kind = api::Configure::Kind::kChange, .changes = {{"m04", "phase_sequence", sequence}}}));
+    EXPECT_EQ(changed.result, "done") << changed.reason;
+    EXPECT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+    EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+  };
+  change("half");
+  EXPECT_EQ(move(8), (std::vector<int>{1, 3, 2, 6, 4, 12, 8, 9, 1}));
+  change("wave");
+  EXPECT_EQ(move(4), (std::vector<int>{1, 2, 4, 8, 1}));
 }
 
 TEST(EmissionSettings, WhatTheMcuCannotKeepIsNamedWithKeyAndLine) {

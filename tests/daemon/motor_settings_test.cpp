@@ -487,5 +487,79 @@ TEST(MotorSettings, WhatWasKnownLastIsSaidInTheMotorsUnit) {
               testing::ContainsRegex("last known: [0-9]+ steps .1[0-9].[0-9]* mm."));
 }
 
+// An MCU with two motors by phases; m01 has a unit.
+std::string phases() {
+  std::string toml = blade("");
+  const std::string mcu = "address = 1\n";
+  return toml.insert(toml.find(mcu) + mcu.size(),
+                     "steps = \"phases\" # unipolar\nphase_sequence = \"full\"\n");
+}
+
+const bushd_emission& emission_of(SettingsLab& lab) {
+  return lab.bus(0).mcu(0).core().emission.settings;
+}
+
+TEST(MotorSettings, ASequenceOfPhasesIsThatOfTheMcuAndOfAllItsMotors) {
+  SettingsLab lab(phases());
+  EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_FULL);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {400})).result, "reached");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  const Answer answer = lab.change("m02", "phase_sequence", "half");
+  EXPECT_EQ(answer.result, "done") << answer.reason;
+  EXPECT_EQ(answer.reason,
+            "m02: phase_sequence = half; its position is uncertain until it is set or homed; "
+            "m01: phase_sequence = half; its position is uncertain until it is set or homed, and "
+            "steps_per_unit stays as bushd.toml has it");
+  EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_HALF);
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  lab.run_for(0.2);
+  for (const char* name : {"m01", "m02"}) {
+    EXPECT_THAT(lab.show(name),
+                Contains(std::string(name) + " phase_sequence = half, in the file full"));
+    EXPECT_EQ(lab.motor(name).trust, api::Trust::kUncertain);
+    EXPECT_EQ(lab.motor(name).uncertain_reason,
+              "its phases began anew when phase_sequence became half, and was full");
+  }
+  lab.expect_refused(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})), "its phases began anew");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).result, "reached");
+  // Twice the same is no change.
+  EXPECT_EQ(lab.change("m01", "phase_sequence", "half").reason,
+            "m01: phase_sequence = half; m02: phase_sequence = half");
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+}
+
+TEST(MotorSettings, ASequenceOfPhasesIsChangedWhileAllMotorsOfTheMcuRest) {
+  SettingsLab lab(phases());
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {1000});
+  lab.run_for(0.2);
+  lab.expect_refused(lab.change("m02", "phase_sequence", "half"),
+                     "a motor of MCU hall:1 moves; what it does by itself can be changed when all "
+                     "of them are at rest");
+  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_FULL);
+  lab.expect_refused(lab.change("m01", "phase_sequence", "three-phase"),
+                     "allowed: wave, full, half");
+  lab.expect_refused(lab.change("m01", "phase_sequence", "quarter"), "is \"quarter\"");
+  SettingsLab other;
+  other.expect_refused(other.change("m01", "phase_sequence", "half"),
+                       "its MCU does not drive it by phases");
+}
+
+TEST(MotorSettings, ASequenceOfPhasesIsKeptUntilTheFileIsEdited) {
+  SettingsLab lab(phases());
+  lab.expect_done("m01", "phase_sequence", "half");
+  lab.restart(phases());
+  EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_HALF);
+  EXPECT_THAT(lab.show("m02"), Contains("m02 phase_sequence = half, in the file full"));
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kUncertain) << "kept as well";
+  std::string edited = phases();
+  edited.replace(edited.find("\"full\""), 6, "\"wave\"");
+  lab.restart(edited);
+  EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_WAVE);
+  lab.restart(phases());
+  EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_FULL);
+}
+
 }  // namespace
 }  // namespace bushd::test

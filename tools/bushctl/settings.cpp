@@ -23,7 +23,8 @@ using bushd::Result;
 
 // A value of a key that a newer daemon has is a text.
 nlohmann::json parsed(const std::string& key, const std::string& value) {
-  for (const auto word : {config::SettingKey::kDirection, config::SettingKey::kInputActive}) {
+  for (const auto word : {config::SettingKey::kDirection, config::SettingKey::kInputActive,
+                          config::SettingKey::kPhaseSequence}) {
     if (key == name_of(word)) return value;
   }
   if (value == "none") return nullptr;
