@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "config/words.h"
+#include "daemon/services/travels.h"
 #include "engine/frame.h"
 #include "engine/run.h"
 #include "motion/zone_run.h"
@@ -97,6 +98,32 @@ Result<tables::TablePtr> written_codes(const Installation& installation, const M
         motor.name(), most, tick_ns / 1000, BUSHD_MAX_STEPS_PER_TICK));
   }
   return made;
+}
+
+constexpr std::uint64_t kLeastTicksFromEdge = 4;
+
+// What an MCU would say of a travel only when its frame begins.
+Result<void> check_travels(const Installation& installation, const CheckedProgram& program,
+                           std::uint32_t tick_ns) {
+  for (const programs::Frame& frame : program.text.frames) {
+    const auto* const travel = std::get_if<programs::Travel>(&frame.what);
+    if (travel == nullptr) continue;
+    std::size_t i = 0;
+    while (!travel->by[i]) ++i;
+    const MotorId motor = program.motors[i];
+    if (auto has = has_both_limits(installation.config()[motor]); !has) {
+      return fail(fmt::format("{}: motor \"{}\": {}", frame.place, installation[motor].name(),
+                              has.error().text()));
+    }
+    const std::uint64_t least_ns = kLeastTicksFromEdge * tick_ns;
+    if (travel->at_edges && std::uint64_t{travel->delay_us} * 1000 < least_ns) {
+      return fail(
+          fmt::format("{}: after_edge_s: is {} us; allowed: {} ticks of the bus or more, "
+                      "which are {} us",
+                      frame.place, travel->delay_us, kLeastTicksFromEdge, (least_ns + 999) / 1000));
+    }
+  }
+  return {};
 }
 
 constexpr double kSameScale = 1e-9;
@@ -191,6 +218,9 @@ Result<CheckedProgram> compile_and_walk(const Installation& installation, const 
     if (!its) return fail(its.error());
     places.push_back(std::move(*its));
     program.tables.push_back(installation.table_of(motor)->content_hash());
+  }
+  if (auto good = check_travels(installation, program, place.tick_ns); !good) {
+    return fail(good.error());
   }
   if (program.text.envelope) {
     auto codes = envelope_codes(installation, program);

@@ -51,6 +51,13 @@ bool has_bit(unsigned mask, Output output) {
 
 }  // namespace
 
+Result<void> has_both_limits(const config::Motor& motor) {
+  const auto& positive = motor.inputs.positive;
+  const auto& negative = motor.inputs.negative;
+  if (positive && negative && positive->number != negative->number) return {};
+  return fail("it needs a limit switch of its own at each end; see its 'inputs'");
+}
+
 Travels::Travels(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,
                  KeptPositions& kept, IdleDrivers& idle_drivers, Outputs& outputs)
     : installation_(installation),
@@ -73,11 +80,8 @@ Result<void> Travels::may_travel(MotorId id, const bushd_travel& message) const 
   if (!mcu.can_travel() || (message.edge != BUSHD_EDGE_NONE && !mcu.can_trigger())) {
     return fail("the firmware of MCU " + mcu.name() + " cannot do that by itself");
   }
-  const auto& inputs = installation_.config()[id].inputs;
-  const bool both =
-      inputs.positive && inputs.negative && inputs.positive->number != inputs.negative->number;
-  if (message.kind == BUSHD_TRAVEL_LIMITS && !both) {
-    return fail("it needs a limit switch of its own at each end; see its 'inputs'");
+  if (message.kind == BUSHD_TRAVEL_LIMITS) {
+    if (auto has = has_both_limits(installation_.config()[id]); !has) return has;
   }
   if (const auto& task = tasks_[mcu.id]) {
     return fail("MCU " + mcu.name() + " has " + installation_[task->motor].name() +

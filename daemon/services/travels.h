@@ -16,6 +16,9 @@
 
 namespace bushd::daemon {
 
+// Whether it can travel from one limit switch to another.
+Result<void> has_both_limits(const config::Motor& motor);
+
 class Travels final : public Service {
  public:
   Travels(Installation& installation, const Interlocks& interlocks, OpenMoves& open_moves,

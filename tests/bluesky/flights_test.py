@@ -181,6 +181,20 @@ class Several(BlueskyTest):
             beside = sum(1 for other in edges["a0"] if other.time_ns <= edge.time_ns)
             self.assertAlmostEqual(beside, 4 * number, delta=4)
 
+    def test_a_line_has_a_law_and_a_feed(self):
+        import bluesky.plan_stubs as bps
+
+        from bushd.ophyd_async import Line
+
+        self.bring_up_lab()
+        (line,) = self.connected(Line(self.daemon, ["a0", "a1"], "line", law="elementary", feed=500.0))
+        self.engine(bps.mv(line, (40, -20)))
+        self.end_programs()
+        times = sorted(edge.time_ns for name in ("a0", "a1") for edge in self.traced()[name])
+        self.assertEqual(len(times), 60)
+        # One step at a time, 2 ms apart at least; a step lies within 10 us of its time.
+        self.assertGreaterEqual(min(after - before for before, after in zip(times, times[1:])), 1_980_000)
+
     def test_progress_is_told(self):
         self.bring_up_lab()
         (a0,) = self.motors_of("a0")

@@ -301,5 +301,23 @@ TEST(Programs, OfSeveralMcusBeginTogetherOrNotAtAll) {
   }
 }
 
+TEST(Programs, ATravelThatCannotBeginIsRefusedWhenItIsPut) {
+  const std::string travel = "[[frame]]\ntravel_by = [60]\n";
+  ProgramLab none;
+  const Answer refused = none.put("scan", "\"m01\"", travel);
+  EXPECT_EQ(refused.result, "refused");
+  EXPECT_THAT(refused.reason, HasSubstr("motor \"m01\": it needs a limit switch of its own at each "
+                                        "end; see its 'inputs'"));
+  std::string toml = hall_of_programs(1, 1);
+  ProgramLab lab(
+      toml.insert(toml.find("output = 0\n"), "inputs = { positive = 0, negative = 1 }\n"));
+  EXPECT_EQ(lab.put("scan", "\"m01\"", travel).result, "done");
+  const Answer early = lab.put("scan", "\"m01\"", travel + "after_edge_s = 0.01\n");
+  EXPECT_EQ(early.result, "refused");
+  EXPECT_THAT(early.reason, HasSubstr("after_edge_s: is 10000 us; allowed: 4 ticks of the bus or "
+                                      "more, which are 10240 us"));
+  EXPECT_EQ(lab.put("scan", "\"m01\"", travel + "after_edge_s = 0.01024\n").result, "done");
+}
+
 }  // namespace
 }  // namespace bushd::test

@@ -221,7 +221,9 @@ class MotorGroup(DeviceMap):
 class Line(MotorGroup):
     """Motors of one bus that go straight: at any moment each has made the same share of its way.
 
-    speed: no motor exceeds it, each in its own unit per second. duration_s: a line does not take less. Both may be changed.
+    speed: no motor exceeds it, each in its own unit per second. duration_s: a line does not take less.
+    law: "leading", or "elementary": one motor makes one step at a time. feed: not exceeded along the way, per second in the unit
+    that the motors share. All may be changed.
     """
 
     def __init__(
@@ -232,17 +234,22 @@ class Line(MotorGroup):
         *,
         speed: float | None = None,
         duration_s: float | None = None,
+        law: str = "leading",
+        feed: float | None = None,
         uncertain: bool = False,
     ) -> None:
         self.speed = speed
         self.duration_s = duration_s
+        self.law = law
+        self.feed = feed
         super().__init__(daemon, motors, name, uncertain=uncertain)
 
     def set(self, value: Targets, timeout: float | None = None) -> WatchableAsyncStatus[float]:
         targets, speed, duration_s = self._targets(value), self.speed, self.duration_s
+        law, feed = self.law, self.feed
 
         async def begin(client: aio.Client) -> Motion:
-            return await client.move_line(targets, speed=speed, duration_s=duration_s, wait=False)
+            return await client.move_line(targets, speed=speed, duration_s=duration_s, law=law, feed=feed, wait=False)
 
         return self._watched(self._daemon.begin(targets, begin, self._uncertain), targets, timeout)
 
