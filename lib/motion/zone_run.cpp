@@ -78,6 +78,15 @@ Result<tables::TableContent> written_codes(const ZoneRun& run, const std::string
   const auto cruise = std::ranges::max_element(parts, {}, &Delays::steps);
   const std::uint32_t steps = run.steps();
   if (steps < 2) return fail("has a single step, and codes have two at least; make it longer");
+  // Before codes are made of them: steps at other speeds may be more than memory has room for.
+  const auto too_many = [](std::size_t codes) {
+    return fail(
+        fmt::format("has {} steps beside those of its longest part at one speed, each of "
+                    "which takes a code; allowed: {}. Make its zones shorter, or use "
+                    "fewer of them",
+                    codes, tables::kMaxCodes));
+  };
+  if (steps - cruise->steps > tables::kMaxCodes) return too_many(steps - cruise->steps);
   tables::TableContent content{.name = name, .time_unit_ns = run.unit_ns, .decel = {{}}};
   const auto append = [](std::vector<std::uint16_t>& side, std::uint32_t times,
                          std::uint32_t delay) {
@@ -118,11 +127,8 @@ Result<tables::TableContent> written_codes(const ZoneRun& run, const std::string
       left > 0 ? cruise_code
                : std::min(*std::ranges::min_element(accel), *std::ranges::min_element(decel));
   const std::size_t codes = accel.size() + decel.size();
-  if (codes <= tables::kMaxCodes) return content;
-  return fail(
-      fmt::format("changes its speed in {} of its steps; allowed: {}. Use a shorter "
-                  "envelope, or a table with fewer codes",
-                  codes, tables::kMaxCodes));
+  if (codes > tables::kMaxCodes) return too_many(codes);
+  return content;
 }
 
 }  // namespace bushd::motion

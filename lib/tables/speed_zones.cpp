@@ -65,6 +65,12 @@ Result<void> check_order(const TomlReader& toml, const SpeedZones& read) {
                     "{}",
                     to, from, read.end)));
   }
+  if (const double way = std::fabs(read.steps_of(read.end) - read.steps_of(first));
+      way > SpeedZones::kMostSteps) {
+    return fail(toml.error("end", fmt::format("is {} steps from where the first zone begins; "
+                                              "allowed: up to {}",
+                                              way, SpeedZones::kMostSteps)));
+  }
   for (const double place : {first, read.end}) {
     if (std::fabs(read.steps_of(place)) <= SpeedZones::kMostSteps) continue;
     return fail(toml.error(

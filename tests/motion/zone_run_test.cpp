@@ -172,6 +172,9 @@ TEST(ZoneRun, WhatCannotBeMadeIsRefused) {
               HasSubstr("has a step of 100000 time units of its table; allowed: 65535"));
   EXPECT_THAT(refusal({.table = "t", .zones = {{0, 1000}}, .end = 1}),
               HasSubstr("has a single step"));
+  // Codes of a billion steps are not made.
+  EXPECT_THAT(refusal({.table = "t", .zones = {{0, 5000}, {1e9, 4000}}, .end = 2e9}),
+              HasSubstr("steps beside those of its longest part at one speed"));
 }
 
 }  // namespace

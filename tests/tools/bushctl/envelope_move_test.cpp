@@ -1,4 +1,4 @@
-#include "envelope_move.h"
+#include "tools/bushctl/envelope_move.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,11 +15,11 @@ namespace tables = bushd::tables;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr const char* kTable = "name = \"feed\"\ntime_unit_ns = 100000\naccel = [80, 40, 20]\n";
+constexpr const char* kFeedTable = "name = \"feed\"\ntime_unit_ns = 100000\naccel = [80, 40, 20]\n";
 
 class EnvelopeMove : public testing::Test {
  protected:
-  EnvelopeMove() { directory_.write("feed.toml", kTable); }
+  EnvelopeMove() { directory_.write("feed.toml", kFeedTable); }
 
   bushd::Result<EnvelopeFile> read(const std::string& keys) {
     return read_envelope(directory_.write("in.envelope", "table = \"feed\"\n" + keys).string());
@@ -91,7 +91,8 @@ TEST_F(EnvelopeMove, WhatDoesNotFitIsRefusedWithCauseAndRemedy) {
   Whereabouts other = motor();
   other.description.table.hash = "00000000";
   EXPECT_THAT(refusal(keys, other), HasSubstr("and feed goes by \"feed\", content 00000000"));
-  EXPECT_THAT(refusal(keys + "steps_per_unit = 100\n", motor(true)),
+  const std::string slow = "zones = [[0, 1], [10, 2]]\nend = 30\n";
+  EXPECT_THAT(refusal(slow + "steps_per_unit = 100\n", motor(true)),
               HasSubstr("steps_per_unit: is 100, and feed has 400 per mm"));
   EXPECT_THAT(refusal(keys + "steps_per_unit = 1\n", motor()), HasSubstr("feed has 1 per steps"));
   Whereabouts moving = motor();
@@ -101,7 +102,7 @@ TEST_F(EnvelopeMove, WhatDoesNotFitIsRefusedWithCauseAndRemedy) {
   unknown.state.trust = api::Trust::kUnknown;
   EXPECT_THAT(refusal(keys, unknown), HasSubstr("nobody knows where it stands"));
   EXPECT_THAT(read_envelope((directory_.path() / "out.envelope").string()).error().text(),
-              HasSubstr("out.envelope: cannot be read: no such file"));
+              HasSubstr("out.envelope: cannot be read: No such file"));
 }
 
 }  // namespace

@@ -89,7 +89,7 @@ TEST_F(BushtabEnvelope, WhatCannotBeIsRefusedAndNothingIsWritten) {
   };
   for (const Case& one : {
            Case{"in --end 5", "is new; it needs --table, --zone and --end"},
-           Case{"in", "in.envelope: cannot be read: no such file"},
+           Case{"in", "in.envelope: cannot be read: No such file"},
            Case{"in --table feed --zone 0:600 --end 50",
                 "in.envelope: zones[0]: has 600 steps/s, and the table \"feed\" reaches 500"},
            Case{"in --table none --zone 0:600 --end 50", "none"},
