@@ -9,11 +9,18 @@ void bushd_mcu_keep_enable(bushd_mcu* mcu) {
   mcu->port.keep_enable(mcu->port.context, on && mcu->inputs.enable_after_watchdog);
 }
 
+static bushd_edge disabling_edge(const bushd_mcu* mcu) {
+  if (mcu->inputs.emergency != BUSHD_EMERGENCY_INPUT_DISABLE) return BUSHD_EDGE_NONE;
+  const bool inverted = (mcu->inputs.system_inverted & BUSHD_INPUT_EMERGENCY) != 0;
+  return inverted ? BUSHD_EDGE_FALLING : BUSHD_EDGE_RISING;
+}
+
 void bushd_mcu_drive_enable(bushd_mcu* mcu) {
   const bool on = (mcu->flags & BUSHD_FLAG_ENABLED) != 0;
   // A master that knows nothing of levels wants these.
   if (on && mcu->config.outputs.enabled == 0) mcu->config.outputs.enabled = BUSHD_ENABLED_HIGH;
-  mcu->port.set_enable(mcu->port.context, on, &mcu->config.outputs);
+  const bushd_edge off_at = on ? disabling_edge(mcu) : BUSHD_EDGE_NONE;
+  mcu->port.set_enable(mcu->port.context, on, &mcu->config.outputs, off_at);
 }
 
 void bushd_mcu_set_enable(bushd_mcu* mcu, bool on) {

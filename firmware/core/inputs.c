@@ -45,17 +45,25 @@ static void watch_emergency(bushd_mcu* mcu, bushd_inputs pins, uint32_t next) {
   const bushd_set_inputs* settings = &mcu->inputs;
   if (settings->emergency == BUSHD_EMERGENCY_INPUT_IGNORED) return;
   if ((system_inputs(mcu, pins) & BUSHD_INPUT_EMERGENCY) == 0) return;
-  if (mcu->faults & BUSHD_FAULT_EMERGENCY_INPUT) return;
-  const bool immediate = settings->emergency == BUSHD_EMERGENCY_INPUT_IMMEDIATE;
-  bushd_mcu_stop_all(mcu, immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP, next);
-  mcu->faults |= BUSHD_FAULT_EMERGENCY_INPUT;
+  const bool disables = settings->emergency == BUSHD_EMERGENCY_INPUT_DISABLE;
+  const uint8_t faults = BUSHD_FAULT_EMERGENCY_INPUT | (disables ? BUSHD_FAULT_DISABLED : 0);
+  if ((mcu->faults & faults) == faults) return;
+  _Static_assert(BUSHD_EMERGENCY_INPUT_RAMP == BUSHD_STOP_RAMP + 1 &&
+                     BUSHD_EMERGENCY_INPUT_IMMEDIATE == BUSHD_STOP_IMMEDIATE + 1 &&
+                     BUSHD_EMERGENCY_INPUT_DISABLE == BUSHD_STOP_DISABLE + 1,
+                 "the same modes, behind that of an input that is ignored");
+  bushd_mcu_stop_all(mcu, (bushd_stop_mode)(settings->emergency - 1), next);
+  mcu->faults |= faults;
+}
+
+void bushd_mcu_watch_emergency_input(bushd_mcu* mcu) {
+  watch_emergency(mcu, mcu->port.read_inputs(mcu->port.context), bushd_mcu_first_open(mcu));
 }
 
 static void watch_current(bushd_mcu* mcu, uint32_t next) {
   const uint16_t most = mcu->inputs.overcurrent;
   if (most == 0 || mcu->port.read_current(mcu->port.context) <= most) return;
-  bushd_mcu_set_enable(mcu, false);
-  bushd_mcu_stop_all(mcu, BUSHD_STOP_IMMEDIATE, next);
+  bushd_mcu_stop_all(mcu, BUSHD_STOP_DISABLE, next);
   mcu->faults |= BUSHD_FAULT_OVERCURRENT;
 }
 
@@ -75,7 +83,7 @@ void bushd_mcu_clear_faults(bushd_mcu* mcu, uint8_t faults) {
   const uint8_t others = faults == 0 ? 0 : (uint8_t)~faults;
   mcu->faults &= (uint8_t)(others | BUSHD_FAULT_SELF_TEST);
   // What has caused one may be there still.
-  watch_emergency(mcu, mcu->port.read_inputs(mcu->port.context), bushd_mcu_first_open(mcu));
+  bushd_mcu_watch_emergency_input(mcu);
   watch_current(mcu, bushd_mcu_first_open(mcu));
 }
 
@@ -84,6 +92,7 @@ bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* messag
   const uint16_t limits = message->limit_positive | message->limit_negative;
   if ((limits & ~bushd_mcu_own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
   bushd_mcu_wait_for_local(mcu);
+  bushd_mcu_watch_emergency_input(mcu);
   mcu->inputs = *message;
   bushd_mcu_default_switches(mcu);
   bushd_mcu_begin_inputs(mcu);
@@ -95,6 +104,7 @@ void bushd_mcu_begin_inputs(bushd_mcu* mcu) {
   const bushd_inputs pins = mcu->port.read_inputs(mcu->port.context);
   bushd_mcu_begin_limits(mcu, pins.motors ^ mcu->inputs.inverted);
   bushd_mcu_forget_presses(mcu, system_inputs(mcu, pins));
+  bushd_mcu_drive_enable(mcu);
   bushd_mcu_keep_enable(mcu);
 }
 

@@ -10,6 +10,8 @@ void bushd_mcu_watch_inputs(bushd_mcu* mcu);  // before every tick is prepared
 bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message);
 bushd_status bushd_mcu_set_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message);
 void bushd_mcu_begin_inputs(bushd_mcu* mcu);  // after the settings were restored
+// What the port has latched counts before EN is written anew.
+void bushd_mcu_watch_emergency_input(bushd_mcu* mcu);
 void bushd_mcu_report_inputs(const bushd_mcu* mcu, bushd_report* report);
 // Clears those of these faults (0: of all) whose cause is gone.
 void bushd_mcu_clear_faults(bushd_mcu* mcu, uint8_t faults);

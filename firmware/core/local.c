@@ -23,7 +23,8 @@ enum { READINGS = BUSHD_MCU_LOCAL_READINGS };
 
 // Other faults are the host's: without one, people may still move a motor.
 static const uint8_t kForbids = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_EMERGENCY |
-                                BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT;
+                                BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT |
+                                BUSHD_FAULT_DISABLED;
 
 static uint8_t buttons_of(const bushd_mcu* mcu, uint8_t system_inputs) {
   if (mcu->local.settings.motors == 0) return 0;

@@ -3,7 +3,6 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
-#include "firmware/core/drivers.h"
 #include "firmware/core/emission.h"
 #include "firmware/core/inputs.h"
 
@@ -92,7 +91,6 @@ bushd_mcu_nvm_region bushd_mcu_nvm_region_at(bushd_mcu* mcu, uint8_t index) {
 }
 
 void bushd_mcu_nvm_restored(bushd_mcu* mcu) {
-  bushd_mcu_drive_enable(mcu);
   bushd_mcu_begin_inputs(mcu);
   bushd_mcu_restore_emission(mcu);
   mcu->port.set_tick(mcu->port.context, mcu->tick_ns);

@@ -106,10 +106,10 @@ void bushd_mcu_stop_motor(bushd_mcu* mcu, uint8_t m, bushd_stop_mode mode, uint3
   bushd_mcu_stream_motion queued = {false, 0};
   if (bushd_mcu_is_queued(&mcu->motor[m])) queued = bushd_mcu_stream_motion_at(mcu, m, next);
   bushd_mcu_cut_queue(mcu, m, next);  // a run that waits, too: the motor is the queue's then
-  if (mode == BUSHD_STOP_IMMEDIATE) {
-    cut(mcu, m, &queued);
-  } else {
+  if (mode == BUSHD_STOP_RAMP) {
     ramp_down(mcu, m, &queued);
+  } else {
+    cut(mcu, m, &queued);
   }
 }
 

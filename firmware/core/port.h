@@ -36,7 +36,11 @@ typedef struct bushd_port {
   // that is, and where STEP and the common DIR rest; while levels->enabled is 0 nobody has told,
   // and EN and STEP are left to the resistors of the board: not driven. `levels` stay where they
   // are, and change while the drivers are disabled and no motor moves, with another call.
-  void (*set_enable)(void* context, bool on, const bushd_set_outputs* levels);
+  // off_at: EN goes off by itself within a slot of this edge at the emergency input, without the
+  // core; at once if the input is so already. From then on read_inputs says that the input is as
+  // after the edge, until the next call: no press is too short. BUSHD_EDGE_NONE: it does not, and
+  // never does with `on` false.
+  void (*set_enable)(void* context, bool on, const bushd_set_outputs* levels, bushd_edge off_at);
 
   // Length of all later ticks, in ns, from the next tick boundary on.
   void (*set_tick)(void* context, uint32_t tick_ns);

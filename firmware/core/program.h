@@ -24,7 +24,7 @@ typedef struct bushd_mcu bushd_mcu;
 // These end any program; others are a matter between the MCU and its host.
 #define BUSHD_MCU_PROGRAM_ENDING_FAULTS                                          \
   (BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT | \
-   BUSHD_FAULT_OVERCURRENT)
+   BUSHD_FAULT_OVERCURRENT | BUSHD_FAULT_DISABLED)
 
 typedef struct bushd_mcu_repeat {
   const uint8_t* at;    // the frame behind REPEAT

@@ -31,7 +31,7 @@ static uint32_t capabilities_of(const bushd_mcu* mcu) {
                  BUSHD_CAN_HOME | BUSHD_CAN_LOCAL | BUSHD_CAN_POSITION_COMPARE | BUSHD_CAN_BURST |
                  BUSHD_CAN_COMMON_DIR | BUSHD_CAN_STAGGERED | BUSHD_CAN_PHASES |
                  BUSHD_CAN_MOTOR_INPUTS | BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRAVEL |
-                 BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS;
+                 BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS | BUSHD_CAN_DISABLE;
   if (mcu->port.set_trigger != NULL) all |= BUSHD_CAN_TRIGGER;
   if (mcu->port.set_current != NULL) all |= BUSHD_CAN_CURRENTS;
   if (mcu->config.velocity_motors != 0) all |= BUSHD_CAN_VELOCITY;
@@ -106,11 +106,13 @@ static uint8_t actions_at_rest_only(const bushd_mcu* mcu, uint8_t faults) {
 static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
   const uint8_t at_rest_only = actions_at_rest_only(mcu, message->faults);
   if ((message->actions & at_rest_only) != 0 && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
+  bushd_mcu_watch_emergency_input(mcu);
   if (message->actions & BUSHD_CONTROL_CLEAR_FAULTS) bushd_mcu_clear_faults(mcu, message->faults);
   if (message->actions & BUSHD_CONTROL_FORGET_TABLES) bushd_mcu_forget_tables(mcu);
   if (message->actions & BUSHD_CONTROL_DISABLE) bushd_mcu_set_enable(mcu, false);
   if (message->actions & BUSHD_CONTROL_ENABLE) {
-    if (mcu->faults & (BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT)) return BUSHD_E_STATE;
+    const uint8_t forbid = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT | BUSHD_FAULT_DISABLED;
+    if (mcu->faults & forbid) return BUSHD_E_STATE;
     bushd_mcu_set_enable(mcu, true);
   }
   return BUSHD_OK;

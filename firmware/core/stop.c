@@ -6,6 +6,7 @@
 #include "firmware/core/stop.h"
 
 #include "firmware/core/access.h"
+#include "firmware/core/drivers.h"
 #include "firmware/core/line_run.h"
 #include "firmware/core/owner.h"
 #include "firmware/core/state.h"
@@ -55,12 +56,16 @@ void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu) {
 }
 
 void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_stop_mode mode, uint32_t next) {
+  // Before all else, since it takes effect at once.
+  if (mode == BUSHD_STOP_DISABLE) bushd_mcu_set_enable(mcu, false);
   if (mode == BUSHD_STOP_RAMP) bushd_mcu_ramp_down_line(mcu);
   for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, mode, next);
 }
 
 bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
+  const bool disables = message->mode == BUSHD_STOP_DISABLE;
+  const uint8_t faults = BUSHD_FAULT_EMERGENCY | (disables ? BUSHD_FAULT_DISABLED : 0);
   bushd_mcu_stop_all(mcu, message->mode, bushd_mcu_first_open(mcu));
-  mcu->faults |= BUSHD_FAULT_EMERGENCY;
+  mcu->faults |= faults;
   return BUSHD_OK;
 }

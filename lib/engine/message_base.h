@@ -68,7 +68,8 @@ enum {
   BUSHD_FAULT_EMERGENCY = 1 << 3,  // an emergency stop was commanded
   BUSHD_FAULT_EMERGENCY_INPUT = 1 << 4,  // the emergency input was active
   BUSHD_FAULT_OVERCURRENT = 1 << 5,      // the supply current was above its threshold; EN is low
-  BUSHD_FAULT_EEPROM = 1 << 6  // what it keeps was unreadable at boot: defaults are in use
+  BUSHD_FAULT_EEPROM = 1 << 6,   // what it keeps was unreadable at boot: defaults are in use
+  BUSHD_FAULT_DISABLED = 1 << 7  // an emergency stop or the emergency input has switched EN off
 };
 
 enum {

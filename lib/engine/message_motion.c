@@ -49,8 +49,9 @@ size_t bushd_encode_emergency(const bushd_emergency* message, uint8_t* payload) 
 bushd_status bushd_decode_emergency(const uint8_t* payload, size_t size, bushd_emergency* message) {
   reader r = read_from(payload, size);
   const uint8_t mode = get8(&r);
-  message->mode = mode == BUSHD_STOP_IMMEDIATE ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP;
-  return finish(&r, mode <= BUSHD_STOP_IMMEDIATE);
+  const bool known = mode <= BUSHD_STOP_DISABLE;
+  message->mode = known ? (bushd_stop_mode)mode : BUSHD_STOP_RAMP;
+  return finish(&r, known);
 }
 
 static uint8_t bits_set(uint16_t mask) {

@@ -219,7 +219,11 @@ typedef struct bushd_position_compare {
   uint32_t width_us;  // >= 1
 } bushd_position_compare;
 
-typedef enum bushd_stop_mode { BUSHD_STOP_RAMP = 0, BUSHD_STOP_IMMEDIATE = 1 } bushd_stop_mode;
+typedef enum bushd_stop_mode {
+  BUSHD_STOP_RAMP = 0,
+  BUSHD_STOP_IMMEDIATE = 1,
+  BUSHD_STOP_DISABLE = 2  // immediately, and EN falls at once; of emergencies only
+} bushd_stop_mode;
 // All motors stop, within two ticks: by their tables' ramps, or without another step.
 typedef struct bushd_emergency {
   bushd_stop_mode mode;

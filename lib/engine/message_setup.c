@@ -317,7 +317,7 @@ bushd_status bushd_decode_set_inputs(const uint8_t* payload, size_t size,
   message->enable_after_watchdog = enable == 1;
   return finish(&r, message->debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS &&
                         message->system_inverted <= BUSHD_SYSTEM_INPUTS &&
-                        message->emergency <= BUSHD_EMERGENCY_INPUT_IMMEDIATE &&
+                        message->emergency <= BUSHD_EMERGENCY_INPUT_DISABLE &&
                         message->overcurrent <= BUSHD_MAX_CURRENT && enable <= 1);
 }
 

@@ -53,6 +53,7 @@ enum {
 #define BUSHD_CAN_SLOW_RUNS UINT32_C(0x200000)   // shortest delays and slow delays beyond 16 bits
 #define BUSHD_CAN_PROGRAM UINT32_C(0x400000)     // carries out programs by itself
 #define BUSHD_CAN_ELEMENTARY UINT32_C(0x800000)  // lines by engine/elementary.h
+#define BUSHD_CAN_DISABLE UINT32_C(0x1000000)    // BUSHD_STOP_DISABLE and _EMERGENCY_INPUT_DISABLE
 
 // Only `protocol_version` is decoded of another version, the rest is zero: enough to say which one
 // it is.
@@ -189,7 +190,8 @@ typedef struct bushd_set_position {
 enum {
   BUSHD_EMERGENCY_INPUT_IGNORED = 0,
   BUSHD_EMERGENCY_INPUT_RAMP = 1,
-  BUSHD_EMERGENCY_INPUT_IMMEDIATE = 2
+  BUSHD_EMERGENCY_INPUT_IMMEDIATE = 2,
+  BUSHD_EMERGENCY_INPUT_DISABLE = 3
 };
 #define BUSHD_MAX_DEBOUNCE_TICKS 15u
 #define BUSHD_MAX_CURRENT 1023u

@@ -238,6 +238,103 @@ TEST_P(Inputs, TooMuchCurrentTakesThePowerAway) {
   }
 }
 
+// Its edge at once takes EN away, in the middle of a tick, and however short it is.
+class DisablingInput : public Inputs {
+ protected:
+  bushd_status control(std::uint8_t address, std::uint8_t action) {
+    return master_.acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
+                                bushd_control{action, 0});
+  }
+  void expect_en_fell_within_a_slot_of(TimeNs time_ns) {
+    const TimeNs slot_ns = kTickNs / 128;
+    for (const std::size_t mcu : {0, 1}) {
+      const auto falls = recorder_.times(mcu, Signal::kEnable, 0, false);
+      ASSERT_EQ(falls.size(), 1u);
+      EXPECT_GE(falls[0], time_ns);
+      EXPECT_LE(falls[0], time_ns + slot_ns);
+    }
+  }
+};
+BUSHD_FOR_TARGETS(DisablingInput, targets());
+
+TEST_P(DisablingInput, TakesEnAwayWithinASlotOfAPressThatIsShorterThanATick) {
+  for (const bool open : {false, true}) {
+    SCOPED_TRACE(open ? "active when open" : "active when closed");
+    bushd_set_inputs settings{};
+    settings.emergency = BUSHD_EMERGENCY_INPUT_DISABLE;
+    if (open) settings.system_inverted = BUSHD_INPUT_EMERGENCY;
+    const std::uint8_t rests = open ? BUSHD_INPUT_EMERGENCY : 0;
+    const std::uint8_t pressed = open ? 0 : BUSHD_INPUT_EMERGENCY;
+    ASSERT_NO_FATAL_FAILURE(configure({}));
+    set_inputs({0, rests});
+    ASSERT_NO_FATAL_FAILURE(configure(settings));
+    recorder_.edges.clear();
+    const auto before = master_.poll(kReal).motor[kMotor].position_steps;
+    start_run();
+    pass_ticks(60);
+    set_inputs({0, pressed});
+    const TimeNs pressed_ns = bus_.now_ns();
+    bus_.advance_to(pressed_ns + TimeNs{kTickNs} / 16);
+    for (const std::size_t mcu : {0, 1}) bus_.node(mcu).set_inputs({0, rests});
+    pass_ticks(40);
+    expect_en_fell_within_a_slot_of(pressed_ns);
+    const bushd_report report = master_.poll(kReal);
+    EXPECT_EQ(report.faults, BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_DISABLED);
+    EXPECT_EQ(report.moving, 0);
+    const auto steps = recorder_.times(1, Signal::kStep, kMotor, true).size();
+    EXPECT_GT(steps, 20u);
+    EXPECT_EQ(steps, recorder_.times(0, Signal::kStep, kMotor, true).size());
+    EXPECT_EQ(report.motor[kMotor].position_steps, before + static_cast<std::int32_t>(steps));
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_E_STATE);
+      EXPECT_EQ(control(address, BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
+      EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_OK);
+      EXPECT_EQ(master_.poll(address).state, BUSHD_STATE_READY);
+    }
+    for (const std::size_t mcu : {0, 1}) {
+      EXPECT_EQ(recorder_.times(mcu, Signal::kEnable, 0, false).size(), 1u);
+      EXPECT_EQ(recorder_.times(mcu, Signal::kEnable, 0, true).size(), 1u);
+    }
+  }
+}
+
+TEST_P(DisablingInput, ThatIsActiveWhenDriversAreEnabledLeavesThemOff) {
+  bushd_set_inputs settings{};
+  settings.emergency = BUSHD_EMERGENCY_INPUT_DISABLE;
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    ASSERT_EQ(control(address, BUSHD_CONTROL_DISABLE), BUSHD_OK);
+  }
+  ASSERT_NO_FATAL_FAILURE(configure(settings));
+  set_inputs({0, BUSHD_INPUT_EMERGENCY});
+  pass_ticks(3);
+  recorder_.edges.clear();
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_E_STATE);
+    EXPECT_EQ(master_.poll(address).faults, BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_DISABLED);
+  }
+  for (const std::size_t mcu : {0, 1}) {
+    EXPECT_EQ(recorder_.times(mcu, Signal::kEnable, 0, true).size(), 0u);
+  }
+}
+
+TEST_P(DisablingInput, IsAsFastAsTheFrameOfACommandedStop) {
+  start_run();
+  pass_ticks(60);
+  recorder_.edges.clear();
+  broadcast(BUSHD_MSG_EMERGENCY, {BUSHD_STOP_DISABLE});
+  const TimeNs heard_ns = bus_.now_ns();
+  pass_ticks(40);
+  for (const std::size_t mcu : {0, 1}) {
+    const auto falls = recorder_.times(mcu, Signal::kEnable, 0, false);
+    ASSERT_EQ(falls.size(), 1u);
+    EXPECT_LE(falls[0], heard_ns + TimeNs{kTickNs});
+  }
+  for (const std::uint8_t address : {kVirtual, kReal}) {
+    EXPECT_EQ(master_.poll(address).faults, BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_DISABLED);
+    EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_E_STATE);
+  }
+}
+
 // Everything that is said of a line in tests/vectors, to one MCU: its answers.
 class GoldenFrames : public testing::TestWithParam<Target> {
  protected:

@@ -32,6 +32,7 @@ const std::vector<Unsupported> kUnsupported = {
        return bench.count_of<link::RequestRefused>() == 1;
      },
      "no line is left for EN"},
+    {"EMERGENCY_disable", BUSHD_CAN_DISABLE, kByCapability, "no line is left for EN"},
     {"CONTROL_named_faults", BUSHD_CAN_CLEAR_NAMED, kByCapability,
      "it clears at once: nothing comes up while that is on its way"},
     {"TABLE_TICKS", BUSHD_CAN_TABLE_TICKS, kByCapability, "there are no slots"},

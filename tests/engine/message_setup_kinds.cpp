@@ -117,14 +117,14 @@ Kinds setup_kinds() {
                    [](Bytes* p) {
                      (*p)[8] = between<uint8_t>(0, BUSHD_MAX_DEBOUNCE_TICKS);
                      (*p)[9] = between<uint8_t>(0, BUSHD_SYSTEM_INPUTS);
-                     (*p)[10] = between<uint8_t>(0, 2);
+                     (*p)[10] = between<uint8_t>(0, 3);
                      bushd_put_u16(p->data() + 11, between<uint16_t>(0, 1023));
                      (*p)[13] = between<uint8_t>(0, 1);
                    }),
         codec(bushd_decode_set_inputs, bushd_encode_set_inputs),
         {{"a debounce beyond the counters", set8(8, 16)},
          {"unknown input", set8(9, 16)},
-         {"unknown action", set8(10, 3)},
+         {"unknown action", set8(10, 4)},
          {"more than can be read", set16(11, 1024)},
          {"neither on nor off", set8(13, 2)}}}},
       {"set_outputs",

@@ -171,7 +171,7 @@ class ExampleMcu {
       self->delay_us_ = static_cast<int>(delay_ns / 1000);
     };
     port.store_address = [](void*, uint8_t) { return true; };
-    port.set_enable = [](void*, bool, const bushd_set_outputs*) {};
+    port.set_enable = [](void*, bool, const bushd_set_outputs*, bushd_edge) {};
     port.set_tick = [](void*, uint32_t) {};
     port.adjust_tick = [](void*, int32_t) {};
     port.time_in_tick_ns = [](void*) { return kTimeInTickNs; };

@@ -316,14 +316,14 @@ INSTANTIATE_TEST_SUITE_P(Formats, SystemInputs,
                          testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
 TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
-  for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
+  for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE, BUSHD_STOP_DISABLE}) {
     for (const std::uint8_t rests_at : {std::uint8_t{0}, std::uint8_t{1}}) {
       const auto stopped =
-          with({.system_inverted = rests_at,
-                .emergency = mode == BUSHD_STOP_IMMEDIATE ? std::uint8_t{2} : std::uint8_t{1}});
+          with({.system_inverted = rests_at, .emergency = static_cast<std::uint8_t>(mode + 1)});
       const auto twin = with({});
       stopped->pins({0, rests_at});
       stopped->control(BUSHD_CONTROL_CLEAR_FAULTS);
+      stopped->control(BUSHD_CONTROL_ENABLE);
       for (Rig* on : {stopped.get(), twin.get()}) {
         ASSERT_EQ(start(*on, 50), BUSHD_OK);
         ASSERT_EQ(on->take(on->part(plan(-50), on->first_open(), 0, 100, 2)), BUSHD_OK);
@@ -335,7 +335,8 @@ TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
       EXPECT_EQ(stopped->history(0), twin->history(0));
       EXPECT_EQ(stopped->history(2), twin->history(2));
       const bushd_report report = stopped->poll();
-      EXPECT_EQ(report.faults, BUSHD_FAULT_EMERGENCY_INPUT);
+      const int disabled = mode == BUSHD_STOP_DISABLE ? int{BUSHD_FAULT_DISABLED} : 0;
+      EXPECT_EQ(report.faults, BUSHD_FAULT_EMERGENCY_INPUT | disabled);
       EXPECT_EQ(report.state, BUSHD_STATE_FAULT);
       EXPECT_EQ(report.motor[2].position_steps, stopped->pulses(2));
       EXPECT_EQ(start(*stopped, 5), BUSHD_E_STATE);

@@ -95,9 +95,10 @@ Rig::Rig(RigOptions options)
     if (rig.options_.stores_address) rig.stored_address_ = address;
     return rig.options_.stores_address;
   };
-  port.set_enable = [](void* context, bool on, const bushd_set_outputs* levels) {
+  port.set_enable = [](void* context, bool on, const bushd_set_outputs* levels, bushd_edge off_at) {
     auto& rig = *static_cast<Rig*>(context);
     rig.enabled_ = on;
+    rig.off_at_ = off_at;
     rig.levels_ = *levels;
     ++rig.enable_calls_;
   };

@@ -205,6 +205,7 @@ class Rig {
   const bushd_set_outputs& levels() const { return levels_; }
   int enable_calls() const { return enable_calls_; }
   bool enable_kept() const { return enable_kept_; }
+  bushd_edge off_at() const { return off_at_; }  // as in bushd_port.set_enable
   int stored_address() const { return stored_address_; }
   static std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE> unique_id() {
     return {'b', 'u', 's', 'h', 0, 1, 2, 3};
@@ -238,6 +239,7 @@ class Rig {
   bushd_edge awaited_edge_ = BUSHD_EDGE_NONE;
   int enable_calls_ = 0;
   bool enable_kept_ = false;
+  bushd_edge off_at_ = BUSHD_EDGE_NONE;
   int stored_address_ = -1;
   bushd_inputs pins_{};
   std::uint16_t current_ = 0;

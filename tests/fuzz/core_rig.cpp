@@ -38,8 +38,8 @@ void CoreRig::boot() {
             self(context)->address_ = address;
             return true;
           },
-      .set_enable = [](void* context, bool on,
-                       const bushd_set_outputs*) { self(context)->enabled_ = on; },
+      .set_enable = [](void* context, bool on, const bushd_set_outputs*,
+                       bushd_edge) { self(context)->enabled_ = on; },
       .set_tick = [](void* context, std::uint32_t tick_ns) { self(context)->tick_ns_ = tick_ns; },
       .adjust_tick = [](void* context, std::int32_t ns) { self(context)->adjusted(ns); },
       .time_in_tick_ns = [](void* context) { return self(context)->time_in_tick_ns(); },

@@ -91,7 +91,7 @@ void decode_for_mcu(Bytes payload) {
   }
   bushd_set_inputs inputs;
   if (decoded(payload, &inputs, bushd_decode_set_inputs, bushd_encode_set_inputs)) {
-    BUSHD_REQUIRE(inputs.emergency <= BUSHD_EMERGENCY_INPUT_IMMEDIATE);
+    BUSHD_REQUIRE(inputs.emergency <= BUSHD_EMERGENCY_INPUT_DISABLE);
     BUSHD_REQUIRE(inputs.debounce_ticks <= BUSHD_MAX_DEBOUNCE_TICKS);
   }
   bushd_motor_inputs motor_inputs;
@@ -126,7 +126,7 @@ void decode_for_mcu(Bytes payload) {
   decoded(payload, &local, bushd_decode_local, bushd_encode_local);
   bushd_emergency emergency;
   if (decoded(payload, &emergency, bushd_decode_emergency, bushd_encode_emergency)) {
-    BUSHD_REQUIRE(emergency.mode == BUSHD_STOP_RAMP || emergency.mode == BUSHD_STOP_IMMEDIATE);
+    BUSHD_REQUIRE(emergency.mode <= BUSHD_STOP_DISABLE);
   }
   bushd_emission emission;
   if (decoded(payload, &emission, bushd_decode_emission, bushd_encode_emission)) {

@@ -40,7 +40,8 @@ TEST_P(DisabledCapability, IsTheOnlyOneThatIsNotInTheIdentity) {
   // It is one of lines.
   const bool no_lines = (GetParam() & BUSHD_CAN_LINE_RUN) != 0;
   const std::uint32_t without = GetParam() | (no_lines ? BUSHD_CAN_ELEMENTARY : 0);
-  EXPECT_EQ(capabilities(), (kAll & ~without) | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS);
+  EXPECT_EQ(capabilities(),
+            (kAll & ~without) | BUSHD_CAN_CLEAR_NAMED | BUSHD_CAN_OUTPUTS | BUSHD_CAN_DISABLE);
 }
 
 // The one that a port has or has not. Messages of the others are those of the core, whose tests

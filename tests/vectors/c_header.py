@@ -98,7 +98,7 @@ def c_encoder(index, message, fields):
                     lines.append(f"  message.bank[{i}].crc = UINT32_C({held[0]});")
                     lines.append(f"  message.bank[{i}].revision = UINT32_C({held[1]});")
             elif message == "emergency" and name == "mode":
-                lines.append(f"  message.mode = {'BUSHD_STOP_IMMEDIATE' if value else 'BUSHD_STOP_RAMP'};")
+                lines.append(f"  message.mode = {('BUSHD_STOP_RAMP', 'BUSHD_STOP_IMMEDIATE', 'BUSHD_STOP_DISABLE')[value]};")
             elif name in ("follows", "enable_after_watchdog"):
                 lines.append(f"  message.{name} = {'true' if value else 'false'};")
             elif name == "format":

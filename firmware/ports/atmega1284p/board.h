@@ -43,6 +43,7 @@
 #define COMPARE_PORT PORTD
 #define COMPARE_BIT 6
 #define EN_PORT PORTD
+#define EN_PIN PIND  // a 1 written to it turns the output over
 #define EN_BIT 5
 // Driver-enable of the RS-485 transceiver, and its /RE: it does not hear itself.
 #define DE_PORT PORTD
@@ -78,6 +79,10 @@
 #define TRIGGER_RISING (1 << ISC21 | 1 << ISC20)
 // Edges of the comparators: their outputs fall when the current is reached.
 #define BOARD_EDGES (1 << ISC01 | 1 << ISC11)
+
+// Interrupt of the emergency input: at any change of its pin.
+#define EMERGENCY_VECTOR PCINT1_vect
+#define EMERGENCY_CHANGE (1 << PCINT9)  // of PCMSK1
 
 // Timer 3 is the clock, what the line waits by (compare A) and that of the position compare pulse
 // (compare B).

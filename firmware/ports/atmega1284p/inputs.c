@@ -1,6 +1,7 @@
 #include "firmware/ports/atmega2560/inputs.h"
 
 #include <board.h>
+#include <util/atomic.h>
 
 #define SETTLE_CYCLES (200UL * CYCLES_PER_US)
 
@@ -32,11 +33,36 @@ void inputs_init(void) {
   ADCSRA = 1 << ADEN | 1 << ADSC | 1 << ADATE | 1 << ADPS2 | 1 << ADPS1 | 1 << ADPS0;
 }
 
+static bool awaited_closed;
+
+static bool emergency_closed(void) {
+  return (INPUT_SYSTEM & 1 << EMERGENCY_BIT) == 0;
+}
+
+// Its interrupt puts itself off.
+void inputs_switch_off_at(bushd_edge edge) {
+  PCICR = 0;
+  PCMSK1 = 0;
+  if (edge == BUSHD_EDGE_NONE) return;
+  awaited_closed = edge == BUSHD_EDGE_RISING;
+  PCMSK1 = EMERGENCY_CHANGE;
+  PCIFR = 1 << PCIF1;
+  PCICR = 1 << PCIE1;
+  // It may have come before. What changes from here on is for the interrupt.
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    if (emergency_closed() == awaited_closed && PCICR != 0) {
+      PCICR = 0;
+      EN_PIN = 1 << EN_BIT;
+    }
+  }
+}
+
 bushd_inputs inputs_read(void) {
   const uint8_t low = (uint8_t)~INPUT_LOW;
   const uint8_t system = (uint8_t)~INPUT_SYSTEM;
   bushd_inputs inputs = {(uint16_t)((low & INPUT_LOW_BITS) | (system & 1 << INPUT_0_BIT)), 0};
-  if (system & 1 << EMERGENCY_BIT) inputs.system |= BUSHD_INPUT_EMERGENCY;
+  const bool switched_off = PCMSK1 != 0 && PCICR == 0;
+  if (switched_off ? awaited_closed : emergency_closed()) inputs.system |= BUSHD_INPUT_EMERGENCY;
   if (system & 1 << FORWARD_BIT) inputs.system |= BUSHD_INPUT_FORWARD;
   if (system & 1 << REVERSE_BIT) inputs.system |= BUSHD_INPUT_REVERSE;
   if (system & 1 << TRIGGER_BIT) inputs.system |= BUSHD_INPUT_TRIGGER;

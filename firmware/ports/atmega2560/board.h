@@ -19,7 +19,8 @@
 // Inputs, with pull-ups; closed to ground: active.
 #define INPUT_LOW PINK
 #define INPUT_HIGH PINJ
-// Those that are no motor's. The trigger's has an interrupt of its own, INT0.
+// Those that are no motor's. The trigger's and the emergency input have interrupts of their own,
+// INT0 and INT1.
 #define INPUT_SYSTEM PIND
 #define TRIGGER_BIT 0
 #define EMERGENCY_BIT 1
@@ -36,6 +37,7 @@
 #define COMPARE_PORT PORTG
 #define COMPARE_BIT 5
 #define EN_PORT PORTH
+#define EN_PIN PINH  // a 1 written to it turns the output over
 #define EN_BIT 3
 // Driver-enable of the RS-485 transceiver, and its /RE: it does not hear itself.
 #define DE_PORT PORTE
@@ -66,7 +68,15 @@
 #define TRIGGER_FLAG INTF0
 #define TRIGGER_FALLING (1 << ISC01)
 #define TRIGGER_RISING (1 << ISC01 | 1 << ISC00)
-#define BOARD_EDGES 0u  // of other interrupts
+// Edges of other interrupts.
+#define BOARD_EDGES (EICRA & EMERGENCY_EDGES)
+
+// Interrupt of the emergency input.
+#define EMERGENCY_VECTOR INT1_vect
+#define EMERGENCY_INT INT1
+#define EMERGENCY_FLAG INTF1
+#define EMERGENCY_FALLING (1 << ISC11)
+#define EMERGENCY_EDGES (1 << ISC11 | 1 << ISC10)  // both bits: rising
 
 // Timer of clock.h, and of its bytes.
 #define CLOCK_COUNT TCNT5

@@ -1,10 +1,11 @@
-; The trigger's edge and the position compare pulse, by the registers that interrupts have to themselves (emission_slots.h):
+; The edges of the trigger and of the emergency input, and the position compare pulse, by the registers that interrupts have to themselves (emission_slots.h):
 ; slots wait for none of them longer than 25 cycles. None changes a flag of SREG.
 
 #include <avr/io.h>
 
 #include <board.h>
 #include "firmware/ports/atmega2560/emission_slots.h"
+#include <board.inc>
 
     .section .vectors, "ax", @progbits
 
@@ -16,6 +17,16 @@ TRIGGER_VECTOR:
     lds DATA_LOW, CLOCK_COUNT_HIGH
     sts trigger_count+1, DATA_LOW
     cbi _SFR_IO_ADDR(EIMSK), TRIGGER_INT
+    reti
+
+; EN is off: its output turns over, once. It was on, or nobody would wait for this edge.
+    .global EMERGENCY_VECTOR
+EMERGENCY_VECTOR:
+    mov SAVED_LOW, r16
+    ldi r16, 1 << EN_BIT
+    sts _SFR_MEM_ADDR(EN_PIN), r16
+    mov r16, SAVED_LOW
+    emergency_interrupt_off
     reti
 
 #ifdef TCNT4

@@ -1,6 +1,7 @@
 #include "firmware/ports/atmega2560/inputs.h"
 
 #include <board.h>
+#include <util/atomic.h>
 
 #define SETTLE_CYCLES (200UL * CYCLES_PER_US)
 
@@ -32,12 +33,39 @@ void inputs_init(void) {
   ADCSRA = 1 << ADEN | 1 << ADSC | 1 << ADATE | 1 << ADPS2 | 1 << ADPS1 | 1 << ADPS0;
 }
 
+// Its interrupt puts itself off, and leaves in EICRA which edge it was.
+void inputs_switch_off_at(bushd_edge edge) {
+  EIMSK &= (uint8_t)~(1 << EMERGENCY_INT);
+  EICRA &= (uint8_t)~EMERGENCY_EDGES;
+  if (edge == BUSHD_EDGE_NONE) return;
+  // Closed to ground is active.
+  const bool rising = edge == BUSHD_EDGE_RISING;
+  EICRA |= rising ? EMERGENCY_FALLING : EMERGENCY_EDGES;
+  EIFR = 1 << EMERGENCY_FLAG;
+  EIMSK |= 1 << EMERGENCY_INT;
+  // It may have come before. What falls from here on is for the interrupt.
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    const bool closed = (INPUT_SYSTEM & 1 << EMERGENCY_BIT) == 0;
+    if (closed == rising && (EIMSK & 1 << EMERGENCY_INT) != 0) {
+      EIMSK &= (uint8_t)~(1 << EMERGENCY_INT);
+      EN_PIN = 1 << EN_BIT;
+    }
+  }
+}
+
+// What the pin is to say although it has gone back; true: it is.
+static bool has_switched_off(void) {
+  return (EICRA & EMERGENCY_EDGES) != 0 && (EIMSK & 1 << EMERGENCY_INT) == 0;
+}
+
 bushd_inputs inputs_read(void) {
   const uint8_t low = INPUT_LOW;
   const uint8_t high = INPUT_HIGH;
   const uint8_t system = (uint8_t)~INPUT_SYSTEM;
   bushd_inputs inputs = {(uint16_t)~((uint16_t)high << 8 | low), 0};
-  if (system & 1 << EMERGENCY_BIT) inputs.system |= BUSHD_INPUT_EMERGENCY;
+  bool emergency = (system & 1 << EMERGENCY_BIT) != 0;
+  if (has_switched_off()) emergency = (EICRA & EMERGENCY_EDGES) == EMERGENCY_FALLING;
+  if (emergency) inputs.system |= BUSHD_INPUT_EMERGENCY;
   if (system & 1 << FORWARD_BIT) inputs.system |= BUSHD_INPUT_FORWARD;
   if (system & 1 << REVERSE_BIT) inputs.system |= BUSHD_INPUT_REVERSE;
   if (system & 1 << TRIGGER_BIT) inputs.system |= BUSHD_INPUT_TRIGGER;

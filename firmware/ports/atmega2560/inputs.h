@@ -14,4 +14,9 @@ void inputs_init(void);
 bushd_inputs inputs_read(void);
 uint16_t inputs_current(void);
 
+// From now on EN changes by itself at this edge of the emergency input, once, and at once if the
+// input is as after it already; inputs_read says so until the next call. BUSHD_EDGE_NONE: no more.
+// Nobody else writes to the port of EN meanwhile.
+void inputs_switch_off_at(bushd_edge edge);
+
 #endif

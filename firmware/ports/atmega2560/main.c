@@ -54,8 +54,10 @@ static bool port_store_address(void* context, uint8_t address) {
   return identity_store_address(address);
 }
 
-static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels) {
+static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels,
+                            bushd_edge off_at) {
   (void)context;
+  inputs_switch_off_at(BUSHD_EDGE_NONE);
   if (levels->enabled == 0) return;
   if (on == (levels->enabled == BUSHD_ENABLED_HIGH)) {
     EN_PORT |= 1 << EN_BIT;
@@ -65,6 +67,7 @@ static void port_set_enable(void* context, bool on, const bushd_set_outputs* lev
   emission_set_rest(levels->step_low);
   board_set_common_dir((levels->direction_low & 1u) != 0);
   board_drive();
+  inputs_switch_off_at(off_at);
 }
 
 static void port_set_tick(void* context, uint32_t tick_ns) {

@@ -28,7 +28,9 @@
 // In the order of BUSHD_INPUT_*.
 #define SYSTEM_INPUTS GPIO_DATA(GPIO_A, 0xF0u)
 #define SYSTEM_INPUTS_SHIFT 4
-#define TRIGGER_PIN (1u << 7)  // of port A, the only one that interrupts
+// Both are of port A; no others interrupt.
+#define EMERGENCY_PIN (1u << 4)
+#define TRIGGER_PIN (1u << 7)
 
 #define ENABLE GPIO_DATA(GPIO_A, 1u << 2)
 // Driver-enable of the RS-485 transceiver, and its /RE: it does not hear itself.

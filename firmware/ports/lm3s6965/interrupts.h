@@ -7,7 +7,7 @@ typedef void (*vector)(void);
 extern vector vectors[];
 #define EXTERNAL(irq) (16u + (irq))
 
-void trigger_edge(void);          // port A
+void input_edge(void);            // port A
 void line_received(void);         // UART 0
 void emission_half_slot(void);    // timer 0
 void emission_tick_begins(void);  // timer 1

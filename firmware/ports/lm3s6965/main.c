@@ -4,12 +4,12 @@
 #include "firmware/ports/lm3s6965/boot.h"
 #include "firmware/ports/lm3s6965/clock.h"
 #include "firmware/ports/lm3s6965/compare_output.h"
+#include "firmware/ports/lm3s6965/edges.h"
 #include "firmware/ports/lm3s6965/emission.h"
 #include "firmware/ports/lm3s6965/journal.h"
 #include "firmware/ports/lm3s6965/line.h"
 #include "firmware/ports/lm3s6965/nvm.h"
 #include "firmware/ports/lm3s6965/timer.h"
-#include "firmware/ports/lm3s6965/trigger.h"
 #include "firmware/ports/memory_names.h"
 
 #define QUEUE_TICKS 512u
@@ -44,15 +44,19 @@ static void put_outputs(bool on, const bushd_set_outputs* levels) {
   emission_set_rest(levels->step_low, (levels->direction_low & 1u) != 0);
 }
 
-static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels) {
+static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels,
+                            bushd_edge off_at) {
   static bool driven;
   (void)context;
+  emergency_await(BUSHD_EDGE_NONE, false);
   if (levels->enabled == 0) return;
   put_outputs(on, levels);
-  if (driven) return;
-  driven = true;
-  board_drive();
-  put_outputs(on, levels);
+  if (!driven) {
+    driven = true;
+    board_drive();
+    put_outputs(on, levels);
+  }
+  emergency_await(off_at, levels->enabled == BUSHD_ENABLED_LOW);
 }
 
 static void port_set_tick(void* context, uint32_t tick_ns) {
@@ -74,8 +78,9 @@ static uint32_t port_time_in_tick_ns(void* context) {
 // one has been shifted, to read them would lose it.
 static bushd_inputs port_read_inputs(void* context) {
   (void)context;
-  const bushd_inputs inputs = {
-      motor_inputs, (uint8_t)(~SYSTEM_INPUTS >> SYSTEM_INPUTS_SHIFT & BUSHD_SYSTEM_INPUTS)};
+  const uint32_t levels = emergency_latched(SYSTEM_INPUTS);
+  const bushd_inputs inputs = {motor_inputs,
+                               (uint8_t)(~levels >> SYSTEM_INPUTS_SHIFT & BUSHD_SYSTEM_INPUTS)};
   return inputs;
 }
 
@@ -192,7 +197,7 @@ int main(void) {
   boot();
   prepare();
   line_init();
-  trigger_init();
+  edges_init();
   compare_init();
   emission_start();
   watchdog_start();

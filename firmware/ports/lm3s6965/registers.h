@@ -33,6 +33,7 @@
 #define GPIO_IBE(port) REGISTER((port) + 0x408u)
 #define GPIO_IEV(port) REGISTER((port) + 0x40Cu)
 #define GPIO_IM(port) REGISTER((port) + 0x410u)
+#define GPIO_MIS(port) REGISTER((port) + 0x418u)
 #define GPIO_ICR(port) REGISTER((port) + 0x41Cu)
 #define GPIO_AFSEL(port) REGISTER((port) + 0x420u)
 #define GPIO_PUR(port) REGISTER((port) + 0x510u)

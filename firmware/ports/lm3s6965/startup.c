@@ -61,7 +61,7 @@ __attribute__((section(".vectors"), used)) static const vector kVectors[VECTORS]
     [4] = fail,
     [5] = fail,
     [6] = fail,
-    [EXTERNAL(IRQ_GPIO_A)] = trigger_edge,
+    [EXTERNAL(IRQ_GPIO_A)] = input_edge,
     [EXTERNAL(IRQ_UART0)] = line_received,
     [EXTERNAL(IRQ_TIMER0A)] = emission_half_slot,
     [EXTERNAL(IRQ_TIMER1A)] = emission_tick_begins,

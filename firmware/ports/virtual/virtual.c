@@ -248,14 +248,29 @@ static void drive_rest(bushd_virtual* v) {
   drive(v, v->now_ns, BUSHD_VIRTUAL_COMMON_DIR, &v->common_dir_level, common_dir_rests_high(v));
 }
 
-static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels) {
+static bool is_after(bushd_edge edge, bushd_inputs inputs) {
+  return ((inputs.system & BUSHD_INPUT_EMERGENCY) != 0) == (edge == BUSHD_EDGE_RISING);
+}
+
+// Its interrupt, and what it finds when it is allowed.
+static void follow_emergency(bushd_virtual* v) {
+  if (v->off_at == BUSHD_EDGE_NONE || v->switched_off || !is_after(v->off_at, v->inputs)) return;
+  v->switched_off = true;
+  drive_enable(v, v->rest.enabled == BUSHD_ENABLED_LOW);
+}
+
+static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels,
+                            bushd_edge off_at) {
   bushd_virtual* v = context;
+  v->off_at = off_at;
+  v->switched_off = false;
   if (levels->enabled == 0) return;
   const bool same =
       v->rest.step_low == levels->step_low && v->rest.direction_low == levels->direction_low;
   v->rest = *levels;
   drive_enable(v, on == (levels->enabled == BUSHD_ENABLED_HIGH));
   if (!same) drive_rest(v);
+  follow_emergency(v);
 }
 
 static void port_set_tick(void* context, uint32_t tick_ns) {
@@ -275,8 +290,10 @@ static uint32_t port_time_in_tick_ns(void* context) {
 
 static bushd_inputs port_read_inputs(void* context) {
   const bushd_virtual* v = context;
-  if (v->config.read_inputs == NULL) return v->inputs;
-  return v->config.read_inputs(v->config.context, v->now_ns);
+  const bool asks = v->config.read_inputs != NULL;
+  bushd_inputs inputs = asks ? v->config.read_inputs(v->config.context, v->now_ns) : v->inputs;
+  if (v->switched_off && !is_after(v->off_at, inputs)) inputs.system ^= BUSHD_INPUT_EMERGENCY;
+  return inputs;
 }
 
 static void port_set_trigger(void* context, bushd_edge edge) {
@@ -331,7 +348,8 @@ static void boot(bushd_virtual* v) {
   v->slot_buffer = NULL;
   v->tick_ns = BUSHD_BOOT_TICK_NS;
   v->adjust_ns = 0;
-  v->trigger_edge = BUSHD_EDGE_NONE;
+  v->trigger_edge = v->off_at = BUSHD_EDGE_NONE;
+  v->switched_off = false;
   memset(v->currents, 0, sizeof v->currents);
   memset(v->current_ma, 0, sizeof v->current_ma);
   memset(v->velocity, 0, sizeof v->velocity);
@@ -392,6 +410,7 @@ int bushd_virtual_keypad_display(bushd_virtual* v) {
 void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs) {
   const uint8_t changed = v->inputs.system ^ inputs.system;
   v->inputs = inputs;
+  if (v->running) follow_emergency(v);
   if (!v->running || (changed & BUSHD_INPUT_TRIGGER) == 0) return;
   const bushd_edge edge =
       inputs.system & BUSHD_INPUT_TRIGGER ? BUSHD_EDGE_RISING : BUSHD_EDGE_FALLING;

@@ -112,6 +112,8 @@ typedef struct bushd_virtual {
   bushd_mcu_nvm_scan scan;
   bushd_virtual_kept kept;
   bushd_edge trigger_edge;  // awaited
+  bushd_edge off_at;        // of the emergency input
+  bool switched_off;        // by it
 } bushd_virtual;
 
 // Precondition: config->mcu as bushd_mcu_boot wants it, its memory outlives *v; transmit is set.
@@ -134,7 +136,8 @@ void bushd_virtual_keypad_break(bushd_virtual* v, int64_t now_ns);
 // The next character for its display, -1: none is due now. As fast as the caller likes.
 int bushd_virtual_keypad_display(bushd_virtual* v);
 
-// The inputs from the last time given on. An edge at the trigger's is captured.
+// The inputs from the last time given on. An edge at the trigger's is captured; one at the
+// emergency input's may switch EN off. The callback, if there is one, says the same of both.
 void bushd_virtual_set_inputs(bushd_virtual* v, bushd_inputs inputs);
 
 // Pulls the MCU's reset at now_ns: DIR falls, STEP and EN are where resistors of the board hold
