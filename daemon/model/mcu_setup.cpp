@@ -52,6 +52,8 @@ void add_places(link::McuSetup& setup, const config::Bus& bus, const config::Mcu
   setup.places[{kAddress, 0}] = mcu.places.at("address");
   setup.places[{kFormat, 0}] = bus.places.at("format");
   setup.places[{kTick, 0}] = bus.places.at("tick_us");
+  setup.places[{kEmergencyStop, 0}] = bus.places.at("emergency_stop");
+  setup.places[{kEmergencyInput, 0}] = mcu.places.at("emergency_input");
 }
 
 void add_places(link::McuSetup& setup, const config::Motor& motor) {
@@ -96,6 +98,7 @@ link::McuSetup setup_of(const config::Config& config, McuId id, const TableOf& t
   setup.outputs = mcu.outputs;
   setup.outputs_at = mcu.outputs_at;
   setup.inputs = inputs_of(mcu);
+  setup.disabled_by_stop = config.bus_of(mcu).emergency_stop == BUSHD_STOP_DISABLE;
   add_places(setup, config.bus_of(mcu), mcu);
   setup.off_after_watchdog = mcu.enable_after_reset == config::EnableAfterReset::kNo;
   std::vector<const config::Motor*> motors;

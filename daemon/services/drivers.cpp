@@ -16,7 +16,10 @@ constexpr std::size_t kMaxOpen = 256;
 // What the report of an MCU shows against an action being done there.
 Result<void> check(std::uint8_t action, const bushd_report& report) {
   const bool enabled = (report.flags & BUSHD_FLAG_ENABLED) != 0;
-  if (action == BUSHD_CONTROL_ENABLE && !enabled) return fail("did not enable its drivers");
+  if (action == BUSHD_CONTROL_ENABLE && !enabled) {
+    const std::string fault = motion::fault_text(report);
+    return fail("did not enable its drivers" + (fault.empty() ? fault : ": " + fault));
+  }
   if (action == BUSHD_CONTROL_DISABLE && enabled) return fail("did not disable its drivers");
   if (action == BUSHD_CONTROL_CLEAR_FAULTS && report.faults != 0) {
     return fail("still has a fault: " + motion::fault_text(report));

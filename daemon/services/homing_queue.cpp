@@ -39,8 +39,8 @@ HomingEnd end_of_homing(const bushd_report& report, const std::string& mcu) {
     default:
       break;
   }
-  const unsigned stops =
-      BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_OVERCURRENT;
+  const unsigned stops = BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT |
+                         BUSHD_FAULT_OVERCURRENT | BUSHD_FAULT_DISABLED;
   if (report.faults & stops) {
     return {Outcome::kStopped, "homing was ended because " + motion::stop_cause(report) +
                                    "; 'bushctl clear', then home it"};

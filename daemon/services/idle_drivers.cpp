@@ -59,6 +59,12 @@ void IdleDrivers::reports(std::int64_t now_us, Mcu& mcu) {
   OfMcu& own = mcus_[mcu.id];
   const bool before = std::exchange(own.enabled, enabled(mcu));
   if (own.enabled && !before) own.enabled_us = now_us;
+  // After an emergency that has disabled them somebody has to say that they may be enabled.
+  if (mcu.asleep && (mcu.report().faults & BUSHD_FAULT_DISABLED) != 0) {
+    switched(mcu.id);
+    installation_.changed = true;
+    return;
+  }
   // What it was asked last has been done: asleep with drivers that are enabled, it is awake. One
   // that has not enabled them has a reason, with which a move is refused.
   if (!mcu.asleep || mcu.busy() || (!own.enabled && !own.waking)) return;

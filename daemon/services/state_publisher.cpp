@@ -26,6 +26,17 @@ api::McuState state_word(const link::McuView& view) {
   }
 }
 
+api::StopMode stop_mode_of(const config::Bus& bus) {
+  switch (bus.emergency_stop) {
+    case BUSHD_STOP_IMMEDIATE:
+      return api::StopMode::kImmediate;
+    case BUSHD_STOP_DISABLE:
+      return api::StopMode::kDisable;
+    default:
+      return api::StopMode::kRamp;
+  }
+}
+
 std::string detail_of(const Mcu& mcu, bool two_masters) {
   const link::McuView& view = mcu.view();
   if (view.phase != link::McuPhase::kOnline && view.bound_by_stop) {
@@ -209,9 +220,7 @@ api::Description StatePublisher::description_of(const Mcu& mcu) const {
                                .mcu = mcu.name(),
                                .address = mcu.config.address.value,
                                .tick_ns = bus.tick_ns(),
-                               .emergency_stop = bus.emergency_stop == BUSHD_STOP_IMMEDIATE
-                                                     ? api::StopMode::kImmediate
-                                                     : api::StopMode::kRamp,
+                               .emergency_stop = stop_mode_of(bus),
                                .port = its_bus.port,
                                .motors = {}};
   for (const MotorId motor : mcu.motors()) {

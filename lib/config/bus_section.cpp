@@ -94,9 +94,16 @@ Result<void> read_manners(const TomlReader& reader, Bus* bus) {
     bus->table_ticks = *frames == 0;
   }
   if (reader.has("emergency_stop")) {
-    const auto mode = read_word(reader, "emergency_stop", {"ramp", "immediate"});
+    const auto mode = read_word(reader, "emergency_stop", {"ramp", "immediate", "disable"});
     if (!mode) return fail(mode.error());
-    bus->emergency_stop = *mode == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE;
+    static_assert(BUSHD_STOP_RAMP == 0 && BUSHD_STOP_IMMEDIATE == 1 && BUSHD_STOP_DISABLE == 2);
+    bus->emergency_stop = static_cast<bushd_stop_mode>(*mode);
+    if (bus->emergency_stop == BUSHD_STOP_DISABLE && bus->kind != BusKind::kRs485) {
+      return fail(reader.error("emergency_stop",
+                               "is \"disable\", but nothing on a bus of this kind can disable "
+                               "drivers; allowed: \"ramp\" or \"immediate\". Use \"immediate\", "
+                               "and cut the power of the motors by a relay"));
+    }
   }
   return {};
 }

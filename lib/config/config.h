@@ -91,7 +91,7 @@ struct Bus {
   std::optional<Converter> converter{};  // by whose pulses it steps
   std::uint32_t answer_ms = 0;           // for an answer, beyond twice its delay
 
-  KeyPlaces places{};  // of `port`, `format`, `tick_us`
+  KeyPlaces places{};  // of `port`, `format`, `tick_us`, `emergency_stop`
 
   std::uint32_t tick_ns() const { return tick_us * 1000u; }
 };
@@ -123,7 +123,7 @@ struct Mcu {
   bool ready_after_homing = false;     // not before its motors with `home` have been homed
   bool has_phase_sequence = false;     // written in the file
   bool stand_in = false;               // for a bus that has no MCUs
-  KeyPlaces places{};                  // of `address`, `ready`
+  KeyPlaces places{};                  // of `address`, `ready`, `emergency_input`
 };
 
 struct Group {

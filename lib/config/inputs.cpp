@@ -23,20 +23,22 @@ Result<void> read_active(const TomlReader& reader, std::string_view key, bool* o
 
 Result<void> read_inputs(const TomlReader& reader, Mcu* mcu) {
   if (reader.has("emergency_input")) {
-    const auto action = read_word(reader, "emergency_input", {"ignore", "ramp", "immediate"});
+    const auto action =
+        read_word(reader, "emergency_input", {"ignore", "ramp", "immediate", "disable"});
     if (!action) return fail(action.error());
     static_assert(BUSHD_EMERGENCY_INPUT_IGNORED == 0 && BUSHD_EMERGENCY_INPUT_RAMP == 1 &&
-                  BUSHD_EMERGENCY_INPUT_IMMEDIATE == 2);
+                  BUSHD_EMERGENCY_INPUT_IMMEDIATE == 2 && BUSHD_EMERGENCY_INPUT_DISABLE == 3);
     mcu->emergency_input = static_cast<std::uint8_t>(*action);
   }
   if (auto read = read_active(reader, "emergency_active", &mcu->emergency_active_open); !read) {
     return read;
   }
   if (reader.has("emergency_active") && mcu->emergency_input == BUSHD_EMERGENCY_INPUT_IGNORED) {
-    return fail(reader.error("emergency_active",
-                             "says nothing while the input is ignored; allowed: beside "
-                             "emergency_input = \"ramp\" or \"immediate\". Add one of them, or "
-                             "remove this key"));
+    return fail(
+        reader.error("emergency_active",
+                     "says nothing while the input is ignored; allowed: beside "
+                     "emergency_input = \"ramp\", \"immediate\" or \"disable\". Add one of them, "
+                     "or remove this key"));
   }
   if (reader.has("debounce_ticks")) {
     const auto ticks = reader.integer("debounce_ticks", 0, BUSHD_MAX_DEBOUNCE_TICKS);

@@ -182,7 +182,7 @@ Result<void> read_buses(Loading* loading) {
     }
     bus.port = std::move(*port);
     if (auto once = check_bus_port(reader, bus.port, loading->config.buses); !once) return once;
-    bus.places = KeyPlaces(reader, {"port", "format", "tick_us"});
+    bus.places = KeyPlaces(reader, {"port", "format", "tick_us", "emergency_stop"});
     if (auto read = read_manners(reader, &bus); !read) return read;
     loading->config.buses.push_back(std::move(bus));
   }
@@ -236,7 +236,7 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     Mcu mcu{.bus = *bus,
             .address = {static_cast<std::uint8_t>(*address)},
             .id = fmt::format("{}:{}", config->buses[bus->value].name, *address)};
-    mcu.places = KeyPlaces(reader, {"address", "ready"});
+    mcu.places = KeyPlaces(reader, {"address", "ready", "emergency_input"});
     auto emission = read_emission(reader);
     if (!emission) return fail(emission.error());
     mcu.emission = std::move(*emission);

@@ -161,6 +161,15 @@ bool Motor::stops_immediately(const bushd_report& report) const {
          ((report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 && setup_.emergency_input_immediate);
 }
 
+// What has taken the power away says more than that the motor was stopped.
+void Motor::doubt_if_cut(const bushd_report& report) {
+  if (has_disabled_drivers(report)) {
+    trust_.lose_steps(unpowered(report, setup_.mcu));
+  } else if (stops_immediately(report)) {
+    trust_.lose_steps(stopped_immediately(report, setup_.mcu));
+  }
+}
+
 void Motor::take_limits(const bushd_report& report) {
   forbidden_up_ = has_bit(report.forbidden_positive, output().value);
   forbidden_down_ = has_bit(report.forbidden_negative, output().value);
@@ -173,11 +182,7 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
   if (restarted) trust_.lose_steps("MCU " + setup_.mcu + " restarted");
   if (!first && !restarted) follow_count(before);
   // Nobody here has seen whether it moved when it was stopped.
-  const bool immediate = stops_immediately(report);
-  const bool unpowered = (report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
-  if ((immediate || unpowered) && (first || position_ != before)) {
-    trust_.lose_steps(immediate ? stopped_immediately(report, setup_.mcu) : kUnpowered);
-  }
+  if (first || position_ != before) doubt_if_cut(report);
   take_limits(report);
   follow_autonomous(report, false);
 }
@@ -215,10 +220,7 @@ void Motor::follow_asked_for() {
 void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output().value));
   // The MCU may still say so in the tick in which it was cut.
-  if (before) {
-    if (stops_immediately(report)) trust_.lose_steps(stopped_immediately(report, setup_.mcu));
-    if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0) trust_.lose_steps(kUnpowered);
-  }
+  if (before) doubt_if_cut(report);
   const bool free = is<Resting>() || is<Local>();
   // The bit alone may be that of a plan of this daemon's that has just ended.
   moved_by_other_ =

@@ -35,7 +35,7 @@ struct MotorSetup {
   bool has_home = false;
   bool local = false;             // people may move it by the inputs at its MCU
   bool restored_refused = false;  // it may not move while its position is only restored
-  // Without a ramp, so that it may overrun.
+  // Without a ramp, so that it may overrun; with drivers disabled or not.
   bool limit_immediate = false;
   bool emergency_stop_immediate = false;
   bool emergency_input_immediate = false;
@@ -276,6 +276,7 @@ class Motor {
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   void follow_end_of_line(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
+  void doubt_if_cut(const bushd_report& report);
   void take_limits(const bushd_report& report);
   void follow(const Report& report, std::vector<Event>& events);
   bool follow_armed(const Report& report, std::vector<Event>& events);

@@ -59,7 +59,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   }
   if ((report.faults & BUSHD_FAULT_OVERCURRENT) != 0 && !is<Armed>()) {
     const std::string why = mcu + " disabled its drivers because " + stop_cause(report);
-    if (stepped) trust_.lose_steps(kUnpowered);
+    if (stepped) trust_.lose_steps(unpowered(report, setup_.mcu));
     return ended(Outcome::kFault,
                  stepped
                      ? why + "; check the position, and run " + words::set_remedy(name())
@@ -68,13 +68,14 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   }
   if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
     const std::string by = stopper(report, setup_.mcu);
-    const bool overran = stops_immediately(report) && stepped;
-    if (overran) trust_.lose_steps(stopped_immediately(report, setup_.mcu));
-    return ended(Outcome::kStopped,
-                 overran ? "stopped immediately by " + by +
-                               "; it may have overrun, so check the position, and run " +
-                               words::set_remedy(name())
-                         : "stopped by " + by);
+    const bool disabled = has_disabled_drivers(report);
+    const bool overran = (disabled || stops_immediately(report)) && stepped;
+    if (!overran) return ended(Outcome::kStopped, "stopped by " + by);
+    doubt_if_cut(report);
+    return ended(Outcome::kStopped, "stopped immediately by " + by +
+                                        (disabled ? ", which disabled its drivers" : "") +
+                                        "; it may have overrun, so check the position, and run " +
+                                        words::set_remedy(name()));
   }
   if (is<Armed>()) {
     return ended(Outcome::kLink, mcu + " disarmed it by itself because " + stop_cause(report));

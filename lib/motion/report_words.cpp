@@ -25,6 +25,10 @@ std::string failed_tests(std::uint8_t tests) {
   return list.empty() ? list : " (" + list + ")";
 }
 
+std::string then_enable(bool disabled) {
+  return disabled ? ", then 'bushctl enable'" : "";
+}
+
 }  // namespace
 
 std::string fault_text(const bushd_report& report) {
@@ -37,12 +41,20 @@ std::string fault_text(const bushd_report& report) {
     return "overcurrent, its drivers are disabled (reading now: " + std::to_string(report.current) +
            "); find the cause, run 'bushctl clear', then 'bushctl enable'";
   }
+  const bool disabled = (faults & BUSHD_FAULT_DISABLED) != 0;
   if (faults & BUSHD_FAULT_EMERGENCY_INPUT) {
-    return (report.system_inputs & BUSHD_INPUT_EMERGENCY) != 0
-               ? "emergency input; release it, then run 'bushctl clear'"
-               : "emergency input, released by now; run 'bushctl clear'";
+    const bool active = (report.system_inputs & BUSHD_INPUT_EMERGENCY) != 0;
+    return std::string("emergency input") + (active ? "" : ", released by now") +
+           (disabled ? ", its drivers are disabled" : "") + "; " +
+           (active ? "release it, then " : "") + "run 'bushctl clear'" + then_enable(disabled);
   }
-  if (faults & BUSHD_FAULT_EMERGENCY) return "emergency stop; run 'bushctl clear'";
+  if (faults & BUSHD_FAULT_EMERGENCY) {
+    return std::string("emergency stop") + (disabled ? ", its drivers are disabled" : "") +
+           "; run 'bushctl clear'" + then_enable(disabled);
+  }
+  if (disabled) {
+    return "its drivers are disabled since an emergency; run 'bushctl clear'" + then_enable(true);
+  }
   if (faults & BUSHD_FAULT_EEPROM) {
     return "its stored settings were unreadable, defaults are in use; if its unique id is 0 in "
            "'bushctl health', write that anew (docs/firmware.md), then run 'bushctl clear'";
@@ -102,12 +114,23 @@ bool forbids(const bushd_report& report, unsigned output, int direction) {
 }
 
 std::string stopper(const bushd_report& report, const std::string& mcu) {
-  const bool commanded = (report.faults & BUSHD_FAULT_EMERGENCY) != 0;
-  return commanded ? "an emergency stop" : "the emergency input of MCU " + mcu;
+  const bool by_input = (report.faults & BUSHD_FAULT_EMERGENCY_INPUT) != 0 &&
+                        (report.faults & BUSHD_FAULT_EMERGENCY) == 0;
+  return by_input ? "the emergency input of MCU " + mcu : "an emergency stop";
 }
 
 std::string stopped_immediately(const bushd_report& report, const std::string& mcu) {
   return "it was stopped immediately by " + stopper(report, mcu) + " and may have overrun";
+}
+
+bool has_disabled_drivers(const bushd_report& report) {
+  return (report.faults & (BUSHD_FAULT_OVERCURRENT | BUSHD_FAULT_DISABLED)) != 0;
+}
+
+std::string unpowered(const bushd_report& report, const std::string& mcu) {
+  const bool overcurrent = (report.faults & BUSHD_FAULT_OVERCURRENT) != 0;
+  return "its drivers were disabled by " + (overcurrent ? "overcurrent" : stopper(report, mcu)) +
+         " while it moved";
 }
 
 }  // namespace bushd::motion

@@ -21,7 +21,10 @@ bool forbids(const bushd_report& report, unsigned output, int direction);
 std::string stopper(const bushd_report& report, const std::string& mcu);
 // Why it is uncertain then where it stands.
 std::string stopped_immediately(const bushd_report& report, const std::string& mcu);
-inline constexpr const char* kUnpowered = "its drivers were disabled by overcurrent while it moved";
+// Whether the MCU has switched its drivers off because of a fault, and why a motor that it moved is
+// uncertain then. Precondition of the second: it has.
+bool has_disabled_drivers(const bushd_report& report);
+std::string unpowered(const bushd_report& report, const std::string& mcu);
 
 // Whether the bit of this output is set.
 constexpr bool has_bit(unsigned mask, unsigned output) {

@@ -39,9 +39,10 @@ constexpr Words<McuState, 5> kMcuStates = {{
     {McuState::kRunning, "RUN"},
     {McuState::kFault, "FAULT"},
 }};
-constexpr Words<StopMode, 2> kStopModes = {{
+constexpr Words<StopMode, 3> kStopModes = {{
     {StopMode::kRamp, "ramp"},
     {StopMode::kImmediate, "immediate"},
+    {StopMode::kDisable, "disable"},
 }};
 constexpr Words<Edge, 2> kEdges = {{
     {Edge::kRising, "rising"},

@@ -40,8 +40,9 @@ enum class Trust {
 enum class McuState { kOffline, kBusy, kReady, kRunning, kFault };
 
 enum class StopMode {
-  kRamp,      // by the decelerating side of the table
-  kImmediate  // no further step; a motor at speed may overrun
+  kRamp,       // by the decelerating side of the table
+  kImmediate,  // no further step; a motor at speed may overrun
+  kDisable     // the same, and drivers are disabled at once
 };
 
 enum class Edge {
@@ -62,7 +63,7 @@ std::string_view word(Outcome outcome);        // done reached stopped limit lin
 std::string_view word(Activity activity);      // rest move armed home local
 std::string_view word(Trust trust);            // unknown known restored stale uncertain
 std::string_view word(McuState state);         // OFFLINE BUSY READY RUN FAULT
-std::string_view word(StopMode mode);          // ramp immediate
+std::string_view word(StopMode mode);          // ramp immediate disable
 std::string_view word(Edge edge);              // rising falling
 std::string_view word(Directions directions);  // "" positive negative both
 

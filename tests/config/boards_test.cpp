@@ -78,6 +78,8 @@ TEST(ConfigBoards, WhatABoardDoesNotHaveIsRefused) {
           "unknown key; allowed here: name, kind, port, baud, start_hz, converter, answer_ms"));
   EXPECT_THAT(board_error(changed(kBoard, "output = 7", "output = 8")),
               HasSubstr("is 8; allowed: 0..7 on commutator board \"board\""));
+  EXPECT_THAT(board_error(changed(kBoard, "baud", "emergency_stop = \"disable\"\nbaud")),
+              HasSubstr("nothing on a bus of this kind can disable drivers; allowed: \"ramp\""));
   EXPECT_THAT(board_error(kBoard + "limit = \"both\"\n"), HasSubstr("limit switches of its own"));
   EXPECT_THAT(board_error(kBoard + "home = { direction = \"negative\", most_steps = 5 }\n"),
               HasSubstr("motor[0].home"));

@@ -417,10 +417,10 @@ INSTANTIATE_TEST_SUITE_P(
                10, "bus[0].frames", "allowed: \"auto\" or \"ticks\""),
         change("EmergencyStopUnknown", "format = \"fine\"\n",
                "format = \"fine\"\nemergency_stop = \"Immediate\"\n", 10, "bus[0].emergency_stop",
-               "is \"Immediate\"; allowed: \"ramp\" or \"immediate\""),
+               "is \"Immediate\"; allowed: \"ramp\", \"immediate\" or \"disable\""),
         change("EmergencyStopIsNumber", "format = \"fine\"\n",
                "format = \"fine\"\nemergency_stop = 1\n", 10, "bus[0].emergency_stop",
-               "is 1; allowed: \"ramp\" or \"immediate\"")),
+               "is 1; allowed: \"ramp\", \"immediate\" or \"disable\"")),
     kNames);
 
 INSTANTIATE_TEST_SUITE_P(

@@ -57,6 +57,16 @@ TEST(ConfigInputs, AnMcuHasItsOwn) {
   EXPECT_EQ(config->mcus[0].emergency_input, BUSHD_EMERGENCY_INPUT_IGNORED);
 }
 
+TEST(ConfigInputs, AnEmergencyMayDisableDrivers) {
+  const auto config =
+      ConfigFile(replaced(with_mcu("emergency_input = \"disable\"\n"), "format = \"fine\"\n",
+                          "format = \"fine\"\nemergency_stop = \"disable\"\n"))
+          .load();
+  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(config->mcus[1].emergency_input, BUSHD_EMERGENCY_INPUT_DISABLE);
+  EXPECT_EQ(config->buses[0].emergency_stop, BUSHD_STOP_DISABLE);
+}
+
 TEST(ConfigInputs, DriversAreDisabledAtRest) {
   const auto config =
       ConfigFile(replaced(with_mcu("idle_disable_s = 2.5\nenable_settle_ms = 300\n"),
@@ -98,10 +108,11 @@ struct BadInputKey {
 TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
   const BadInputKey bad[] = {
       {with_mcu("emergency_input = \"stop\"\n"), 22,
-       "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\" or \"immediate\""},
+       "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\", \"immediate\" or "
+       "\"disable\""},
       {with_mcu("emergency_active = \"open\"\n"), 22,
        "mcu[1].emergency_active: says nothing while the input is ignored; allowed: beside "
-       "emergency_input = \"ramp\" or \"immediate\""},
+       "emergency_input = \"ramp\", \"immediate\" or \"disable\""},
       {with_mcu("emergency_input = \"ignore\"\nemergency_active = \"open\"\n"), 23,
        "mcu[1].emergency_active: says nothing while the input is ignored"},
       {with_mcu("emergency_active = 1\n"), 22,

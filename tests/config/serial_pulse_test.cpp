@@ -84,6 +84,9 @@ TEST(SerialPulse, DirectionLineMayBeOffInThePositiveDirection) {
     EXPECT_EQ(config->buses[0].serial_pulse.positive_off, off);
   }
   EXPECT_THAT(
+      refusal("direction_line = \"rts\"", "direction_line = \"rts\"\nemergency_stop = \"disable\""),
+      HasSubstr("nothing on a bus of this kind can disable drivers"));
+  EXPECT_THAT(
       refusal("direction_line = \"rts\"", "direction_line = { line = \"dtr\", active = \"low\" }"),
       HasSubstr("direction_line.active: is \"low\"; allowed: \"on\" or \"off\""));
   EXPECT_THAT(refusal("group = \"slits\"\n", "group = \"slits\"\ndirection_active = \"low\"\n"),

@@ -148,5 +148,70 @@ TEST_P(Emergency, AnMcuThatIsLostEndsItsMovesWithLink) {
   EXPECT_THAT(lab.wait(stop).reason, HasSubstr("hall:"));
 }
 
+std::string disabling_hall(const std::string& keys_of_mcu = "") {
+  std::string toml = hall(1, 2);
+  const std::string mcu = "address = 1\n";
+  toml.insert(toml.find(mcu) + mcu.size(), keys_of_mcu);
+  return toml.insert(toml.find("[[group]]"), "emergency_stop = \"disable\"\n");
+}
+
+void expect_disabled_until_cleared_and_enabled(Lab& lab) {
+  EXPECT_FALSE(lab.motor("m02").enabled);
+  const Answer still = lab.wait(lab.send(Ask::kEnable, {}));
+  EXPECT_EQ(still.result, "fault");
+  EXPECT_THAT(still.reason, HasSubstr("emergency stop, its drivers are disabled"));
+  EXPECT_THAT(still.reason, HasSubstr("run 'bushctl clear', then 'bushctl enable'"));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  lab.run_for(0.1);
+  EXPECT_FALSE(lab.motor("m02").enabled);
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m02"}, {5})).reason, HasSubstr("enable"));
+  lab.run_for(1);
+  EXPECT_EQ(lab.shaft_steps("m02"), 0);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
+  // A daemon that has just begun does not know whether it moved.
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m02"}, {0})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached");
+}
+
+TEST(EmergencyThatDisables, TakesThePowerAndSaysSo) {
+  for (const bool restarts : {false, true}) {
+    SCOPED_TRACE(restarts);
+    Lab lab(disabling_hall());
+    lab.connect();
+    const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
+    lab.run_for(1.5);
+    EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+    const Answer result = lab.wait(move);
+    EXPECT_EQ(result.result, "stopped");
+    EXPECT_THAT(result.reason, HasSubstr("by an emergency stop, which disabled its drivers"));
+    EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0));
+    EXPECT_EQ(lab.motor("m01").uncertain_reason,
+              "its drivers were disabled by an emergency stop while it moved");
+    EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown) << "it did not move";
+    lab.unplug(0);
+    lab.run_for(1);
+    lab.plug(0);
+    lab.run_for(3);
+    if (restarts) lab.restart_daemon();
+    ASSERT_TRUE(lab.run_until([&] {
+      return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
+    }));
+    EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+    EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("its drivers are disabled"));
+    expect_disabled_until_cleared_and_enabled(lab);
+  }
+}
+
+// Drivers that are disabled at rest are enabled before the next move: not any more.
+TEST(EmergencyThatDisables, EndsTheSleepOfDriversAtRest) {
+  Lab lab(disabling_hall("idle_disable_s = 0\n"));
+  lab.connect();
+  ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m02").enabled; }));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  lab.run_for(0.1);
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
+  expect_disabled_until_cleared_and_enabled(lab);
+}
+
 }  // namespace
 }  // namespace bushd::test

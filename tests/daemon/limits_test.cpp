@@ -165,6 +165,37 @@ TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndRelease
   }
 }
 
+TEST_P(Limits, AnEmergencyInputThatDisablesTakesThePowerAndSaysSo) {
+  Lab lab(lab_with(GetParam(), "emergency_input = \"disable\"\n", ""));
+  lab.connect();
+  const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
+  lab.run_for(1);
+  press(lab, 0, BUSHD_INPUT_EMERGENCY);
+  press(lab, 0);
+  const Answer result = lab.wait(move);
+  EXPECT_EQ(result.result, "stopped");
+  EXPECT_THAT(result.reason,
+              HasSubstr("by the emergency input of MCU hall:1, which disabled its drivers"));
+  lab.run_for(0.1);
+  EXPECT_EQ(lab.motor("m01").uncertain_reason,
+            "its drivers were disabled by the emergency input of MCU hall:1 while it moved");
+  EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown) << "it did not move";
+  EXPECT_FALSE(lab.motor("m01").enabled);
+  EXPECT_EQ(lab.state_of("hall:1").detail,
+            "emergency input, released by now, its drivers are disabled; run 'bushctl clear', then "
+            "'bushctl enable'");
+  lab.restart_daemon();
+  ASSERT_TRUE(lab.run_until([&] {
+    return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
+  })) << "not for a daemon to clear";
+  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  lab.run_for(0.1);
+  EXPECT_FALSE(lab.motor("m01").enabled);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m02"}, {0})).result, "done");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {10})).result, "reached");
+}
+
 TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
   Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
   lab.connect();

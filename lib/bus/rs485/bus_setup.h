@@ -33,7 +33,9 @@ enum class SetupKey {
   kVelocity,
   kKeypad,
   kMotorInputs,
-  kInput
+  kInput,
+  kEmergencyStop,
+  kEmergencyInput
 };
 
 struct McuSetup {
@@ -45,6 +47,7 @@ struct McuSetup {
   bushd_set_outputs outputs{.step_low = 0, .direction_low = 0, .enabled = BUSHD_ENABLED_HIGH};
   Error outputs_at{};  // where one of them is said to be active low; without a message
   bushd_set_inputs inputs{};
+  bool disabled_by_stop = false;  // by an emergency stop of its bus: BUSHD_STOP_DISABLE
   // Inputs of motors whose switches are not all at the input with the number of their output.
   std::vector<bushd_motor_inputs> motor_inputs{};
   // Currents of all motors that are driven by phases: those without current control have zeros.

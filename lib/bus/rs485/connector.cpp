@@ -18,7 +18,8 @@ constexpr std::int64_t kCommTimeoutUs = 1'000'000;
 constexpr unsigned kIdentifyWindows = 8;
 constexpr std::int64_t kReplyUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 // While one of these is latched the MCU refuses to raise EN.
-constexpr unsigned kFaultsWithoutEnable = BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT;
+constexpr unsigned kFaultsWithoutEnable =
+    BUSHD_FAULT_SELF_TEST | BUSHD_FAULT_OVERCURRENT | BUSHD_FAULT_DISABLED;
 constexpr std::int64_t kRetryUs = 500'000;           // between two IDENTIFYs to an MCU
 constexpr std::int64_t kRefusedRetryUs = 2'000'000;  // that does not fit: no hurry
 

@@ -33,8 +33,13 @@ bool EmergencyStop::send_due(std::int64_t now_us) {
   if (now_us < stop_->due_us) return false;
   if (!stop_->until_us) stop_->until_us = now_us + kLongestUs;
   stop_->due_us = now_us + kRepeatUs;
-  const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(stop_->mode)};
   for (int i = 0; i < kFrames; ++i) {
+    // An MCU that is not among those configured may have a firmware that refuses the mode, and does
+    // not say so. The others have obeyed by then, and this changes nothing for them.
+    const bool is_last = i + 1 == kFrames;
+    const bool to_all = is_last && stop_->mode == BUSHD_STOP_DISABLE;
+    const bushd_stop_mode mode = to_all ? BUSHD_STOP_IMMEDIATE : stop_->mode;
+    const std::array<std::uint8_t, 1> payload = {static_cast<std::uint8_t>(mode)};
     writer_.send(now_us, kBroadcast, BUSHD_MSG_EMERGENCY, payload);
   }
   for (McuRecord& mcu : mcus_) mcu.poll_wanted |= mcu.view.phase != McuPhase::kOffline;

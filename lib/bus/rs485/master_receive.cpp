@@ -113,7 +113,8 @@ void Rs485Master::handle_report(std::int64_t now_us, const Transactions::Answer&
   view.outdated_us = 0;
   poller_.follow_report(now_us, index);
   connector_.follow_stop(index);
-  if (report.faults & BUSHD_FAULT_OVERCURRENT) connector_.drivers_off(index);
+  constexpr unsigned kSwitchedOff = BUSHD_FAULT_OVERCURRENT | BUSHD_FAULT_DISABLED;
+  if ((report.faults & kSwitchedOff) != 0) connector_.drivers_off(index);
   synchroniser_.expect_own_time(index, connector_.may_have_own_time(index));
   const auto agreement = synchroniser_.follow_report(now_us, index, answer.line_us, answer.in_time);
   if (agreement == Synchroniser::Agreement::kOtherTime && view.phase == McuPhase::kOnline) {

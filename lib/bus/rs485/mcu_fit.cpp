@@ -129,6 +129,17 @@ Result<void> check_keypad(const McuSetup& setup, const bushd_identity& identity)
               at(setup, SetupKey::kKeypad, motor));
 }
 
+// One that does not know the mode would ignore the stop.
+Result<void> check_disabling(const McuSetup& setup, const bushd_identity& identity) {
+  const bool by_input = setup.inputs.emergency == BUSHD_EMERGENCY_INPUT_DISABLE;
+  if (!by_input && !setup.disabled_by_stop) return {};
+  if ((identity.capabilities & BUSHD_CAN_DISABLE) != 0) return {};
+  return fail(std::string("does not disable its drivers in an emergency, but ") +
+              (by_input ? "its emergency_input" : "emergency_stop of its bus") +
+              " is \"disable\": update its firmware, or use \"immediate\"" +
+              at(setup, by_input ? SetupKey::kEmergencyInput : SetupKey::kEmergencyStop));
+}
+
 // An MCU has as many inputs as motors.
 Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity) {
   for (unsigned n = identity.motors; n < BUSHD_MOTORS_PER_MCU; ++n) {
@@ -186,6 +197,7 @@ Result<void> check_fit(const BusSetup& bus, const McuSetup& setup, const bushd_i
     }
   }
   if (auto inputs = check_inputs(setup, identity); !inputs) return inputs;
+  if (auto disabling = check_disabling(setup, identity); !disabling) return disabling;
   if (auto room = check_room(setup, identity, bus.tick_ns); !room) return room;
   const std::int64_t queue_us =
       static_cast<std::int64_t>(identity.queue_ticks) * bus.tick_ns / 1000;

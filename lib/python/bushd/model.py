@@ -221,7 +221,7 @@ class Mcu:
     boot_number: int  # 0 until the MCU was heard
     tick: int
     tick_ns: int
-    emergency_stop: str  # how its motors stop then: "ramp" or "immediate"
+    emergency_stop: str  # how its motors stop then: "ramp", "immediate" or "disable"
     port: str  # of its bus, that is open; "": none
 
 

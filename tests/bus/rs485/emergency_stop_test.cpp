@@ -29,6 +29,17 @@ TEST_F(Emergency, ThreeFramesToAllAndPollsToSee) {
   EXPECT_FALSE(stop.send_due(stop.due_us() - 1));
 }
 
+// One of older firmware, which may be on the line without being configured, refuses the mode.
+TEST_F(Emergency, TheLastFrameOfOneThatDisablesIsForMcusThatDoNotKnowIt) {
+  stop.begin(BUSHD_STOP_DISABLE);
+  ASSERT_TRUE(stop.send_due(1'000));
+  const auto sent = take_sent(writer);
+  ASSERT_EQ(sent.size(), 3u);
+  EXPECT_EQ(sent[0].payload, Bytes{BUSHD_STOP_DISABLE});
+  EXPECT_EQ(sent[1].payload, Bytes{BUSHD_STOP_DISABLE});
+  EXPECT_EQ(sent[2].payload, Bytes{BUSHD_STOP_IMMEDIATE});
+}
+
 TEST_F(Emergency, RepeatedUntilTheLastMcuHasLatchedIt) {
   stop.begin(BUSHD_STOP_RAMP);
   ASSERT_TRUE(stop.send_due(1'000));

@@ -71,6 +71,27 @@ TEST(Connect, AnMcuWithoutTheInputsIsNamed) {
   }
 }
 
+TEST(Connect, AnMcuThatDisablesNoDriversIsNamedWhereAnEmergencyIsTo) {
+  for (const bool by_stop : {false, true}) {
+    for (const bool can : {false, true}) {
+      FakeBus bus(1, 2);
+      link::McuSetup setup = bus.setup.mcus[0];
+      setup.disabled_by_stop = by_stop;
+      if (!by_stop) setup.inputs.emergency = BUSHD_EMERGENCY_INPUT_DISABLE;
+      if (can) bus.slaves[0].identity.capabilities |= BUSHD_CAN_DISABLE;
+      bus.master->reconfigure(McuIndex{0}, setup);
+      bus.run_for(3'000'000);
+      EXPECT_EQ(bus.master->view(McuIndex{0}).phase == McuPhase::kOffline, !can);
+      EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONFIGURE).empty(), !can);
+      if (can) continue;
+      EXPECT_EQ(bus.master->view(McuIndex{0}).detail,
+                std::string("does not disable its drivers in an emergency, but ") +
+                    (by_stop ? "emergency_stop of its bus" : "its emergency_input") +
+                    " is \"disable\": update its firmware, or use \"immediate\"");
+    }
+  }
+}
+
 TEST(Connect, AnMcuWithoutAChopperIsNamedWhereCurrentsAreSet) {
   FakeBus bus(1, 2);
   link::McuSetup setup = bus.setup.mcus[0];
