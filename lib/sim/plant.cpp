@@ -89,7 +89,11 @@ void Plant::edge(const Edge& edge) {
     return;
   }
   if (!edge.level) return;  // a driver steps when STEP rises
-  if (!enabled_[edge.mcu]) {
+  // An emergency may switch the driver off in the middle of a tick, and what is prepared is
+  // emitted.
+  const bool prepared =
+      motor->halt && motor->halt->immediate && edge.time_ns <= motor->halt->from_ns;
+  if (!enabled_[edge.mcu] && !prepared) {
     violated(edge.time_ns, edge.mcu, edge.index, "a step while its driver is off");
     return;
   }
@@ -122,7 +126,13 @@ void Plant::settled(TimeNs until_ns) {
 
 void Plant::rest_on_line(TimeNs now_ns, std::size_t mcu, std::size_t output, bool rests) {
   Motor& motor = *motor_of_[mcu].at(output);
-  report(now_ns, mcu, output, motor, motor.pace.rest_on_line(now_ns, rests));
+  const Jump jump = motor.pace.rest_on_line(now_ns, rests);
+  // Told before the two ticks of an immediate stop are over, in which it makes no step.
+  if (jump == Jump::kStoppedDead && motor.halt && motor.halt->immediate) {
+    if (on_cut_off) on_cut_off(now_ns, mcu, output);
+    return;
+  }
+  report(now_ns, mcu, output, motor, jump);
 }
 
 void Plant::cut(std::size_t mcu) {

@@ -55,7 +55,8 @@ class Plant final : public EdgeSink {
   void cut(std::size_t mcu);
 
   // An emergency stop has reached the MCU. From two ticks later on its motors make no step
-  // (`immediate`), or ramp down; none starts until release().
+  // (`immediate`), or ramp down; none starts until release(). Drivers may be off from the start of
+  // an immediate one on: the steps of these two ticks turn nothing, and are counted.
   void halt(std::size_t mcu, TimeNs now_ns, bool immediate);
   void release(std::size_t mcu);
 

@@ -86,7 +86,7 @@ std::string Inputs::press_emergency(TimeNs now_ns, bushd::sim::Random& random) {
   // EMERGENCY. One that a host has not told yet what this input is for does not look at all.
   const bushd::sim::VirtualMcu& of = bus_.mcu(mcu);
   if (of.running() && of.core().inputs.emergency != BUSHD_EMERGENCY_INPUT_IGNORED) {
-    plant_.halt(mcu, now_ns, of.core().inputs.emergency == BUSHD_EMERGENCY_INPUT_IMMEDIATE);
+    plant_.halt(mcu, now_ns, of.core().inputs.emergency != BUSHD_EMERGENCY_INPUT_RAMP);
   }
   return fmt::format("of {} for {} ms", config_.mcus[mcu].id, length_ns / kMs);
 }

@@ -21,10 +21,12 @@ constexpr std::array<const char*, 4> kTables = {"bushd2-constant", "bushd2-scurv
 constexpr std::array<std::uint32_t, 7> kBauds = {57'600,    115'200,   230'400,  500'000,
                                                  1'000'000, 2'000'000, 4'000'000};
 constexpr std::uint32_t kUsualBaud = 500'000;
+constexpr std::array<const char*, 3> kEmergencyStops = {"ramp", "immediate", "disable"};
 constexpr std::uint32_t kInstallationStream = 400;  // of randomness
 constexpr std::uint32_t kHomeStream = 401;
 constexpr std::uint32_t kEmergencyStream = 402;
 constexpr std::uint32_t kInputStream = 413;
+constexpr std::uint32_t kDisablingStream = 415;
 constexpr std::uint32_t kHomeSpeedStream = 407;
 constexpr std::uint32_t kRequiredStream = 410;
 constexpr std::uint32_t kLineStream = 414;
@@ -41,11 +43,14 @@ bushd::config::Bus make_bus(const Ways& ways, std::uint64_t seed) {
   const bool table_ticks = random.one_in(2);
   const bool coarse = random.one_in(2);
   const bool immediate = random.one_in(2);
+  // Behind the others, which keep what they were in a seed.
+  const bool disables = random.one_in(2) && immediate;
   bus.table_runs = ways.table_runs.value_or(table_runs);
   bus.table_ticks = ways.table_ticks.value_or(table_ticks);
   bus.format = ways.format.value_or(coarse ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE);
-  bus.emergency_stop =
-      ways.emergency_stop.value_or(immediate ? BUSHD_STOP_IMMEDIATE : BUSHD_STOP_RAMP);
+  bus.emergency_stop = ways.emergency_stop.value_or(disables    ? BUSHD_STOP_DISABLE
+                                                    : immediate ? BUSHD_STOP_IMMEDIATE
+                                                                : BUSHD_STOP_RAMP);
   return bus;
 }
 
@@ -208,9 +213,11 @@ std::vector<bushd::sim::SwitchOptions> limit_switches(const bushd::config::Confi
 
 void add_emergency_inputs(bushd::config::Config& config, std::uint64_t seed) {
   bushd::sim::Random random(seed, kEmergencyStream);
+  bushd::sim::Random disables(seed, kDisablingStream);
   for (bushd::config::Mcu& mcu : config.mcus) {
-    mcu.emergency_input =
-        random.one_in(2) ? BUSHD_EMERGENCY_INPUT_IMMEDIATE : BUSHD_EMERGENCY_INPUT_RAMP;
+    mcu.emergency_input = !random.one_in(2)    ? BUSHD_EMERGENCY_INPUT_RAMP
+                          : disables.one_in(2) ? BUSHD_EMERGENCY_INPUT_DISABLE
+                                               : BUSHD_EMERGENCY_INPUT_IMMEDIATE;
   }
 }
 
@@ -233,8 +240,7 @@ std::string ways_text(const bushd::config::Config& config) {
   return fmt::format("--moves {} --frames {} --format {} --emergency {} --required {}{}",
                      bus.table_runs ? "table" : "stream", bus.table_ticks ? "auto" : "ticks",
                      bus.format == BUSHD_FORMAT_FINE ? "fine" : "coarse",
-                     bus.emergency_stop == BUSHD_STOP_IMMEDIATE ? "immediate" : "ramp",
-                     config.state.required ? "yes" : "no",
+                     kEmergencyStops.at(bus.emergency_stop), config.state.required ? "yes" : "no",
                      bus.tick_us == kSlowTickUs ? " --line slow" : "");
 }
 

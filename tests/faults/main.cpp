@@ -98,7 +98,9 @@ int run(int argc, char** argv) {
   add_way<bushd_format>(app, "--format", ways.format,
                         {{"coarse", BUSHD_FORMAT_COARSE}, {"fine", BUSHD_FORMAT_FINE}});
   add_way<bushd_stop_mode>(app, "--emergency", ways.emergency_stop,
-                           {{"ramp", BUSHD_STOP_RAMP}, {"immediate", BUSHD_STOP_IMMEDIATE}});
+                           {{"ramp", BUSHD_STOP_RAMP},
+                            {"immediate", BUSHD_STOP_IMMEDIATE},
+                            {"disable", BUSHD_STOP_DISABLE}});
   add_way<bool>(app, "--required", ways.state_required, {{"no", false}, {"yes", true}});
   app.add_option_function<std::string>(
          "--line", [&ways](const std::string& line) { ways.slow_line = line == "slow"; },

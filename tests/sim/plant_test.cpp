@@ -87,6 +87,32 @@ TEST_F(PlantTest, CutStopsDeadAndMakesNoStepMore) {
   EXPECT_EQ(violations.size(), 1u);
 }
 
+TEST_F(PlantTest, DriversMayBeOffInTheTicksThatWerePreparedForAnImmediateStop) {
+  for (const bool halted : {true, false}) {
+    accelerate();
+    if (halted) plant.halt(0, now_ns, true);
+    plant.edge({now_ns, 0, Signal::kEnable, 0, false});
+    step_after(codes.back() * TimeNs{40'000});
+    EXPECT_EQ(violations.empty(), halted);
+    EXPECT_EQ(plant.steps_made(), 7u + (halted ? 0 : 6));
+    rest();
+    plant.release(0);
+    plant.edge({now_ns, 0, Signal::kEnable, 0, true});
+  }
+}
+
+TEST_F(PlantTest, ALineThatAnImmediateStopEndsMayRestBeforeItsTwoTicks) {
+  for (const bool halted : {true, false}) {
+    plant.begin_on_line(now_ns, 0, 0);
+    accelerate();
+    if (halted) plant.halt(0, now_ns, true);
+    plant.rest_on_line(now_ns + kTickNs, 0, 0, true);
+    EXPECT_EQ(violations.empty(), halted);
+    plant.release(0);
+    rest();
+  }
+}
+
 TEST_F(PlantTest, ReleasedMotorsMoveAgain) {
   accelerate();
   plant.halt(0, now_ns, true);
