@@ -66,7 +66,9 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
                      : "it did not move: " + why + "; find the cause, run 'bushctl clear', then " +
                            words::remedy("enable", name()));
   }
-  if ((report.faults & (BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT)) != 0) {
+  constexpr unsigned kEmergencies =
+      BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_DISABLED;
+  if ((report.faults & kEmergencies) != 0) {
     const std::string by = stopper(report, setup_.mcu);
     const bool disabled = has_disabled_drivers(report);
     const bool overran = (disabled || stops_immediately(report)) && stepped;

@@ -69,6 +69,7 @@ std::string stop_cause(const bushd_report& report) {
   if (faults & BUSHD_FAULT_OVERCURRENT) return "its supply current was too high";
   if (faults & BUSHD_FAULT_EMERGENCY) return "an emergency stop was commanded";
   if (faults & BUSHD_FAULT_EMERGENCY_INPUT) return "its emergency input was active";
+  if (faults & BUSHD_FAULT_DISABLED) return "an emergency disabled its drivers";
   if (faults & BUSHD_FAULT_SELF_TEST) return "its self-test failed";
   if (faults & BUSHD_FAULT_SYNC) return "it fell out of step with the bus";
   return "nothing more reached it in time";
