@@ -122,7 +122,7 @@ TEST_P(ProgramScript, AnInputEndsAMoveAsAtItsTwin) {
   bytes.push_back(0);
   append(bytes, 0u - 5000u, 4);
   append(bytes, 5000, 4);
-  for (const std::uint8_t after : {0, 60}) {
+  for (const std::uint8_t after : {std::uint8_t{0}, std::uint8_t{60}}) {
     bytes.push_back(BUSHD_PROGRAM_MOVE_UNTIL);
     append(bytes, 1u << kFirst, 2);
     for (const std::uint8_t byte :

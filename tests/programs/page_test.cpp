@@ -88,7 +88,7 @@ std::pair<std::string, std::string> range_of(const std::string& allowed) {
 
 TEST(ProgramsPage, ItsExamplesArePrograms) {
   const auto examples = blocks("toml");
-  ASSERT_EQ(examples.size(), 5u);
+  ASSERT_EQ(examples.size(), 6u);
   for (const std::string& example : examples) EXPECT_EQ(why_not(example), "");
 }
 

@@ -40,7 +40,7 @@ void inputs_switch_off_at(bushd_edge edge) {
   if (edge == BUSHD_EDGE_NONE) return;
   // Closed to ground is active.
   const bool rising = edge == BUSHD_EDGE_RISING;
-  EICRA |= rising ? EMERGENCY_FALLING : EMERGENCY_EDGES;
+  EICRA = (uint8_t)(EICRA | (rising ? EMERGENCY_FALLING : EMERGENCY_EDGES));
   EIFR = 1 << EMERGENCY_FLAG;
   EIMSK |= 1 << EMERGENCY_INT;
   // It may have come before. What falls from here on is for the interrupt.

@@ -13,7 +13,7 @@ void trigger_await(bushd_edge edge) {
   awaited = edge != BUSHD_EDGE_NONE;
   if (!awaited) return;
   // Closed to ground is active.
-  EICRA = BOARD_EDGES | (edge == BUSHD_EDGE_RISING ? TRIGGER_FALLING : TRIGGER_RISING);
+  EICRA = (uint8_t)(BOARD_EDGES | (edge == BUSHD_EDGE_RISING ? TRIGGER_FALLING : TRIGGER_RISING));
   EIFR = 1 << TRIGGER_FLAG;
   EIMSK |= 1 << TRIGGER_INT;
 }
