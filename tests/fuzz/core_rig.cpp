@@ -106,6 +106,7 @@ void CoreRig::pass() {
   count_pulses(*emitted);
   const bool homed = mcu_.homing.stage == BUSHD_HOMING_DONE;
   bushd_mcu_prepare(&mcu_);
+  prepared_enabled_ = enabled_;
   if (!homed && mcu_.homing.stage == BUSHD_HOMING_DONE) take_home();
   check_state();
   BUSHD_REQUIRE((mcu_.state == BUSHD_STATE_FAULT) == (mcu_.faults != 0));
@@ -271,7 +272,9 @@ void CoreRig::count_pulses(const bushd_slot_buffer& slot_buffer) {
     }
   }
   BUSHD_REQUIRE(all >> motors() == 0);
-  BUSHD_REQUIRE(all == 0 || enabled_);
+  // An emergency may disable drivers before what had been prepared is made.
+  const bool cut = prepared_enabled_ && (mcu_.faults & BUSHD_FAULT_DISABLED) != 0;
+  BUSHD_REQUIRE(all == 0 || enabled_ || cut);
   for (const std::uint32_t made : pulses) BUSHD_REQUIRE(made <= BUSHD_MAX_STEPS_PER_TICK);
 }
 

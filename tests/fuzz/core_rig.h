@@ -113,6 +113,7 @@ class CoreRig : public Programmed {
   std::optional<Pins> pins_;
   std::uint8_t address_ = kAddress;
   bool enabled_ = true;
+  bool prepared_enabled_ = true;  // when the tick that comes next was prepared
   std::uint32_t tick_ns_ = 0;
   std::uint16_t share_ = 0;
   using Counters = std::array<std::uint32_t, BUSHD_MOTORS_PER_MCU>;

@@ -162,6 +162,9 @@ SCAN = (struct.pack("<BH", 8, 2) + struct.pack("<BHBHH", 3, 3, 0, 0, 2) + struct
         + struct.pack("<BI", 7, 9000) + struct.pack("<BI", 5, 12000) + struct.pack("<BBBI", 6, 1, 1, 40000)
         + struct.pack("<BHiHiH", 1, 3, 5, 0, -5, 120) + b"\x09")
 
+# Until input 1 of a motor, with a ramp-down, and back, 9 steps after it is not active any more.
+UNTIL = (struct.pack("<BHBBIiH", 11, 1, 1, 1, 0, 200, 0) + struct.pack("<BHBBIiH", 11, 1, 1, 0, 9, -200, 120))
+
 
 def ready(fine=0, before=b""):
     return (pins(0) + configure(fine) + before + in_step() + table() + assign(0, 1, 2, 3)
@@ -235,6 +238,10 @@ SEEDS = {
                       + program_action(5) + passes(30) + program_action(3, 0, 1) + passes(9) + program_action(0) + program_action(2, 2, 200),
     "program-alone": ready(0, inputs(positive=1)) + program(SCAN, 1) + program_action(2, 1, 20) + passes(15) + sync(1, 30000, 1) + passes(15)
                      + pins(1) + passes(60) + program_action(2, 2, 140) + frame(EMERGENCY, b"\0", True) + passes(30),
+    "program-until": ready(1) + program(UNTIL) + program_action(2, 1, 20) + passes(40) + pins(2) + passes(30) + pins(0) + passes(60)
+                     + frame(PROGRAM_STATE) + poll(7),
+    "emergency-that-disables": ready(1, inputs(emergency=3)) + MOVE[1] + passes(3) + pins(0, 1) + passes(9) + pins(0)
+                               + frame(CONTROL, b"\4") + frame(CONTROL, b"\1") + MOVE[1] + passes(3) + frame(EMERGENCY, b"\2", True) + passes(9),
     "burst": ready(0, emission(1)) + MOVE[0] + passes(12),
     "common-dir": ready(0, emission(2)) + MOVE[0] + passes(12),
     "staggered": ready(0, emission(3, settle_us=60)) + MOVE[0] + passes(12),
