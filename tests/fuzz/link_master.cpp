@@ -190,7 +190,7 @@ void run_op(Op op, Bus& bus, Input& input) {
     case Op::kTableRun:
       return begin(bus, input, true);
     case Op::kEmergency:
-      return master.emergency_stop(input.u8() % 2 == 0 ? BUSHD_STOP_RAMP : BUSHD_STOP_IMMEDIATE);
+      return master.emergency_stop(static_cast<bushd_stop_mode>(input.u8() % 3));
     case Op::kHome:
       return home(bus, input);
     case Op::kArm:
