@@ -133,7 +133,8 @@ Result<void> EmergencyStop::follow(std::int64_t now_us, Stopping& stopping) cons
       stopping.done = "done; MCU " + mcu.name() + " was lost meanwhile: " + mcu.view().detail;
       return true;
     }
-    const bool latched = (mcu.report().faults & BUSHD_FAULT_EMERGENCY) != 0;
+    const bool latched =
+        link::has_obeyed(mcu.view(), installation_.bus_of(mcu).config.emergency_stop);
     // A ramp-down by a long table may take its time.
     if (!latched && now_us > stopping.deadline_us) {
       good = fail("MCU " + mcu.name() + " did not confirm it in time");

@@ -16,6 +16,14 @@ std::string assignment(SettingKey key, const std::string& value) {
   return std::string(config::name_of(key)) + " = " + value;
 }
 
+constexpr const char* kHalfSteps = "half";
+
+bool has_program(const Mcu& mcu) {
+  if (!mcu.can_have_program()) return false;
+  const link::ProgramView& its = mcu.offers.programs->program(mcu.on_bus());
+  return its.uploading || (its.known && its.state.stage >= BUSHD_PROGRAM_LOADED);
+}
+
 // The file has not been edited since. A key that was written with its default value is one that
 // was left out no more.
 bool is_as_replaced(const config::Settings& in_file, SettingKey key, const std::string& replaces) {
@@ -131,6 +139,13 @@ Result<void> MotorSettings::may_be_changed(MotorId id) const {
   return fail(motor.name() + ": its position is being set; wait for that result");
 }
 
+bool MotorSettings::begins_phases_anew(const Plan& plan, MotorId id) {
+  return std::ranges::any_of(plan.changes, [id](const Change& change) {
+    return change.motor == id && change.key == SettingKey::kPhaseSequence &&
+           change.before != change.after;
+  });
+}
+
 // An MCU is set up anew with what it keeps of a motor, while all of its motors rest.
 Result<void> MotorSettings::mcu_takes(const Plan& plan, MotorId id) const {
   const auto drive_of = [&plan](std::size_t i) { return plan.settings[i].drive; };
@@ -138,6 +153,11 @@ Result<void> MotorSettings::mcu_takes(const Plan& plan, MotorId id) const {
   for (std::size_t i = 0; i < plan.motors.size(); ++i) drives[plan.motors[i]] = drive_of(i);
   if (drives[id] == installation_.drives()[id]) return {};
   const Mcu& mcu = installation_.mcu_of(id);
+  if (begins_phases_anew(plan, id) && has_program(mcu)) {
+    return fail("MCU " + mcu.name() +
+                " has a program, whose steps would go another way; erase it first: 'bushctl "
+                "program list' shows its name");
+  }
   if (!installation_.rests(mcu)) {
     return fail("a motor of MCU " + mcu.name() + " moves; what it does by itself can be " +
                 "changed when all of them are at rest");
@@ -300,6 +320,22 @@ void MotorSettings::take_kept(MotorId id, SettingKey key, const state::Setting& 
                    ", as it was set in operation; bushd.toml says " + in_file);
 }
 
+// What a sequence with other steps means for all that is told in steps.
+std::string MotorSettings::other_steps(const Plan& plan, MotorId id) const {
+  for (const Change& change : plan.changes) {
+    const bool of_it = change.motor == id && change.key == SettingKey::kPhaseSequence;
+    const bool was_half = change.before == kHalfSteps;
+    const bool is_half = change.after == kHalfSteps;
+    if (!of_it || was_half == is_half) continue;
+    const std::string means = std::string("; a step is ") + (is_half ? "half" : "twice") +
+                              " as far now, and so soft limits, speeds and tables mean " +
+                              (is_half ? "half" : "twice") + " as much";
+    if (!installation_[id].scale().coordinates().has_unit()) return means;
+    return means + ": write steps_per_unit anew into bushd.toml, and restart bushd";
+  }
+  return {};
+}
+
 // "theta: offset = 12.5; it stands at 31.00 mm, beyond its soft limits of ..."
 std::string MotorSettings::text_of(const Plan& plan) const {
   std::string text;
@@ -312,14 +348,9 @@ std::string MotorSettings::text_of(const Plan& plan) const {
       text += separator + assignment(change.key, change.after);
       separator = ", ";
     }
-    const bool begins_anew = std::ranges::any_of(plan.changes, [id](const Change& change) {
-      return change.motor == id && change.key == SettingKey::kPhaseSequence &&
-             change.before != change.after;
-    });
-    if (begins_anew) text += "; its position is uncertain until it is set or homed";
-    if (begins_anew && motor.scale().coordinates().has_unit()) {
-      text += ", and steps_per_unit stays as bushd.toml has it";
-    }
+    if (begins_phases_anew(plan, id))
+      text += "; its position is uncertain until it is set or homed";
+    text += other_steps(plan, id);
     // Where nobody has heard of it there is nothing to be said.
     if (!installation_.mcu_of(id).online()) continue;
     const auto within = motor.reach().stands_within_soft_limits();

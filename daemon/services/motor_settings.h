@@ -68,6 +68,8 @@ class MotorSettings final : public Service {
                        const ById<MotorId, config::Settings>* from) const;
   Result<void> may_be_changed(MotorId motor) const;
   Result<void> mcu_takes(const Plan& plan, MotorId motor) const;
+  static bool begins_phases_anew(const Plan& plan, MotorId motor);
+  std::string other_steps(const Plan& plan, MotorId motor) const;
   void change(const api::Asker& asker, const api::Configure& request);
   void carry_out(const Plan& plan, const api::Asker& asker);
   void saved(const api::Asker& asker, const api::Configure& request);

@@ -278,9 +278,19 @@ static void shorten_run(bushd_mcu* mcu, uint8_t m) {
   motor->made.until = motor->known_until = mcu->tick + 1u + ticks;
 }
 
+// A run that has only been made is not yet one that could be shortened: the next tick looks again.
+static bool waits_to_begin(const bushd_mcu* mcu) {
+  const bushd_mcu_program* p = mcu->config.program;
+  for (uint8_t m = 0; m < mcu->config.motors; ++m) {
+    const bool waits = mcu->motor[m].mode == BUSHD_MCU_RUN_WAITS;
+    if ((p->moving & motor_bit(m)) != 0 && waits) return true;
+  }
+  return false;
+}
+
 static void look_at_input(bushd_mcu* mcu) {
   bushd_mcu_program* p = mcu->config.program;
-  if (p->met || !shows_level(mcu)) return;
+  if (p->met || waits_to_begin(mcu) || !shows_level(mcu)) return;
   p->met = true;
   for (uint8_t m = 0; m < mcu->config.motors; ++m) {
     if ((p->moving & motor_bit(m)) != 0 && mcu->motor[m].mode == BUSHD_MCU_TABLE_RUN) {

@@ -162,7 +162,7 @@ bool Motor::stops_immediately(const bushd_report& report) const {
 }
 
 // What has taken the power away says more than that the motor was stopped.
-void Motor::doubt_if_cut(const bushd_report& report) {
+void Motor::uncertain_if_stopped_immediately(const bushd_report& report) {
   if (has_disabled_drivers(report)) {
     trust_.lose_steps(unpowered(report, setup_.mcu));
   } else if (stops_immediately(report)) {
@@ -182,7 +182,7 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
   if (restarted) trust_.lose_steps("MCU " + setup_.mcu + " restarted");
   if (!first && !restarted) follow_count(before);
   // Nobody here has seen whether it moved when it was stopped.
-  if (first || position_ != before) doubt_if_cut(report);
+  if (first || position_ != before) uncertain_if_stopped_immediately(report);
   take_limits(report);
   follow_autonomous(report, false);
 }
@@ -220,7 +220,7 @@ void Motor::follow_asked_for() {
 void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
   const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output().value));
   // The MCU may still say so in the tick in which it was cut.
-  if (before) doubt_if_cut(report);
+  if (before) uncertain_if_stopped_immediately(report);
   const bool free = is<Resting>() || is<Local>();
   // The bit alone may be that of a plan of this daemon's that has just ended.
   moved_by_other_ =

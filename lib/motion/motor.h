@@ -276,7 +276,7 @@ class Motor {
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   void follow_end_of_line(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
-  void doubt_if_cut(const bushd_report& report);
+  void uncertain_if_stopped_immediately(const bushd_report& report);
   void take_limits(const bushd_report& report);
   void follow(const Report& report, std::vector<Event>& events);
   bool follow_armed(const Report& report, std::vector<Event>& events);

@@ -73,7 +73,7 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
     const bool disabled = has_disabled_drivers(report);
     const bool overran = (disabled || stops_immediately(report)) && stepped;
     if (!overran) return ended(Outcome::kStopped, "stopped by " + by);
-    doubt_if_cut(report);
+    uncertain_if_stopped_immediately(report);
     return ended(Outcome::kStopped, "stopped immediately by " + by +
                                         (disabled ? ", which disabled its drivers" : "") +
                                         "; it may have overrun, so check the position, and run " +

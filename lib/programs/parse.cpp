@@ -90,7 +90,9 @@ class FrameReader {
   Result<std::optional<Move::Until>> until(const Move& move) const {
     if (!toml_.has("until_input")) {
       for (const char* const key : {"active", "after"}) {
-        if (toml_.has(key)) return fail(toml_.error(key, "is beside until_input; add that"));
+        if (toml_.has(key))
+          return fail(
+              toml_.error(key, "is for a move with until_input; add until_input, or remove it"));
       }
       return std::optional<Move::Until>();
     }

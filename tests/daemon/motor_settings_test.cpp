@@ -499,6 +499,17 @@ const bushd_emission& emission_of(SettingsLab& lab) {
   return lab.bus(0).mcu(0).core().emission.settings;
 }
 
+TEST(MotorSettings, ASequenceOfPhasesWaitsUntilItsMcuHasNoProgram) {
+  SettingsLab lab(phases());
+  const api::PutProgram put{
+      .program = "back",
+      .text = "motors = [\"m01\"]\nunit = \"steps\"\n[[frame]]\nmove_by = [-5]\n"};
+  ASSERT_EQ(lab.wait(lab.send(put)).result, "done");
+  lab.expect_refused(lab.change("m01", "phase_sequence", "half"), "has a program");
+  ASSERT_EQ(lab.wait(lab.send(api::EraseProgram{"back"})).result, "done");
+  lab.expect_done("m01", "phase_sequence", "half");
+}
+
 TEST(MotorSettings, ASequenceOfPhasesIsThatOfTheMcuAndOfAllItsMotors) {
   SettingsLab lab(phases());
   EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_FULL);
@@ -506,10 +517,13 @@ TEST(MotorSettings, ASequenceOfPhasesIsThatOfTheMcuAndOfAllItsMotors) {
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   const Answer answer = lab.change("m02", "phase_sequence", "half");
   EXPECT_EQ(answer.result, "done") << answer.reason;
-  EXPECT_EQ(answer.reason,
-            "m02: phase_sequence = half; its position is uncertain until it is set or homed; "
-            "m01: phase_sequence = half; its position is uncertain until it is set or homed, and "
-            "steps_per_unit stays as bushd.toml has it");
+  EXPECT_EQ(
+      answer.reason,
+      "m02: phase_sequence = half; its position is uncertain until it is set or homed; a step "
+      "is half as far now, and so soft limits, speeds and tables mean half as much; m01: "
+      "phase_sequence = half; its position is uncertain until it is set or homed; a step is "
+      "half as far now, and so soft limits, speeds and tables mean half as much: write "
+      "steps_per_unit anew into bushd.toml, and restart bushd");
   EXPECT_EQ(emission_of(lab).sequence, BUSHD_PHASES_HALF);
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   lab.run_for(0.2);

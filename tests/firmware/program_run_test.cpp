@@ -241,6 +241,24 @@ TEST_P(ProgramRun, AnInputEndsAMoveSoManyStepsAfterIt) {
   EXPECT_GT(ended, 80);
 }
 
+// Pins may change while the run is made: after the look at all inputs and that of the frame which
+// begins.
+TEST_P(ProgramRun, AnInputThatComesWhileItsMoveIsMadeEndsIt) {
+  ASSERT_EQ(load({.frames = {move_until(kLongestMove, 0), kProgramEnd}}), BUSHD_OK);
+  const std::uint32_t first = rig.first_open();
+  ASSERT_EQ(start(first), BUSHD_OK);
+  int looks = 0;
+  rig.sense = [&] {
+    const bool is_made = rig.tick() == first - 1;
+    looks += is_made ? 1 : 0;
+    const bool active = is_made ? looks > 2 : rig.tick() == first;
+    return bushd_inputs{static_cast<std::uint16_t>(active ? 4 : 0), 0};
+  };
+  expect_ended(BUSHD_PROGRAM_DONE);
+  EXPECT_GE(looks, 2);
+  EXPECT_LT(rig.pulses(0), 20);
+}
+
 TEST_P(ProgramRun, AnInputThatIsThereLetsNoMoveBegin) {
   rig.pins({4, 0});
   begin({.frames = {move_until(50, 9), move_by(0, 3), kProgramEnd}});
@@ -254,7 +272,7 @@ TEST_P(ProgramRun, AMoveThatNoInputEndsEndsTheProgram) {
   EXPECT_EQ(rig.pulses(0), -50);
 }
 
-TEST_P(ProgramRun, APauseOfAMoveUntilAnInputEndsIt) {
+TEST_P(ProgramRun, AMoveUntilAnInputIsNotPaused) {
   begin({.frames = {move_until(500, 0), move_by(0, 3), kProgramEnd}});
   pass(20);
   EXPECT_EQ(control(BUSHD_PROGRAM_PAUSE), BUSHD_E_STATE);

@@ -400,7 +400,7 @@ void Connector::follow_report(std::int64_t now_us, McuIndex mcu, bool in_step) {
   Link& link = links_[mcu];
   const bushd_report& report = view.report;
   note_power(mcu);
-  if (view.bound_by_stop && (report.faults & BUSHD_FAULT_EMERGENCY) == 0) {
+  if (view.bound_by_stop && !has_obeyed(view, link.stop_mode)) {
     // Nobody answers that frame: it is said until a report shows it.
     link.stop_now = mcus_[mcu].poll_wanted = true;
     return;

@@ -16,15 +16,15 @@ void EmergencyStop::begin(bushd_stop_mode mode) {
   stop_ = Stop{.mode = mode, .until_us = {}};
   // One that was latched before says nothing of this one.
   for (McuRecord& mcu : mcus_) {
-    mcu.view.report.faults &= static_cast<std::uint8_t>(~BUSHD_FAULT_EMERGENCY);
+    constexpr unsigned kOfStops = BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_DISABLED;
+    mcu.view.report.faults &= static_cast<std::uint8_t>(~kOfStops);
   }
 }
 
 bool EmergencyStop::send_due(std::int64_t now_us) {
   if (!stop_) return false;
-  const bool open = std::any_of(mcus_.begin(), mcus_.end(), [](const McuRecord& mcu) {
-    return mcu.view.phase != McuPhase::kOffline &&
-           (mcu.view.report.faults & BUSHD_FAULT_EMERGENCY) == 0;
+  const bool open = std::any_of(mcus_.begin(), mcus_.end(), [this](const McuRecord& mcu) {
+    return mcu.view.phase != McuPhase::kOffline && !has_obeyed(mcu.view, stop_->mode);
   });
   if (stop_->until_us && (!open || now_us >= *stop_->until_us)) {
     stop_.reset();

@@ -1,4 +1,4 @@
-// An emergency stop, said until every MCU has latched it.
+// An emergency stop, said until every MCU has obeyed it.
 #pragma once
 
 #include <cstdint>

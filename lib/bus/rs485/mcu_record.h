@@ -33,6 +33,15 @@ struct McuView {
   bool bound_by_stop = false;
 };
 
+// Whether it has obeyed an emergency stop of this mode, as its report tells. One that disables
+// drivers has come in another mode, too (EmergencyStop): that alone does not do.
+inline bool has_obeyed(const McuView& view, bushd_stop_mode mode) {
+  const bool disables =
+      mode == BUSHD_STOP_DISABLE && (view.identity.capabilities & BUSHD_CAN_DISABLE) != 0;
+  const unsigned wanted = BUSHD_FAULT_EMERGENCY | (disables ? unsigned{BUSHD_FAULT_DISABLED} : 0u);
+  return (view.report.faults & wanted) == wanted;
+}
+
 // Common to the machines of a master. Each keeps for itself what only it needs to know.
 struct McuRecord {
   McuSetup setup;

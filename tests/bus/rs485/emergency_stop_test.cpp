@@ -40,6 +40,19 @@ TEST_F(Emergency, TheLastFrameOfOneThatDisablesIsForMcusThatDoNotKnowIt) {
   EXPECT_EQ(sent[2].payload, Bytes{BUSHD_STOP_IMMEDIATE});
 }
 
+// It has heard the last one only, and its drivers are on.
+TEST_F(Emergency, OneThatDisablesIsSaidUntilDriversAreDisabled) {
+  for (McuRecord& mcu : mcus) mcu.view.identity.capabilities = BUSHD_CAN_DISABLE;
+  stop.begin(BUSHD_STOP_DISABLE);
+  ASSERT_TRUE(stop.send_due(1'000));
+  latch(kFirst);
+  latch(kSecond);
+  EXPECT_TRUE(stop.send_due(stop.due_us()));
+  for (McuRecord& mcu : mcus) mcu.view.report.faults |= BUSHD_FAULT_DISABLED;
+  EXPECT_FALSE(stop.send_due(stop.due_us()));
+  EXPECT_FALSE(stop.active());
+}
+
 TEST_F(Emergency, RepeatedUntilTheLastMcuHasLatchedIt) {
   stop.begin(BUSHD_STOP_RAMP);
   ASSERT_TRUE(stop.send_due(1'000));
