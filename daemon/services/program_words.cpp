@@ -60,7 +60,8 @@ ProgramEnd end_of_program(const bushd_program_state& state, const Mcu& mcu) {
     case BUSHD_PROGRAM_NO_INPUT:
       return {
           Outcome::kFault,
-          "the input has not come within longest_s, or within the way of the move that it ends"};
+          "the input did not come within longest_s, or on the whole way of its move; look at the "
+          "input, or allow more of either"};
     case BUSHD_PROGRAM_REFUSED:
       return {Outcome::kFault,
               "MCU " + mcu.name() +

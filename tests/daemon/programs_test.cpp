@@ -214,6 +214,43 @@ TEST(Programs, PauseAndGoOn) {
   EXPECT_THAT(lab.steps.of(0, 0), SizeIs(2000 + 1993));
 }
 
+constexpr const char* kUntilTrigger =
+    "[[frame]]\nmove_by = { m01 = 3000 }\nuntil_input = \"trigger\"\nafter = 250\n";
+
+TEST(Programs, AnInputEndsTheMoveOfAFrame) {
+  ProgramLab lab;
+  const Answer put = lab.put("until", "\"m01\"", kUntilTrigger);
+  ASSERT_EQ(put.result, "done") << put.reason;
+  EXPECT_TRUE(put.programs.front().waits_for_inputs);
+  EXPECT_EQ(put.programs.front().motors.front().most_steps, 3000);
+  const std::int64_t run = lab.run({"until"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").position_steps > 400; }));
+  const auto before = static_cast<std::int64_t>(lab.steps.of(0, 0).size());
+  lab.bus(0).mcu(0).set_inputs({0, BUSHD_INPUT_TRIGGER});
+  const Answer ended = lab.wait(run);
+  EXPECT_EQ(ended.result, "reached") << ended.reason;
+  const auto made = static_cast<std::int64_t>(lab.steps.of(0, 0).size());
+  EXPECT_EQ(lab.motor("m01").position_steps, made);
+  // It is looked at within two ticks, in which it makes 2 * 7 steps at most.
+  EXPECT_GE(made, before + 250);
+  EXPECT_LE(made, before + 250 + 14);
+  lab.bus(0).mcu(0).set_inputs({0, 0});
+  const Answer in_vain = lab.wait(lab.run({"until"}));
+  EXPECT_EQ(in_vain.result, "fault");
+  EXPECT_THAT(in_vain.reason, HasSubstr("on the whole way of its move"));
+  EXPECT_EQ(lab.motor("m01").position_steps, made + 3000);
+}
+
+TEST(Programs, APauseEndsAMoveUntilAnInput) {
+  ProgramLab lab;
+  ASSERT_EQ(lab.put("until", "\"m01\"", kUntilTrigger).result, "done");
+  const std::int64_t run = lab.run({"until"});
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").position_steps > 400; }));
+  lab.wait(lab.send(api::Pause{{"m01"}}));
+  EXPECT_EQ(lab.wait(run).result, "stopped");
+  EXPECT_LT(lab.motor("m01").position_steps, 3000);
+}
+
 TEST(Programs, DoNotGoOnWhileOneOfTheirMotorsIsHeld) {
   ProgramLab lab;
   ASSERT_EQ(lab.put("a", "\"m01\", \"m02\"", "[[frame]]\nmove_by = [900, 900]\n").result, "done");
