@@ -4,11 +4,6 @@
 #include "firmware/core/access.h"
 #include "firmware/core/state.h"
 
-void bushd_mcu_keep_enable(bushd_mcu* mcu) {
-  const bool on = (mcu->flags & BUSHD_FLAG_ENABLED) != 0;
-  mcu->port.keep_enable(mcu->port.context, on && mcu->inputs.enable_after_watchdog);
-}
-
 static bushd_edge disabling_edge(const bushd_mcu* mcu) {
   if (mcu->inputs.emergency != BUSHD_EMERGENCY_INPUT_DISABLE) return BUSHD_EDGE_NONE;
   const bool inverted = (mcu->inputs.system_inverted & BUSHD_INPUT_EMERGENCY) != 0;
@@ -19,6 +14,8 @@ void bushd_mcu_drive_enable(bushd_mcu* mcu) {
   const bool on = (mcu->flags & BUSHD_FLAG_ENABLED) != 0;
   // A master that knows nothing of levels wants these.
   if (on && mcu->config.outputs.enabled == 0) mcu->config.outputs.enabled = BUSHD_ENABLED_HIGH;
+  // First: what the port makes void when it switches off is not written again.
+  mcu->port.keep_enable(mcu->port.context, on && mcu->inputs.enable_after_watchdog);
   const bushd_edge off_at = on ? disabling_edge(mcu) : BUSHD_EDGE_NONE;
   mcu->port.set_enable(mcu->port.context, on, &mcu->config.outputs, off_at);
 }
@@ -27,7 +24,6 @@ void bushd_mcu_set_enable(bushd_mcu* mcu, bool on) {
   mcu->flags &= (uint8_t)~BUSHD_FLAG_ENABLED;
   if (on) mcu->flags |= BUSHD_FLAG_ENABLED;
   bushd_mcu_drive_enable(mcu);
-  bushd_mcu_keep_enable(mcu);
 }
 
 // A level of STEP that changes may look like a step to a driver: it is off meanwhile.

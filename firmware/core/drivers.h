@@ -9,10 +9,8 @@
 typedef struct bushd_mcu bushd_mcu;
 
 void bushd_mcu_set_enable(bushd_mcu* mcu, bool on);
-// Tells the port what is so.
+// Tells the port what is so, and whether EN is to be raised again after a watchdog reset.
 void bushd_mcu_drive_enable(bushd_mcu* mcu);
 bushd_status bushd_mcu_set_outputs(bushd_mcu* mcu, const bushd_set_outputs* message);
-// Tells the port whether EN is to be raised again after a watchdog reset.
-void bushd_mcu_keep_enable(bushd_mcu* mcu);
 
 #endif

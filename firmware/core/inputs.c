@@ -105,7 +105,6 @@ void bushd_mcu_begin_inputs(bushd_mcu* mcu) {
   bushd_mcu_begin_limits(mcu, pins.motors ^ mcu->inputs.inverted);
   bushd_mcu_forget_presses(mcu, system_inputs(mcu, pins));
   bushd_mcu_drive_enable(mcu);
-  bushd_mcu_keep_enable(mcu);
 }
 
 bushd_status bushd_mcu_set_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message) {

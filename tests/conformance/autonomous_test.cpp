@@ -334,5 +334,28 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
   }
 }
 
+// The port switches EN off although the core hangs; and the reset must not undo that.
+TEST_P(Autonomous, APressWhileItHangsKeepsEnOffOverTheWatchdogReset) {
+  bushd_set_inputs inputs{};
+  inputs.enable_after_watchdog = true;
+  inputs.emergency = BUSHD_EMERGENCY_INPUT_DISABLE;
+  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
+  real_->hang();
+  pass_ticks(4);
+  const TimeNs pressed_ns = bus_.now_ns();
+  set_inputs({0, BUSHD_INPUT_EMERGENCY});
+  pass_ticks(1);
+  set_inputs({});
+  const auto falls = recorder_.times(1, Signal::kEnable, 0, false);
+  ASSERT_EQ(falls.size(), 1u) << "by its interrupt, without the core";
+  EXPECT_LE(falls[0], pressed_ns + kTickNs);
+  recorder_.edges.clear();
+  pass_ticks(180);
+  const bushd_report after = master_.poll(kReal);
+  EXPECT_EQ(after.reset_cause, BUSHD_RESET_WATCHDOG);
+  EXPECT_EQ(after.flags & BUSHD_FLAG_ENABLED, 0);
+  EXPECT_EQ(recorder_.times(1, Signal::kEnable, 0, true).size(), 0u);
+}
+
 }  // namespace
 }  // namespace bushd::sim::autonomous_test

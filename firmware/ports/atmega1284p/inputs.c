@@ -3,6 +3,8 @@
 #include <board.h>
 #include <util/atomic.h>
 
+#include "firmware/ports/atmega2560/identity.h"
+
 #define SETTLE_CYCLES (200UL * CYCLES_PER_US)
 
 // PINx, DDRx and PORTx follow each other. Returns the pins that are high while they are driven low,
@@ -39,6 +41,10 @@ static bool emergency_closed(void) {
   return (INPUT_SYSTEM & 1 << EMERGENCY_BIT) == 0;
 }
 
+static bool has_switched_off(void) {
+  return PCMSK1 != 0 && PCICR == 0;
+}
+
 // Its interrupt puts itself off.
 void inputs_switch_off_at(bushd_edge edge) {
   PCICR = 0;
@@ -55,14 +61,15 @@ void inputs_switch_off_at(bushd_edge edge) {
       EN_PIN = 1 << EN_BIT;
     }
   }
+  if (has_switched_off()) identity_keep_enable(0);
 }
 
 bushd_inputs inputs_read(void) {
   const uint8_t low = (uint8_t)~INPUT_LOW;
   const uint8_t system = (uint8_t)~INPUT_SYSTEM;
   bushd_inputs inputs = {(uint16_t)((low & INPUT_LOW_BITS) | (system & 1 << INPUT_0_BIT)), 0};
-  const bool switched_off = PCMSK1 != 0 && PCICR == 0;
-  if (switched_off ? awaited_closed : emergency_closed()) inputs.system |= BUSHD_INPUT_EMERGENCY;
+  if (has_switched_off() ? awaited_closed : emergency_closed())
+    inputs.system |= BUSHD_INPUT_EMERGENCY;
   if (system & 1 << FORWARD_BIT) inputs.system |= BUSHD_INPUT_FORWARD;
   if (system & 1 << REVERSE_BIT) inputs.system |= BUSHD_INPUT_REVERSE;
   if (system & 1 << TRIGGER_BIT) inputs.system |= BUSHD_INPUT_TRIGGER;

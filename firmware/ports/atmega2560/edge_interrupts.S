@@ -19,13 +19,15 @@ TRIGGER_VECTOR:
     cbi _SFR_IO_ADDR(EIMSK), TRIGGER_INT
     reti
 
-; EN is off: its output turns over, once. It was on, or nobody would wait for this edge.
+; EN is off: its output turns over, once. It was on, or nobody would wait for this edge. Nor does it come on again when the
+; watchdog bites, should the core hang: without its low byte what was kept is neither level (boot_tests.h).
     .global EMERGENCY_VECTOR
 EMERGENCY_VECTOR:
     mov SAVED_LOW, r16
     ldi r16, 1 << EN_BIT
     sts _SFR_MEM_ADDR(EN_PIN), r16
     mov r16, SAVED_LOW
+    sts enable_kept, ZERO
     emergency_interrupt_off
     reti
 

@@ -3,6 +3,8 @@
 #include <board.h>
 #include <util/atomic.h>
 
+#include "firmware/ports/atmega2560/identity.h"
+
 #define SETTLE_CYCLES (200UL * CYCLES_PER_US)
 
 // PINx, DDRx and PORTx follow each other. Returns the pins that are high while they are driven low,
@@ -33,6 +35,11 @@ void inputs_init(void) {
   ADCSRA = 1 << ADEN | 1 << ADSC | 1 << ADATE | 1 << ADPS2 | 1 << ADPS1 | 1 << ADPS0;
 }
 
+// What the pin is to say although it has gone back; true: it is.
+static bool has_switched_off(void) {
+  return (EICRA & EMERGENCY_EDGES) != 0 && (EIMSK & 1 << EMERGENCY_INT) == 0;
+}
+
 // Its interrupt puts itself off, and leaves in EICRA which edge it was.
 void inputs_switch_off_at(bushd_edge edge) {
   EIMSK &= (uint8_t)~(1 << EMERGENCY_INT);
@@ -51,11 +58,7 @@ void inputs_switch_off_at(bushd_edge edge) {
       EN_PIN = 1 << EN_BIT;
     }
   }
-}
-
-// What the pin is to say although it has gone back; true: it is.
-static bool has_switched_off(void) {
-  return (EICRA & EMERGENCY_EDGES) != 0 && (EIMSK & 1 << EMERGENCY_INT) == 0;
+  if (has_switched_off()) identity_keep_enable(0);
 }
 
 bushd_inputs inputs_read(void) {

@@ -12,6 +12,10 @@ static volatile bool switched_off;
 static bool closed_after;  // closed to ground
 static uint32_t enable_off;
 
+// In memory that a watchdog reset leaves as it is.
+#define ENABLE_KEPT 0x5AC3E910u  // plus BUSHD_ENABLED_*
+__attribute__((section(".kept"))) static volatile uint32_t enable_kept;
+
 void edges_init(void) {
   GPIO_IS(GPIO_A) = 0;
   GPIO_IBE(GPIO_A) = 0;
@@ -63,6 +67,8 @@ static void switch_off(void) {
   GPIO_IM(GPIO_A) &= ~EMERGENCY_PIN;
   GPIO_ICR(GPIO_A) = EMERGENCY_PIN;
   switched_off = true;
+  // Should the core hang, it does not come on again when the watchdog bites.
+  enable_kept = 0;
 }
 
 void emergency_await(bushd_edge edge, bool off_high) {
@@ -78,6 +84,16 @@ void emergency_await(bushd_edge edge, bool off_high) {
     if (closed == closed_after) switch_off();
   }
   interrupts_on();
+}
+
+void emergency_keep_enable(uint8_t enabled) {
+  enable_kept = enabled != 0 ? ENABLE_KEPT + enabled : 0;
+}
+
+uint8_t emergency_kept_enable(void) {
+  const uint32_t enabled = enable_kept - ENABLE_KEPT;
+  const bool is_level = enabled == BUSHD_ENABLED_HIGH || enabled == BUSHD_ENABLED_LOW;
+  return is_level ? (uint8_t)enabled : 0;
 }
 
 uint32_t emergency_latched(uint32_t levels) {

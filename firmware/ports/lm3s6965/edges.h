@@ -18,6 +18,11 @@ bool trigger_came(uint32_t* time);
 // As off_at of bushd_port.set_enable; `off_high`: the level of EN then. With interrupts on.
 void emergency_await(bushd_edge edge, bool off_high);
 
+// BUSHD_ENABLED_* of drivers to be enabled again after a watchdog reset, or 0. It is 0 once EN has
+// been switched off by the input.
+void emergency_keep_enable(uint8_t enabled);
+uint8_t emergency_kept_enable(void);
+
 // Levels of port A, with that of the emergency input as after the edge once it has come.
 uint32_t emergency_latched(uint32_t levels);
 

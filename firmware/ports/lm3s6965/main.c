@@ -25,9 +25,6 @@ static bushd_mcu_program program = {.bytes = program_bytes, .memory = PROGRAM_BY
 static uint8_t reply[BUSHD_MCU_MAX_REPLY];
 static bool eeprom_failed;
 static uint16_t motor_inputs;
-// In memory that a watchdog reset leaves as it is.
-#define ENABLE_KEPT 0x5AC3E910u  // plus BUSHD_ENABLED_*
-__attribute__((section(".kept"))) static uint32_t enable_kept;
 
 static void port_transmit(void* context, const uint8_t* wire, size_t size, uint32_t delay_ns) {
   (void)context;
@@ -100,7 +97,7 @@ static uint8_t port_self_test(void* context) {
 
 static void port_keep_enable(void* context, bool on) {
   (void)context;
-  enable_kept = on ? ENABLE_KEPT + mcu.config.outputs.enabled : 0;
+  emergency_keep_enable(on ? mcu.config.outputs.enabled : 0);
 }
 
 static void port_set_trigger(void* context, bushd_edge edge) {
@@ -148,11 +145,10 @@ static void boot(void) {
   config.reset_cause = reset_cause();
   const nvm_found found = nvm_find();
   if (found == NVM_WHOLE) config.outputs = nvm_outputs();
-  const uint32_t enabled = enable_kept - ENABLE_KEPT;
-  const bool is_level = enabled == BUSHD_ENABLED_HIGH || enabled == BUSHD_ENABLED_LOW;
-  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && is_level;
+  const uint8_t enabled = emergency_kept_enable();
+  config.enable_at_boot = config.reset_cause == BUSHD_RESET_WATCHDOG && enabled != 0;
   // The flash may not have it yet.
-  if (config.enable_at_boot) config.outputs.enabled = (uint8_t)enabled;
+  if (config.enable_at_boot) config.outputs.enabled = enabled;
   eeprom_failed = !journal_open(&kept) || found == NVM_BROKEN;
   config.address = kept.address;
   config.boot_number = kept.boot_number;

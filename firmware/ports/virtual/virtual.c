@@ -256,6 +256,7 @@ static bool is_after(bushd_edge edge, bushd_inputs inputs) {
 static void follow_emergency(bushd_virtual* v) {
   if (v->off_at == BUSHD_EDGE_NONE || v->switched_off || !is_after(v->off_at, v->inputs)) return;
   v->switched_off = true;
+  v->enable_kept = false;
   drive_enable(v, v->rest.enabled == BUSHD_ENABLED_LOW);
 }
 
