@@ -2,6 +2,7 @@
 #include "firmware/core/drivers.h"
 
 #include "firmware/core/access.h"
+#include "firmware/core/inputs.h"
 #include "firmware/core/state.h"
 
 static bushd_edge disabling_edge(const bushd_mcu* mcu) {
@@ -18,6 +19,11 @@ void bushd_mcu_drive_enable(bushd_mcu* mcu) {
   mcu->port.keep_enable(mcu->port.context, on && mcu->inputs.enable_after_watchdog);
   const bushd_edge off_at = on ? disabling_edge(mcu) : BUSHD_EDGE_NONE;
   mcu->port.set_enable(mcu->port.context, on, &mcu->config.outputs, off_at);
+}
+
+void bushd_mcu_unwatch_emergency_input(bushd_mcu* mcu) {
+  const bool on = (mcu->flags & BUSHD_FLAG_ENABLED) != 0;
+  mcu->port.set_enable(mcu->port.context, on, &mcu->config.outputs, BUSHD_EDGE_NONE);
 }
 
 void bushd_mcu_set_enable(bushd_mcu* mcu, bool on) {
@@ -38,6 +44,7 @@ bushd_status bushd_mcu_set_outputs(bushd_mcu* mcu, const bushd_set_outputs* mess
   if (message->step_low != 0 && mcu->emission.grid.mode == BUSHD_EMISSION_PHASES) {
     return BUSHD_E_FORMAT;
   }
+  bushd_mcu_watch_emergency_input(mcu);
   if (outputs->enabled != 0) bushd_mcu_set_enable(mcu, false);
   *outputs = *message;
   bushd_mcu_set_enable(mcu, false);

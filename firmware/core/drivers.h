@@ -11,6 +11,8 @@ typedef struct bushd_mcu bushd_mcu;
 void bushd_mcu_set_enable(bushd_mcu* mcu, bool on);
 // Tells the port what is so, and whether EN is to be raised again after a watchdog reset.
 void bushd_mcu_drive_enable(bushd_mcu* mcu);
+// EN falls by no edge any more, until that is called again.
+void bushd_mcu_unwatch_emergency_input(bushd_mcu* mcu);
 bushd_status bushd_mcu_set_outputs(bushd_mcu* mcu, const bushd_set_outputs* message);
 
 #endif

@@ -92,6 +92,8 @@ bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* messag
   const uint16_t limits = message->limit_positive | message->limit_negative;
   if ((limits & ~bushd_mcu_own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
   bushd_mcu_wait_for_local(mcu);
+  // What the port has latched was for the settings that were: it latches no more before they go.
+  bushd_mcu_unwatch_emergency_input(mcu);
   bushd_mcu_watch_emergency_input(mcu);
   mcu->inputs = *message;
   bushd_mcu_default_switches(mcu);

@@ -38,9 +38,10 @@ typedef struct bushd_port {
   // are, and change while the drivers are disabled and no motor moves, with another call.
   // off_at: EN goes off by itself within a slot of this edge at the emergency input, without the
   // core; at once if the input is so already. From then on read_inputs says that the input is as
-  // after the edge, until the next call: no press is too short, and what keep_enable was told is
-  // void, since a core that hangs would not see it before a reset. BUSHD_EDGE_NONE: it does not,
-  // and never does with `on` false.
+  // after the edge, until a call with `on` false, and EN stays off until then: with `on` true the
+  // core cannot have seen it. No press is too short. What keep_enable was told is void, since a
+  // core that hangs would not see it before a reset. BUSHD_EDGE_NONE: it does not, and never does
+  // with `on` false.
   void (*set_enable)(void* context, bool on, const bushd_set_outputs* levels, bushd_edge off_at);
 
   // Length of all later ticks, in ns, from the next tick boundary on.

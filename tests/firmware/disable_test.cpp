@@ -138,6 +138,75 @@ TEST_P(Disabling, APressOfThisTickIsNotLostToARequest) {
   }
 }
 
+// Between the core's look and what it writes: the port does not raise EN, and goes on saying so.
+TEST_P(Disabling, APressBehindTheLookIsSeenByTheNextOne) {
+  for (const int looks : {1, 2}) {
+    SCOPED_TRACE(looks);
+    const auto on = watching();
+    int left = looks;
+    on->sense = [&] {
+      if (--left == 0) on->press_shortly();
+      return kReleased;
+    };
+    if (looks == 1) {
+      EXPECT_EQ(on->control(BUSHD_CONTROL_ENABLE), BUSHD_OK) << "it has not seen it";
+    } else {
+      on->pass(2);
+    }
+    EXPECT_FALSE(on->enabled());
+    on->pass();
+    EXPECT_FALSE(on->enabled());
+    EXPECT_EQ(on->poll().faults, BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_DISABLED);
+    on->sense = nullptr;
+    expect_off_until_cleared_and_enabled(*on);
+  }
+}
+
+// Also one that ended before the frame came which writes EN.
+TEST_P(Disabling, APressBeforeOutputsAreSetIsNotLost) {
+  const auto on = watching();
+  on->press_shortly();
+  ASSERT_EQ(on->outputs({.step_low = 1, .direction_low = 0, .enabled = BUSHD_ENABLED_LOW}),
+            BUSHD_OK);
+  EXPECT_FALSE(on->enabled());
+  EXPECT_EQ(on->poll().faults, BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_DISABLED);
+  EXPECT_EQ(on->control(BUSHD_CONTROL_ENABLE), BUSHD_E_STATE);
+}
+
+// What the port has latched is judged by the settings that it was for, whatever the next ones are.
+TEST_P(Disabling, APressBeforeOtherSettingsCameIsNotLost) {
+  for (const InputSettings& next : {InputSettings{.emergency = BUSHD_EMERGENCY_INPUT_IGNORED},
+                                    InputSettings{.system_inverted = BUSHD_INPUT_EMERGENCY,
+                                                  .emergency = BUSHD_EMERGENCY_INPUT_DISABLE}}) {
+    const auto on = watching();
+    // What the last read of the old settings is followed by: the port watches no more.
+    on->sense = [&] {
+      on->press_shortly();
+      return kReleased;
+    };
+    on->press_shortly();
+    ASSERT_EQ(on->set_inputs(next), BUSHD_OK);
+    EXPECT_FALSE(on->enabled());
+    EXPECT_EQ(on->off_at(), BUSHD_EDGE_NONE);
+    on->sense = nullptr;
+    EXPECT_EQ(on->poll().faults, BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_DISABLED);
+    EXPECT_EQ(on->poll().flags & BUSHD_FLAG_ENABLED, 0);
+  }
+}
+
+TEST_P(Disabling, WithSettingsThatChangeThePortWatchesNoMoreWhenTheCoreLooks) {
+  const auto on = watching();
+  std::vector<bushd_edge> edges;
+  on->sense = [&] {
+    edges.push_back(on->off_at());
+    return kReleased;
+  };
+  ASSERT_EQ(on->set_inputs({.emergency = BUSHD_EMERGENCY_INPUT_IGNORED}), BUSHD_OK);
+  ASSERT_GE(edges.size(), 2u);
+  EXPECT_EQ(edges.front(), BUSHD_EDGE_NONE) << "or a press behind this look would leave EN off";
+  EXPECT_TRUE(on->enabled());
+}
+
 TEST_P(Disabling, WithAnInputThatRampedBeforeTheSettingsCameItTakesEnAway) {
   const auto on = ready({.emergency = BUSHD_EMERGENCY_INPUT_RAMP});
   on->pins(kPressed);

@@ -97,10 +97,15 @@ Rig::Rig(RigOptions options)
   };
   port.set_enable = [](void* context, bool on, const bushd_set_outputs* levels, bushd_edge off_at) {
     auto& rig = *static_cast<Rig*>(context);
+    ++rig.enable_calls_;
+    if (on && rig.switched_off_) {
+      rig.enable_kept_ = false;
+      return;
+    }
+    rig.switched_off_ = false;
     rig.enabled_ = on;
     rig.off_at_ = off_at;
     rig.levels_ = *levels;
-    ++rig.enable_calls_;
   };
   port.set_tick = [](void* context, std::uint32_t ns) {
     static_cast<Rig*>(context)->port_tick_ns_ = ns;
@@ -109,7 +114,14 @@ Rig::Rig(RigOptions options)
   port.time_in_tick_ns = [](void*) { return kTimeInTickNs; };
   port.read_inputs = [](void* context) {
     const auto& rig = *static_cast<Rig*>(context);
-    return rig.sense ? rig.sense() : rig.pins_;
+    const bool latched = rig.switched_off_;
+    bushd_inputs pins = rig.sense ? rig.sense() : rig.pins_;
+    if (latched) {
+      pins.system = static_cast<std::uint8_t>(rig.off_at_ == BUSHD_EDGE_RISING
+                                                  ? pins.system | BUSHD_INPUT_EMERGENCY
+                                                  : pins.system & ~BUSHD_INPUT_EMERGENCY);
+    }
+    return pins;
   };
   port.read_current = [](void* context) { return static_cast<Rig*>(context)->current_; };
   port.self_test = [](void* context) { return static_cast<Rig*>(context)->options_.failing_tests; };

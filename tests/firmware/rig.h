@@ -204,6 +204,12 @@ class Rig {
   // The levels of STEP, DIR and EN, as the port was told last.
   const bushd_set_outputs& levels() const { return levels_; }
   int enable_calls() const { return enable_calls_; }
+  // The edge that the port was told of comes, if it was, and goes back: too short for any tick.
+  void press_shortly() {
+    if (off_at_ == BUSHD_EDGE_NONE) return;
+    switched_off_ = true;
+    enabled_ = enable_kept_ = false;
+  }
   bool enable_kept() const { return enable_kept_; }
   bushd_edge off_at() const { return off_at_; }  // as in bushd_port.set_enable
   int stored_address() const { return stored_address_; }
@@ -239,6 +245,7 @@ class Rig {
   bushd_edge awaited_edge_ = BUSHD_EDGE_NONE;
   int enable_calls_ = 0;
   bool enable_kept_ = false;
+  bool switched_off_ = false;
   bushd_edge off_at_ = BUSHD_EDGE_NONE;
   int stored_address_ = -1;
   bushd_inputs pins_{};

@@ -45,10 +45,19 @@ static bool has_switched_off(void) {
   return PCMSK1 != 0 && PCICR == 0;
 }
 
+bool inputs_unwatch(bool on) {
+  bool off = false;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    off = has_switched_off();
+    PCICR = 0;
+  }
+  if (off && on) return false;
+  PCMSK1 = 0;
+  return true;
+}
+
 // Its interrupt puts itself off.
 void inputs_switch_off_at(bushd_edge edge) {
-  PCICR = 0;
-  PCMSK1 = 0;
   if (edge == BUSHD_EDGE_NONE) return;
   awaited_closed = edge == BUSHD_EDGE_RISING;
   PCMSK1 = EMERGENCY_CHANGE;

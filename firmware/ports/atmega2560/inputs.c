@@ -40,10 +40,19 @@ static bool has_switched_off(void) {
   return (EICRA & EMERGENCY_EDGES) != 0 && (EIMSK & 1 << EMERGENCY_INT) == 0;
 }
 
+bool inputs_unwatch(bool on) {
+  bool off = false;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    off = has_switched_off();
+    EIMSK &= (uint8_t)~(1 << EMERGENCY_INT);
+  }
+  if (off && on) return false;
+  EICRA &= (uint8_t)~EMERGENCY_EDGES;
+  return true;
+}
+
 // Its interrupt puts itself off, and leaves in EICRA which edge it was.
 void inputs_switch_off_at(bushd_edge edge) {
-  EIMSK &= (uint8_t)~(1 << EMERGENCY_INT);
-  EICRA &= (uint8_t)~EMERGENCY_EDGES;
   if (edge == BUSHD_EDGE_NONE) return;
   // Closed to ground is active.
   const bool rising = edge == BUSHD_EDGE_RISING;

@@ -14,9 +14,13 @@ void inputs_init(void);
 bushd_inputs inputs_read(void);
 uint16_t inputs_current(void);
 
-// From now on EN changes by itself at this edge of the emergency input, once, and at once if the
-// input is as after it already; inputs_read says so until the next call. BUSHD_EDGE_NONE: no more.
-// Nobody else writes to the port of EN meanwhile.
+// EN changes by itself no more: it may be written, but not to be `on` (false) where it has changed
+// since the last call with `on` false.
+bool inputs_unwatch(bool on);
+
+// After that: from now on EN changes by itself at this edge of the emergency input, once, and at
+// once if the input is as after it already; inputs_read says so until inputs_unwatch.
+// BUSHD_EDGE_NONE: it does not. Nobody else writes to the port of EN meanwhile.
 void inputs_switch_off_at(bushd_edge edge);
 
 #endif

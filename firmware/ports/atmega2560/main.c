@@ -57,7 +57,10 @@ static bool port_store_address(void* context, uint8_t address) {
 static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels,
                             bushd_edge off_at) {
   (void)context;
-  inputs_switch_off_at(BUSHD_EDGE_NONE);
+  if (!inputs_unwatch(on)) {
+    identity_keep_enable(0);
+    return;
+  }
   if (levels->enabled == 0) return;
   if (on == (levels->enabled == BUSHD_ENABLED_HIGH)) {
     EN_PORT |= 1 << EN_BIT;

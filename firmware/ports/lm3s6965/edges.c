@@ -71,10 +71,21 @@ static void switch_off(void) {
   enable_kept = 0;
 }
 
-void emergency_await(bushd_edge edge, bool off_high) {
+bool emergency_unwatch(bool on) {
   interrupts_off();
   GPIO_IM(GPIO_A) &= ~EMERGENCY_PIN;
-  switched_off = false;
+  const bool may = !switched_off || !on;
+  if (may) {
+    switched_off = false;
+  } else {
+    enable_kept = 0;
+  }
+  interrupts_on();
+  return may;
+}
+
+void emergency_await(bushd_edge edge, bool off_high) {
+  interrupts_off();
   enable_off = off_high ? ALL_PINS : 0;
   closed_after = edge == BUSHD_EDGE_RISING;
   if (edge != BUSHD_EDGE_NONE) {

@@ -15,7 +15,12 @@ void trigger_await(bushd_edge edge);
 // The edge has come: when (clock.h). Each is told once. For the main loop.
 bool trigger_came(uint32_t* time);
 
-// As off_at of bushd_port.set_enable; `off_high`: the level of EN then. With interrupts on.
+// Nothing is awaited any more: EN may be written, but not to be `on` (false) where it has been
+// switched off since the last call with `on` false. With interrupts on.
+bool emergency_unwatch(bool on);
+
+// After that. As off_at of bushd_port.set_enable; `off_high`: the level of EN then. With interrupts
+// on.
 void emergency_await(bushd_edge edge, bool off_high);
 
 // BUSHD_ENABLED_* of drivers to be enabled again after a watchdog reset, or 0. It is 0 once EN has

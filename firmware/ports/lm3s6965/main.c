@@ -45,7 +45,7 @@ static void port_set_enable(void* context, bool on, const bushd_set_outputs* lev
                             bushd_edge off_at) {
   static bool driven;
   (void)context;
-  emergency_await(BUSHD_EDGE_NONE, false);
+  if (!emergency_unwatch(on)) return;
   if (levels->enabled == 0) return;
   put_outputs(on, levels);
   if (!driven) {

@@ -263,6 +263,10 @@ static void follow_emergency(bushd_virtual* v) {
 static void port_set_enable(void* context, bool on, const bushd_set_outputs* levels,
                             bushd_edge off_at) {
   bushd_virtual* v = context;
+  if (on && v->switched_off) {
+    v->enable_kept = false;
+    return;
+  }
   v->off_at = off_at;
   v->switched_off = false;
   if (levels->enabled == 0) return;
