@@ -2,7 +2,6 @@
 #include "firmware/core/drivers.h"
 
 #include "firmware/core/access.h"
-#include "firmware/core/inputs.h"
 #include "firmware/core/state.h"
 
 static bushd_edge disabling_edge(const bushd_mcu* mcu) {
@@ -44,7 +43,6 @@ bushd_status bushd_mcu_set_outputs(bushd_mcu* mcu, const bushd_set_outputs* mess
   if (message->step_low != 0 && mcu->emission.grid.mode == BUSHD_EMISSION_PHASES) {
     return BUSHD_E_FORMAT;
   }
-  bushd_mcu_watch_emergency_input(mcu);
   if (outputs->enabled != 0) bushd_mcu_set_enable(mcu, false);
   *outputs = *message;
   bushd_mcu_set_enable(mcu, false);

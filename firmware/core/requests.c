@@ -103,6 +103,12 @@ static uint8_t actions_at_rest_only(const bushd_mcu* mcu, uint8_t faults) {
   return all;
 }
 
+// EN falls and may rise, so a press that nobody has seen yet is looked at first.
+static bushd_status set_outputs(bushd_mcu* mcu, const bushd_set_outputs* message) {
+  bushd_mcu_watch_emergency_input(mcu);
+  return bushd_mcu_set_outputs(mcu, message);
+}
+
 static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
   const uint8_t at_rest_only = actions_at_rest_only(mcu, message->faults);
   if ((message->actions & at_rest_only) != 0 && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
@@ -303,7 +309,7 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
     case BUSHD_MSG_INPUTS:
       HANDLE(set_inputs, bushd_mcu_set_inputs);
     case BUSHD_MSG_OUTPUTS:
-      HANDLE(set_outputs, bushd_mcu_set_outputs);
+      HANDLE(set_outputs, set_outputs);
     case BUSHD_MSG_MOTOR_INPUTS:
       HANDLE(motor_inputs, bushd_mcu_set_motor_inputs);
     case BUSHD_MSG_EMISSION:
