@@ -3,22 +3,11 @@
 #include <string_view>
 
 #include "fuzz/fuzz.h"
+#include "fuzz/fuzz_table.h"
 #include "motion/zone_run.h"
-#include "tables/table.h"
 
 namespace bushd::fuzz {
 namespace {
-
-const bushd_table& table() {
-  static const tables::TablePtr kTable = [] {
-    tables::TableContent content{.name = "fuzz", .time_unit_ns = 40'000};
-    content.accel = {250, 200, 150, 110};
-    content.decel = {160, 240};
-    content.cruise = 100;
-    return tables::make(std::move(content)).value();
-  }();
-  return kTable->view();
-}
 
 void run(std::string_view text) {
   constexpr double kMostStepsTried = 20'000;  // a run has all its delays in memory
@@ -31,7 +20,7 @@ void run(std::string_view text) {
   BUSHD_REQUIRE(again && *again == *zones);
   const double way = zones->steps_of(zones->end - zones->zones.front().from);
   if (way > kMostStepsTried || way < -kMostStepsTried) return;
-  const auto run = motion::zone_run(*zones, table());
+  const auto run = motion::zone_run(*zones, fuzz_table());
   if (!run) {
     BUSHD_REQUIRE(!run.error().message.empty());
     return;

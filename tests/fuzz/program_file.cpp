@@ -6,6 +6,7 @@
 
 #include "engine/program.h"
 #include "fuzz/fuzz.h"
+#include "fuzz/fuzz_table.h"
 #include "programs/compile.h"
 #include "tables/any_line.h"
 
@@ -15,17 +16,6 @@ namespace {
 constexpr const char* kEnvelope =
     "table = \"fuzz\"\nby = \"distance\"\nzones = [[0, 100], [30, 200]]\nend = 50\n";
 constexpr std::size_t kMostFrames = 2000;  // of a walk: repeats are the engine's
-
-const bushd_table& table() {
-  static const tables::TablePtr kTable = [] {
-    tables::TableContent content{.name = "fuzz", .time_unit_ns = 40'000};
-    content.accel = {250, 200, 150, 110};
-    content.decel = {160, 240};
-    content.cruise = 100;
-    return tables::make(std::move(content)).value();
-  }();
-  return kTable->view();
-}
 
 void run(std::string_view text) {
   const auto program = programs::parse(text, "fuzz.toml", [](const std::string& file) {
@@ -39,13 +29,13 @@ void run(std::string_view text) {
                          .memory = 4096,
                          .tick_ns = 2'560'000,
                          .line_bank = 7,
-                         .line_table = &table()};
+                         .line_table = &fuzz_table()};
   std::vector<programs::MotorPlace> motors;
   for (const std::string& name : program->motors) {
     programs::MotorPlace motor;
     motor.name = name;
     motor.output = static_cast<std::uint8_t>(motors.size());
-    motor.table = &table();
+    motor.table = &fuzz_table();
     motors.push_back(std::move(motor));
   }
   tables::TablePtr codes;
