@@ -11,6 +11,7 @@
 
 #include "heritage/commutator/exchange.h"
 #include "sim/avr/avr_board.h"
+#include "sim/avr/booted_board.h"
 #include "sim/board_line.h"
 #include "sim/random.h"
 #include "sim/random_streams.h"
@@ -42,22 +43,10 @@ constexpr TimeNs kTwoCounts = 16;
 constexpr TimeNs kLateNs = (kLoop + kLoop + kByte + kToStrobe + kTwoCounts) * 125 / 2;
 static_assert(kLateNs < 40'000);
 
-// A board that has booted.
-class Image {
+class Image : public BootedBoard {
  public:
   explicit Image(std::uint32_t start_hz, std::uint32_t baud = kFastBaud)
-      : board(image_of(baud), baud, start_hz) {
-    pass(AvrBoard::kBootNs);
-  }
-  void pass(TimeNs ns) {
-    for (const std::uint8_t byte : board.advance(board.advanced_to_ns() + ns)) {
-      answers.push_back(byte);
-    }
-  }
-  void send(const std::vector<std::uint8_t>& bytes) { board.send(board.advanced_to_ns(), bytes); }
-
-  AvrBoard board;
-  std::vector<std::uint8_t> answers;
+      : BootedBoard(image_of(baud), baud, start_hz) {}
 };
 
 TEST(CommutatorImage, SwitchesEachMotorToItsFirstPhaseWhenPowerComes) {

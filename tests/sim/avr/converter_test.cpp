@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "sim/avr/avr_board.h"
+#include "sim/avr/booted_board.h"
 #include "sim/board_line.h"
 #include "sim/random.h"
 #include "sim/random_streams.h"
@@ -45,22 +46,10 @@ std::string image_of(std::uint32_t baud) {
   return COMMUTATOR_IMAGES "-converter-" + std::to_string(baud) + ".elf";
 }
 
-// A board that has booted.
-class Image {
+class Image : public BootedBoard {
  public:
   explicit Image(const Character& character = kPlain, std::uint32_t baud = kFastBaud)
-      : board(image_of(baud), baud, FrequencyConverter(character)) {
-    pass(AvrBoard::kBootNs);
-  }
-  void pass(TimeNs ns) {
-    for (const std::uint8_t byte : board.advance(board.advanced_to_ns() + ns)) {
-      answers.push_back(byte);
-    }
-  }
-  void send(const std::vector<std::uint8_t>& bytes) { board.send(board.advanced_to_ns(), bytes); }
-
-  AvrBoard board;
-  std::vector<std::uint8_t> answers;
+      : BootedBoard(image_of(baud), baud, FrequencyConverter(character)) {}
 };
 
 TEST(ConverterImage, SwitchesEachMotorToItsFirstPhaseWhenPowerComes) {
