@@ -80,4 +80,14 @@ static void begin_line(void) {
   UCSR0B = 1 << RXEN0 | 1 << TXEN0;
 }
 
+typedef enum heard { HEARD_NOTHING, HEARD_BYTE, HEARD_DAMAGED } heard;
+
+// The status belongs to the byte that is read next.
+static inline heard hear_byte(uint8_t* byte) {
+  const uint8_t status = UCSR0A;
+  if ((status & 1 << RXC0) == 0) return HEARD_NOTHING;
+  *byte = UDR0;
+  return (status & (1 << FE0 | 1 << DOR0)) != 0 ? HEARD_DAMAGED : HEARD_BYTE;
+}
+
 #endif

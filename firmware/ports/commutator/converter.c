@@ -66,11 +66,10 @@ static void begin(bushd_converter* converter) {
 }
 
 static void hear(bushd_converter* converter, uint16_t time) {
-  // The status belongs to the byte that is read next.
-  const uint8_t status = UCSR0A;
-  if ((status & 1 << RXC0) == 0) return;
-  const uint8_t byte = UDR0;
-  if (status & (1 << FE0 | 1 << DOR0)) {
+  uint8_t byte;
+  const heard what = hear_byte(&byte);
+  if (what == HEARD_NOTHING) return;
+  if (what == HEARD_DAMAGED) {
     bushd_converter_receive_damaged(converter);
   } else {
     bushd_converter_receive(converter, time, TCNT1, byte);
