@@ -15,7 +15,7 @@ namespace bushd::daemon {
 class CommonStarts {
  public:
   // A start is tried so often at most.
-  static constexpr unsigned kMostTries = 5;
+  static constexpr unsigned kMostTries = 6;
 
   explicit CommonStarts(std::size_t motors);
 
@@ -23,6 +23,8 @@ class CommonStarts {
   void begin(const std::vector<MotorId>& motors);
   // Nobody has heard yet whether it has begun.
   bool waits(MotorId motor) const { return of_[motor] != nullptr; }
+  // Its start has not been tried before.
+  bool is_first(MotorId motor) const { return waits(motor) && of_[motor]->tries == 1; }
   // What is heard of a motor for which waits() holds: it has missed the start, or it has begun.
   void misses(MotorId motor);
   void begins(MotorId motor);

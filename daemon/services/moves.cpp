@@ -125,7 +125,7 @@ void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::i
 
 void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target,
                      bushd_delay shortest_delay) {
-  if (installation_[id].is_withdrawn()) starts_.leaves(id);
+  if (installation_[id].is_withdrawn()) starts_.begin({id});
   installation_[id].aim(target, shortest_delay);
   open_.planned(id, 1, installation_[id].axis().most_steps_per_s(shortest_delay));
   retarget(now_us, {id});

@@ -36,7 +36,7 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
     if (!motor.stands()) {
-      if (motor.is_withdrawn()) starts_.leaves(part.motor);
+      if (motor.is_withdrawn()) starts_.begin({part.motor});
       motor.aim(part.legs.front().target, part.legs.front().shortest_delay);
     } else {
       plan_start({part.motor, part.legs.front()},
@@ -112,7 +112,10 @@ void Moves::misses_start(MotorId id) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
   if (motor.is_late()) return;
-  if (!motor.is_withdrawn()) mcu.bus().start_missed();
+  // More time does not help against a frame that is lost now and then.
+  const bool lost_once =
+      starts_.is_first(id) && mcu.bus().start_was_lost(mcu.on_bus(), motor.output().value);
+  if (!motor.is_withdrawn() && !lost_once) mcu.bus().start_missed();
   const bool on_line = motor.is<motion::OnLine>();
   // Buses without streams miss a start for another reason than time.
   const bool may = mcu.offers.streams && (on_line || starts_.waits(id));

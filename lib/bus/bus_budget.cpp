@@ -12,11 +12,11 @@ constexpr double kFrameCost = BUSHD_FRAME_OVERHEAD + 1.0;
 constexpr double kSyncBytes = 19.0;
 constexpr double kPollEntryBytes = BUSHD_POLL_ENTRY;
 
-// The window of one whose motors all move, whether its report fills it or not.
+// The window of one whose motors all move, with the last SYNC, whether its report fills it or not.
 double report_bytes(std::uint8_t motors) {
   const auto all = static_cast<std::uint16_t>((1u << motors) - 1u);
-  const unsigned sections =
-      motors != 0 ? BUSHD_NEWS_IN_MOTION & ~BUSHD_TELLS_AUTONOMOUS : BUSHD_NEWS_AT_REST;
+  unsigned sections = BUSHD_TELLS_SYNC;
+  if (motors != 0) sections |= BUSHD_TELLS_MOTION;
   return static_cast<double>(bushd_report_size(static_cast<std::uint8_t>(sections), all));
 }
 
@@ -30,9 +30,9 @@ double bus_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
   const double polls_per_s = 1.0 / (kPollPeriodUs * 1e-6);
   double bytes_per_s = (kFrameCost + kSyncBytes) / (kSyncPeriodUs * 1e-6);
   bytes_per_s += (kFrameCost + 1.0 + kFirstWindowUs * bytes_per_us) * polls_per_s;
+  const double guard_bytes = static_cast<double>(window_guard_us(baud)) * bytes_per_us;
   for (const std::uint8_t motors : motors_per_mcu) {
-    const double report =
-        kPollEntryBytes + kFrameCost + report_bytes(motors) + kWindowGuardUs * bytes_per_us;
+    const double report = kPollEntryBytes + kFrameCost + report_bytes(motors) + guard_bytes;
     bytes_per_s += report * polls_per_s;
     if (motors == 0) continue;
     const double ticks = ticks_per_frame(motors, format, tick_ns);

@@ -13,10 +13,14 @@ inline constexpr std::int64_t kSyncPeriodUs = 500'000;
 // What one lost frame can cost: so many ticks, and so much time, half of what queues hold.
 inline constexpr unsigned kMaxTicksPerFrame = 16;
 inline constexpr std::int64_t kMaxFrameUs = 150'000;
-// From a poll's end to the first answer, and from one answer to the next: what an MCU may need to
-// begin and to let the bus go.
+// From a poll's end to the first answer: what an MCU may need to begin.
 inline constexpr std::int64_t kFirstWindowUs = 1'000;
-inline constexpr std::int64_t kWindowGuardUs = 600;
+// From one answer to the next: an answer may begin so late, its transmitter may hold the bus for a
+// byte time more, and windows begin in whole units.
+inline constexpr std::int64_t kAnswerLateUs = 500;
+constexpr std::int64_t window_guard_us(std::uint32_t baud) {
+  return kAnswerLateUs + (10'000'000 + baud - 1) / baud + BUSHD_REPLY_UNIT_NS / 1000;
+}
 
 // Ticks that a full frame of TICKS holds. Precondition: motors > 0.
 inline unsigned ticks_per_frame(unsigned motors, bushd_format format, std::uint32_t tick_ns) {

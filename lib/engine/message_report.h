@@ -110,8 +110,7 @@ enum {  // bushd_report.sections
 #define BUSHD_SECTION_BYTES(name, bit, fields) +(0u fields(BUSHD_FIELD_BYTES))
 #define BUSHD_REPORT_BASE_SIZE (0u BUSHD_REPORT_BASE(BUSHD_FIELD_BYTES))
 #define BUSHD_REPORT_MOTOR_SIZE (0u BUSHD_REPORT_MOTOR(BUSHD_FIELD_BYTES))
-// What may be new of an MCU that is online: of one at rest, of one with motors that move.
-#define BUSHD_NEWS_AT_REST BUSHD_TELLS_SYNC
+// What may be new of an MCU that is online and whose motors move.
 #define BUSHD_NEWS_IN_MOTION \
   (BUSHD_TELLS_SYNC | BUSHD_TELLS_INPUTS | BUSHD_TELLS_MOTION | BUSHD_TELLS_AUTONOMOUS)
 // The size of one that tells all.

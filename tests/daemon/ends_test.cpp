@@ -41,7 +41,7 @@ class EndsOfMoves : public testing::TestWithParam<Ends> {};
 TEST_P(EndsOfMoves, AreHeardOfByOnePoll) {
   const auto& [name, mcus, line, apart_steps] = GetParam();
   constexpr std::size_t kSync = 19;
-  const std::int64_t poll_us = hall_poll_us(mcus, answer_in_motion(1));
+  const std::int64_t poll_us = hall_poll_us(mcus, answer_at_end(1));
   const std::int64_t others_us = apart_steps != 0 && !line ? 2 * poll_us : 0;
   const std::int64_t answers_us =
       poll_us - hall_line_us(1 + static_cast<std::size_t>(mcus) * BUSHD_POLL_ENTRY);

@@ -115,6 +115,19 @@ TEST_P(LateStarts, AMoveOfOneStepBeginsAnew) {
   expect_each_edge_is_explained();
 }
 
+// A frame that is lost now and then puts no start off; what is lost again and again does.
+TEST_P(LateStarts, ALostFrameLeavesTheNextStartsAsSoonAsThisOne) {
+  if (std::string(GetParam()) == "fine_ticks") return;  // its starts are not at once
+  const auto margin_us = [this] { return lab.health_of("hall").start_margin_us; };
+  const std::int64_t before_us = margin_us();
+  loses(0.005);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {1})).result, "reached");
+  EXPECT_EQ(margin_us(), before_us);
+  loses(0.05);
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {1})).result, "reached");
+  EXPECT_GT(margin_us(), before_us);
+}
+
 TEST_P(LateStarts, AGroupBeginsAnewAtOneTick) {
   loses(0.12);
   const auto move = lab.send(Ask::kMoveTo, {"m01", "m02", "m03"}, {500, -600, 700});

@@ -86,6 +86,8 @@ class BusMaster {
   virtual void confirm_start(Tick /*at*/) {}
   // A motion has missed its start: what begins at once next gets more time.
   virtual void start_missed() {}
+  // The start that the motor has missed was told in time, as far as is known, and that was lost.
+  virtual bool start_was_lost(McuIndex /*mcu*/, std::uint8_t /*motor*/) const { return false; }
   // Time that a start by earliest_common_start leaves this program, beyond what the line and its
   // adapter take; 0: this bus has no such starts.
   virtual std::int64_t start_margin_us(std::int64_t /*now_us*/) const { return 0; }

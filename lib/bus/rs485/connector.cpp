@@ -148,7 +148,7 @@ bool Connector::send_due_identify(std::int64_t now_us) {
     identify_turn_ = i.value + 1;
     const unsigned windows = links_[i].identify_attempts++ % 2 == 0 ? 1 : kIdentifyWindows;
     const std::int64_t window_us =
-        writer_.line_us(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + fieldbus::kWindowGuardUs;
+        writer_.line_us(BUSHD_IDENTITY_SIZE + BUSHD_FRAME_OVERHEAD + 1) + writer_.window_guard_us();
     const bushd_identify identify = {
         .salt = ++salt_,
         .windows = static_cast<std::uint8_t>(windows),

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bus/address.h"
+#include "bus/bus_times.h"
 #include "engine/frame.h"
 #include "engine/message.h"
 
@@ -37,6 +38,8 @@ class FrameWriter {
 
   // How long the line takes for this many bytes.
   std::int64_t line_us(std::size_t bytes) const;
+  // From the end of the longest answer of a window to the next window.
+  std::int64_t window_guard_us() const { return fieldbus::window_guard_us(baud_); }
   // When all that was sent has left.
   std::int64_t free_us() const { return free_us_; }
   // Little enough waits for the line that the next frame may be chosen now.

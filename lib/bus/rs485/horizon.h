@@ -23,9 +23,10 @@ class Horizon {
     return clock_.tick_at(now_us) + clock_.ticks_in(kStartLeadUs + 4 * held_back_us());
   }
   // The same if one frame is enough, which the bus will have carried by `carried_us`, and this
-  // program and the driver take up to `margin_us` meanwhile. This clock lags by a part of a tick.
+  // program and the driver take up to `margin_us` meanwhile. This clock lags by a part of a tick,
+  // and by what the adapter holds back of each answer; of what is sent it holds back nothing.
   Tick earliest_at_once(std::int64_t carried_us, std::int64_t margin_us) const {
-    return first_changeable(clock_.tick_at(carried_us + margin_us + 2 * held_back_us()) + 1);
+    return first_changeable(clock_.tick_at(carried_us + margin_us + held_back_us()) + 1);
   }
   // Earliest tick from which a replacement can take effect that the bus will have carried by
   // `carried_us`. This clock lags by a part of a tick.

@@ -101,6 +101,9 @@ class Rs485Master final : public BusMaster,
                                     std::span<const ToBegin> together) const override;
   void confirm_start(Tick at) override { streams_.confirm_start(at); }
   void start_missed() override { start_margin_.missed(stepped_us_); }
+  bool start_was_lost(McuIndex mcu, std::uint8_t motor) const override {
+    return streams_.start_was_lost(mcu, motor);
+  }
   std::int64_t start_margin_us(std::int64_t now_us) const override {
     return start_margin_.margin_us(now_us);
   }

@@ -153,11 +153,13 @@ void Rs485Master::ask_at_end(std::int64_t now_us, McuIndex mcu) {
   if (!end && streams_.active(mcu) != 0) {
     for (const McuIndex i : mcus_.indices()) end = std::max(end, streams_.next_end(i));
   }
-  poller_.expect_motion(mcu, streams_.active(mcu));
   // What lies farther ahead the next report asks for.
   const Tick soon = clock().tick_at(now_us) + clock().ticks_in(2 * fieldbus::kPollPeriodUs);
-  const bool is_soon = end && *end <= soon;
-  poller_.expect_news(mcu, is_soon ? clock().begin_us(*end) + kMostDriftUs : INT64_MAX);
+  const auto known_us = [&](std::optional<Tick> tick) {
+    return tick && *tick <= soon ? clock().begin_us(*tick) + kMostDriftUs : INT64_MAX;
+  };
+  poller_.expect_motion(mcu, streams_.active(mcu), known_us(streams_.last_end(mcu)));
+  poller_.expect_news(mcu, known_us(end));
 }
 
 void Rs485Master::found(std::int64_t now_us, McuIndex) {

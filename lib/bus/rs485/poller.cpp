@@ -11,10 +11,12 @@ namespace {
 
 using fieldbus::kFirstWindowUs;
 using fieldbus::kPollPeriodUs;
-using fieldbus::kWindowGuardUs;
 
 // Nothing else is sent meanwhile; queues that have run low must not wait for longer.
 constexpr std::int64_t kMaxCycleUs = 60'000;
+// While nothing moves, answers to a routine poll take no more than so many times what each poll
+// takes besides: a start does not wait for all MCUs.
+constexpr std::int64_t kAnswersAtRest = 2;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
@@ -22,6 +24,8 @@ constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
 // have to wait until that poll is over, and for as long again.
 constexpr std::int64_t kNewsTogetherUs = 3'000;
 constexpr int kMaxMissedReplies = 10;  // about half a second
+// So many reports, 10 s, have room for inputs or counters after one that had some.
+constexpr int kLivelyReports = 200;
 // An MCU that was not asked for so long may have given the number to another report.
 constexpr std::int64_t kKnownForUs = 1'000'000;
 
@@ -36,7 +40,7 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   const std::int64_t arrives_us = arrival_us(now_us);
   bool doubtful = false;
   for (const McuIndex i : mcus_.indices()) {
-    doubtful |= mcus_[i].poll_wanted && polled_[i].missed_replies != 0;
+    doubtful |= asked_for(i) && polled_[i].missed_replies != 0;
   }
   std::vector<McuIndex> asked;
   for (const McuIndex i : mcus_.indices()) {
@@ -46,11 +50,11 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
     const bool soon =
         doubtful || has_news || (polled_[i].routine_us <= now_us + kPollPeriodUs / 2 && !waits);
     const bool along = mcus_[i].view.phase != McuPhase::kOffline && soon;
-    if (mcus_[i].poll_wanted || along) asked.push_back(i);
+    if (asked_for(i) || along) asked.push_back(i);
   }
   std::stable_sort(asked.begin(), asked.end(), [this](McuIndex a, McuIndex b) {
     const auto rank = [this](McuIndex i) {
-      return std::pair{polled_[i].missed_replies == 0, !mcus_[i].poll_wanted};
+      return std::pair{polled_[i].missed_replies == 0, !asked_for(i)};
     };
     return rank(a) < rank(b);
   });
@@ -111,9 +115,9 @@ void Poller::expect_news(McuIndex mcu, std::int64_t at_us) {
 }
 
 // Payload bytes of its report: for all, where all may be told. Otherwise for what is likely: the
-// last SYNC until that is told, then as much as inputs or counters take, and motors that plans
-// move.
-std::uint8_t Poller::room(McuIndex mcu, std::uint16_t to_move) const {
+// last SYNC until that is told, as much as inputs or counters take if there were some lately, and
+// motors that plans move. Of motors that rest by then it has no more than where they stand.
+std::uint8_t Poller::room(McuIndex mcu, std::uint16_t to_move, bool rests) const {
   const McuRecord& record = mcus_[mcu];
   const Polled& polled = polled_[mcu];
   const bushd_report& report = record.view.report;
@@ -125,8 +129,13 @@ std::uint8_t Poller::room(McuIndex mcu, std::uint16_t to_move) const {
     return static_cast<std::uint8_t>(bushd_report_size(BUSHD_NEWS_IN_MOTION, of_mcu));
   }
   const auto motors = static_cast<std::uint16_t>(polled.motors | report.moving | to_move);
-  unsigned sections = record.sync_sent ? BUSHD_TELLS_SYNC : BUSHD_TELLS_INPUTS;
-  if (motors != 0) sections |= BUSHD_TELLS_MOTION;
+  unsigned sections = 0;
+  if (record.sync_sent) {
+    sections |= BUSHD_TELLS_SYNC;
+  } else if (polled.lively_reports != 0) {
+    sections |= BUSHD_TELLS_INPUTS;
+  }
+  if (motors != 0 && !rests) sections |= BUSHD_TELLS_MOTION;
   return static_cast<std::uint8_t>(bushd_report_size(static_cast<std::uint8_t>(sections), motors));
 }
 
@@ -135,13 +144,14 @@ std::int64_t Poller::reply_us(std::size_t payload) const {
 }
 
 std::int64_t Poller::longest_cycle_us() const {
+  const std::int64_t guard_us = writer_.window_guard_us();
   std::int64_t answers_us = 0;
   std::size_t entries = 0;
   for (const McuRecord& mcu : mcus_) {
     if (mcu.view.phase == McuPhase::kOffline) continue;
     ++entries;
     const std::int64_t with_us =
-        answers_us + reply_us(BUSHD_REPORT_SIZE(mcu.view.identity.motors)) + kWindowGuardUs;
+        answers_us + reply_us(BUSHD_REPORT_SIZE(mcu.view.identity.motors)) + guard_us;
     if (answers_us == 0 || with_us <= kMaxCycleUs) answers_us = with_us;
   }
   return writer_.line_us(2 + entries * BUSHD_POLL_ENTRY + BUSHD_FRAME_OVERHEAD) + kFirstWindowUs +
@@ -158,41 +168,61 @@ std::int64_t Poller::expected_cycle_us(std::span<const ToBegin> together) const 
       if (begin.mcu == i) to_move |= begin.motors;
     }
     ++entries;
-    answers_us += reply_us(room(i, to_move)) + kWindowGuardUs;
+    answers_us += reply_us(room(i, to_move, false)) + writer_.window_guard_us();
   }
   return writer_.line_us(2 + entries * BUSHD_POLL_ENTRY + BUSHD_FRAME_OVERHEAD) + kFirstWindowUs +
          std::min(answers_us, kMaxCycleUs);
 }
 
-bool Poller::send_wanted(std::int64_t now_us) {
-  if (std::none_of(mcus_.begin(), mcus_.end(), [](const McuRecord& m) { return m.poll_wanted; })) {
-    return false;
+// Where something moves, or has news, or an MCU is not known well, all are asked by one poll.
+std::int64_t Poller::most_cycle_us(std::int64_t now_us) const {
+  const std::int64_t arrives_us = arrival_us(now_us);
+  for (const McuIndex i : mcus_.indices()) {
+    const McuRecord& mcu = mcus_[i];
+    const Polled& polled = polled_[i];
+    if (mcu.view.phase == McuPhase::kOffline) continue;
+    const bool rests = polled.motors == 0 && polled.news_us > arrives_us;
+    const bool known = mcu.view.phase == McuPhase::kOnline && mcu.known != 0;
+    if (!rests || !known || mcu.poll_wanted || polled.missed_replies != 0) return kMaxCycleUs;
   }
+  return kFirstWindowUs +
+         kAnswersAtRest * (kFirstWindowUs + transactions_.health().latency.recent_us);
+}
+
+bool Poller::send_wanted(std::int64_t now_us) {
+  const auto wanted = [](const McuRecord& mcu) { return mcu.poll_wanted; };
+  return std::ranges::any_of(mcus_, wanted) && send(now_us);
+}
+
+bool Poller::send(std::int64_t now_us) {
   forget_old(now_us);
+  const std::int64_t most_us = most_cycle_us(now_us);
   std::vector<bushd_poll_entry> entries;
   std::vector<Transactions::ReplyWindow> windows;
+  const std::int64_t guard_us = writer_.window_guard_us();
+  const std::int64_t arrives_us = arrival_us(now_us);
   std::int64_t begin_us = kFirstWindowUs;
   for (const McuIndex i : choose(now_us)) {
     const McuRecord& mcu = mcus_[i];
-    const std::uint8_t most = room(i, 0);
+    const std::uint8_t most = room(i, 0, polled_[i].rest_us <= arrives_us);
     const std::int64_t end_us = begin_us + reply_us(most);
-    const bool full = entries.size() == BUSHD_POLL_MAX_ENTRIES || end_us > kMaxCycleUs;
+    const bool full = entries.size() == BUSHD_POLL_MAX_ENTRIES || end_us > most_us;
     if (full && !entries.empty()) break;
     const auto units = static_cast<std::uint16_t>((begin_us + kUnitUs - 1) / kUnitUs);
     entries.push_back({mcu.setup.address.value, units, mcu.known, most});
     windows.push_back({.mcu = i, .address = mcu.setup.address, .end_us = end_us, .payload = most});
-    begin_us = end_us + kWindowGuardUs;
+    begin_us = end_us + guard_us;
   }
   std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
   const std::size_t size =
       bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data());
-  transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, windows, kWindowGuardUs);
+  transactions_.ask_all(now_us, BUSHD_MSG_POLL, {payload.data(), size}, windows, guard_us);
   extra_sent_us_.reset();
-  const std::int64_t arrives_us = arrival_us(now_us);
   bool extra = false;
   for (const Transactions::ReplyWindow& window : windows) {
     mcus_[window.mcu].poll_wanted = false;
     Polled& polled = polled_[window.mcu];
+    polled.due = false;
     polled.routine_us = now_us + kPollPeriodUs;
     if (polled.news_us > arrives_us) continue;
     expect_news(window.mcu, INT64_MAX);
@@ -211,9 +241,9 @@ bool Poller::send_due(std::int64_t now_us) {
   bool due = false;
   for (const McuIndex i : mcus_.indices()) {
     if (mcus_[i].view.phase == McuPhase::kOffline || due_us(i) > now_us) continue;
-    mcus_[i].poll_wanted = due = true;
+    polled_[i].due = due = true;
   }
-  return due && send_wanted(now_us);
+  return due && send(now_us);
 }
 
 // Mostly all have answered, so that it took less than was set aside for it.
@@ -234,7 +264,12 @@ bool Poller::missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
 void Poller::follow_report(std::int64_t now_us, McuIndex mcu) {
   polled_[mcu].reported_us = now_us;
   polled_[mcu].has_more = false;
-  polled_[mcu].counters.follow(mcus_[mcu].view.report, mcus_[mcu].health);
+  const bushd_report& report = mcus_[mcu].view.report;
+  constexpr unsigned kEvents = BUSHD_TELLS_INPUTS | BUSHD_TELLS_COUNTERS;
+  const bool events = (report.sections & kEvents) != 0 && !bushd_report_is_whole(&report);
+  int& lively = polled_[mcu].lively_reports;
+  lively = events ? kLivelyReports : std::max(lively - 1, 0);
+  polled_[mcu].counters.follow(report, mcus_[mcu].health);
 }
 
 bool Poller::no_room(McuIndex mcu) {
@@ -245,8 +280,8 @@ bool Poller::no_room(McuIndex mcu) {
 
 void Poller::went_offline(McuIndex mcu) {
   polled_[mcu].missed_replies = 0;
-  polled_[mcu].has_more = false;
-  polled_[mcu].motors = 0;
+  polled_[mcu].has_more = polled_[mcu].due = false;
+  expect_motion(mcu, 0, INT64_MAX);
   mcus_[mcu].known = 0;
   expect_news(mcu, INT64_MAX);
   mcus_[mcu].poll_wanted = mcus_[mcu].answered = false;

@@ -37,8 +37,12 @@ class Poller {
   // poll. Such extra polls take at most half of the time, so they may come later; no routine poll
   // does.
   void expect_news(McuIndex mcu, std::int64_t at_us);
-  // Until told otherwise these motors of it move, or are to.
-  void expect_motion(McuIndex mcu, std::uint16_t motors) { polled_[mcu].motors = motors; }
+  // Until told otherwise these motors of it move, or are to. By plan all of them rest from
+  // `rest_us` on, INT64_MAX: none knows when.
+  void expect_motion(McuIndex mcu, std::uint16_t motors, std::int64_t rest_us) {
+    polled_[mcu].motors = motors;
+    polled_[mcu].rest_us = rest_us;
+  }
   // When the MCU's turn comes. Precondition: it is not offline.
   std::int64_t due_us(McuIndex mcu) const;
 
@@ -61,17 +65,23 @@ class Poller {
     int missed_replies = 0;            // requests in a row without an answer
     std::int64_t reported_us = 0;      // the last report
     std::uint16_t motors = 0;          // expect_motion
-    bool has_more = false;             // no_room
+    std::int64_t rest_us = INT64_MAX;
+    bool has_more = false;   // no_room
+    bool due = false;        // its turn has come
+    int lively_reports = 0;  // so many may have inputs or counters, as one had lately
     ReportedCounters counters;
   };
 
+  bool asked_for(McuIndex mcu) const { return mcus_[mcu].poll_wanted || polled_[mcu].due; }
   std::vector<McuIndex> choose(std::int64_t now_us) const;
+  bool send(std::int64_t now_us);
+  std::int64_t most_cycle_us(std::int64_t now_us) const;
   void forget_old(std::int64_t now_us);
   std::int64_t news_due_us(McuIndex mcu) const;
   std::int64_t poll_frame_us(std::size_t entries) const;
   std::int64_t arrival_us(std::int64_t now_us) const;
   std::int64_t routine_due_us(McuIndex mcu) const;
-  std::uint8_t room(McuIndex mcu, std::uint16_t to_move) const;
+  std::uint8_t room(McuIndex mcu, std::uint16_t to_move, bool rests) const;
   std::int64_t reply_us(std::size_t payload) const;
 
   PerMcu<McuRecord>& mcus_;

@@ -286,6 +286,7 @@ void StreamScheduler::send_ticks(std::int64_t now_us, McuIndex index, std::uint1
 
 void StreamScheduler::note_sent(McuIndex index, std::uint8_t motor, Tick first, Tick until) {
   Stream& stream = mcus_[index].stream[motor];
+  if (!stream.told) stream.refused_before = records_[index].view.report.rejected_frames;
   stream.told = true;
   if (first < stream.sent) ++records_[index].health.repeats;
   stream.next = until;

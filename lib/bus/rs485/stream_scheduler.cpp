@@ -107,6 +107,14 @@ std::optional<Tick> StreamScheduler::next_end(McuIndex mcu) const {
   return next;
 }
 
+std::optional<Tick> StreamScheduler::last_end(McuIndex mcu) const {
+  std::optional<Tick> last;
+  for (std::uint8_t motor = 0; motor < BUSHD_MOTORS_PER_MCU; ++motor) {
+    if (mcus_[mcu].stream[motor].active) last = std::max(last, {source_.end_tick(mcu, motor)});
+  }
+  return last;
+}
+
 // A start waits for the replacement before it to be confirmed: if that was not taken, neither would
 // the start be, and a replacement of the start would not be taken either.
 std::optional<Tick> StreamScheduler::Mcu::next_tick() const {

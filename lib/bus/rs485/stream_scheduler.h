@@ -122,11 +122,15 @@ class StreamScheduler {
   // The first tick of this motor that has not been sent.
   Tick next_tick(McuIndex mcu, std::uint8_t motor) const { return mcus_[mcu].stream[motor].next; }
   bool has_ticks_to_send(McuIndex mcu) const;
+  // Its motion was told and has missed its start, and the MCU has refused nothing since.
+  bool start_was_lost(McuIndex mcu, std::uint8_t motor) const;
   // Its motors that have a stream or a run.
   std::uint16_t active(McuIndex mcu) const;
   // The next tick, after that of its report, at which a motor of this MCU comes to rest by its
   // plan.
   std::optional<Tick> next_end(McuIndex mcu) const;
+  // The tick from which on none of them moves by its plan; none: none is active.
+  std::optional<Tick> last_end(McuIndex mcu) const;
   // An MCU makes the run of a line, or is to.
   bool runs_line() const;
   bool has_replacement_to_send(McuIndex mcu) const { return mcus_[mcu].replacing != 0; }
@@ -151,6 +155,8 @@ class StreamScheduler {
     bool finished = false;  // all is sent; until dropped it may still be repeated or replaced
     bool told = false;      // something of it has been sent
     bool taken = false;     // its MCU has had all that was sent when it was asked
+    // What its MCU had refused when it was first told.
+    std::uint16_t refused_before = 0;
     Tick start = 0;
     // First tick that the MCU gets of it: the start, or that of a replacement before it, which
     // leads up to the start. What follows one is no start, wherever it ends.

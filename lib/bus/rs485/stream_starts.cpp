@@ -146,6 +146,12 @@ void StreamScheduler::fail_late_starts(std::int64_t now_us) {
   }
 }
 
+bool StreamScheduler::start_was_lost(McuIndex mcu, std::uint8_t motor) const {
+  const Stream& stream = mcus_[mcu].stream[motor];
+  const std::uint16_t refused = records_[mcu].view.report.rejected_frames;
+  return stream.told && refused == stream.refused_before && refused != UINT16_MAX;
+}
+
 // A motion that was cancelled before its start misses nothing. The MCU has refused what was sent
 // behind the start.
 void StreamScheduler::miss_start(McuIndex index, std::uint8_t motor) {

@@ -42,7 +42,7 @@ TEST(BusBudget, IsACloseUpperBoundOfWhatIsSent) {
         bus.run_for(10'000'000);
         const auto bytes = static_cast<double>(bus.master_bytes - before) + bytes_of_windows(bus);
         // Twenty times a second the line is quiet before each answer.
-        const double quiet_s = 20 * (1e-3 + slaves * 0.6e-3);
+        const double quiet_s = 20 * (1e-3 + slaves * 0.53e-3);
         const double sent = bytes * 10 / FakeBus::kBaud / 10.0 + quiet_s;
         const std::vector<std::uint8_t> all(bus.slaves.size(), static_cast<std::uint8_t>(motors));
         const double budget = fieldbus::bus_load(FakeBus::kBaud, FakeBus::kTickNs, format, all);

@@ -214,6 +214,7 @@ TEST_P(Tables, AStartThatWouldComeTooLateIsNotSent) {
   bus.master->begin_table_run(McuIndex{0}, 1, start, {40});
   bus.run_for(1'000);
   EXPECT_EQ(bus.count<link::StartMissed>(), 1);
+  EXPECT_FALSE(bus.master->start_was_lost(McuIndex{0}, 1)) << "nothing was told";
   bus.run_for(500'000);
   EXPECT_EQ(bus.count<link::StartMissed>(), 1);
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_RUN).size(), 0u);
@@ -246,6 +247,22 @@ TEST_P(Tables, WholeMoveThatIsTooLateIsTold) {
   bus.slaves[0].loses = [](const Heard& h) { return h.type == BUSHD_MSG_TABLE_RUN; };
   start(1, 2000, true);
   ASSERT_TRUE(bus.run_until([&] { return bus.count<link::StartMissed>() > 0; }, 1'000'000));
+}
+
+TEST_P(Tables, AStartThatIsLostIsToldFromOneThatIsRefused) {
+  bool refuses = false;
+  bus.slaves[0].loses = [&](const Heard& h) {
+    if (h.type != BUSHD_MSG_TABLE_RUN) return false;
+    if (refuses) ++bus.slaves[0].rejected;  // as it does what comes too late
+    return true;
+  };
+  start(1, 2000, true);
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::StartMissed>() == 1; }, 1'000'000));
+  EXPECT_TRUE(bus.master->start_was_lost(McuIndex{0}, 1));
+  refuses = true;
+  start(1, 2000, true);
+  ASSERT_TRUE(bus.run_until([&] { return bus.count<link::StartMissed>() == 2; }, 1'000'000));
+  EXPECT_FALSE(bus.master->start_was_lost(McuIndex{0}, 1));
 }
 
 TEST_P(Tables, StopOfAWholeMoveGoesOnAsAStream) {
