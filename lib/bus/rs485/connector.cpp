@@ -169,6 +169,23 @@ bool Connector::send_due_identify(std::int64_t now_us) {
   return false;
 }
 
+void Connector::want_report(McuIndex mcu, bool wanted) {
+  const bool connects = mcus_[mcu].view.phase == McuPhase::kConnecting;
+  links_[mcu].report_wanted = wanted && connects;
+  mcus_[mcu].poll_wanted = wanted && !connects;
+}
+
+void Connector::ask_for_reports() {
+  for (const McuIndex i : mcus_.indices()) {
+    const Link& link = links_[i];
+    const bool connects = mcus_[i].view.phase == McuPhase::kConnecting;
+    if (connects && (!link.queue.empty() || link.program.wants_state())) return;
+  }
+  for (const McuIndex i : mcus_.indices()) {
+    mcus_[i].poll_wanted |= std::exchange(links_[i].report_wanted, false);
+  }
+}
+
 bool Connector::send_stop(std::int64_t now_us) {
   for (const McuIndex i : mcus_.indices()) {
     const McuView& view = mcus_[i].view;
@@ -369,7 +386,7 @@ void Connector::acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t typ
     return links_[mcu].scratch.acknowledged(type, status);
   }
   links_[mcu].queue.done(type);
-  record.poll_wanted = links_[mcu].queue.empty();
+  want_report(mcu, links_[mcu].queue.empty());
   record.answered = true;
   if (status == BUSHD_OK) return;
   if (record.view.phase == McuPhase::kOnline || !SetupQueue::may_be_setup(type)) {
@@ -444,6 +461,7 @@ void Connector::give_up(McuIndex mcu, const std::string& cause, std::int64_t ret
   view.detail = cause;
   links_[mcu].retry_due_us = retry_due_us;
   links_[mcu].identify_attempts = 0;
+  links_[mcu].report_wanted = false;
   links_[mcu].queue.clear();
   links_[mcu].scratch.clear();
   links_[mcu].program.clear();

@@ -73,6 +73,9 @@ class Connector {
   bool send_stop(std::int64_t now_us);
   // An order that takes motion away from a program.
   bool send_program_stop(std::int64_t now_us);
+  // MCUs that connect are asked for their reports together, when all requests to them have been
+  // answered. (A routine poll asks them meanwhile.)
+  void ask_for_reports();
   // By turns: one that does not answer its request keeps nobody else waiting.
   bool send_request(std::int64_t now_us);
   // When the next MCU is to be looked for. Precondition: it is offline.
@@ -114,6 +117,7 @@ class Connector {
     // While connecting: its program has another configuration, and has not ended.
     bool left_alone = false;
     bool setup_written = false;  // while connecting: into the queue
+    bool report_wanted = false;  // while connecting: ask_for_reports
     bool was_online = false;     // while it gets another setup: nobody was told otherwise
     // EN as wanted; empty until the first report tells how the MCU was found. Drivers that somebody
     // switched off stay off through restarts and lost links: there may be hands in the mechanism.
@@ -144,6 +148,8 @@ class Connector {
   void add_control(McuIndex mcu, std::uint8_t actions);
   void note_power(McuIndex mcu);
   void tell_local(McuIndex mcu);
+  // A request of it has been answered: whether nothing else is to be asked before its report.
+  void want_report(McuIndex mcu, bool wanted);
 
   // connector_program.cpp
   void ask_for_program(McuIndex mcu);

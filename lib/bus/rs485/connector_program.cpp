@@ -138,7 +138,7 @@ void Connector::end_late_runs(Tick now, Tick margin) {
 
 void Connector::program_told(std::int64_t now_us, McuIndex mcu, const bushd_program_state& state) {
   links_[mcu].program.told(now_us, state);
-  mcus_[mcu].poll_wanted |= mcus_[mcu].view.phase == McuPhase::kConnecting;
+  if (mcus_[mcu].view.phase == McuPhase::kConnecting) want_report(mcu, true);
   listener_.program_reported(mcu);
 }
 

@@ -124,6 +124,7 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   if (clock().valid()) {
     connector_.end_late_runs(clock().tick_at(now_us), clock().ticks_in(kRunConfirmedUs));
   }
+  connector_.ask_for_reports();
   // Nobody should be talking any more, and an answer that is late all the same may be lost.
   if (transactions_.open() && now_us >= transactions_.quiet_us()) {
     emergency_.send_due(now_us);
