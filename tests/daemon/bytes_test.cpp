@@ -1,6 +1,8 @@
 // Bytes on the bus for each step of a move, by the way it is sent: what the daemon's core hands
-// over for it, the delimiters that take the line included, polls and SYNCs not. The shipped table
-// bushd2-constant, ticks of 2.56 ms, one motor on a line that loses nothing.
+// over for it, the delimiters that take the line included, polls and SYNCs not. Beside it all bytes
+// of the line in both directions until the result, to which the time of the move adds polls and
+// SYNCs. The shipped table bushd2-constant, ticks of 2.56 ms, one motor on a line that loses
+// nothing.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -30,33 +32,41 @@ constexpr ByteWay kWays[] = {
     {.name = "TICKS fine", .manner = "fine_ticks", .steps = 20000, .goal = 0},
 };
 
-MotionFrames sent_for(const ByteWay& way) {
+struct Carried {
+  MotionFrames motion;
+  std::int64_t all_bytes = 0;
+};
+
+Carried carried_for(const ByteWay& way) {
   Lab lab(hall(1, 1, way.manner));
   lab.connect();
-  MotionFrames sent;
-  lab.on_send = [&sent](std::size_t, const std::vector<std::uint8_t>& bytes) {
-    sent.add(bytes);
+  Carried carried;
+  lab.on_send = [&carried](std::size_t, const std::vector<std::uint8_t>& bytes) {
+    carried.motion.add(bytes);
+    carried.all_bytes += static_cast<std::int64_t>(bytes.size());
     return true;
   };
+  lab.on_receive = [&carried](std::size_t, std::uint8_t&) { ++carried.all_bytes; };
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {way.steps})).result, "reached");
-  return sent;
+  return carried;
 }
 
 TEST(Bytes, PerStepKeepTheirGoals) {
-  std::printf("%-12s %8s %8s %8s %12s %8s\n", "way", "steps", "frames", "bytes", "bytes/step",
-              "goal");
+  std::printf("%-12s %8s %8s %8s %12s %8s %10s\n", "way", "steps", "frames", "bytes", "bytes/step",
+              "goal", "all/step");
   for (const ByteWay& way : kWays) {
     SCOPED_TRACE(way.name);
-    const MotionFrames sent = sent_for(way);
+    const auto& [sent, all_bytes] = carried_for(way);
     const std::int64_t bytes = sent.bytes + sent.delimiters;
     const double cost = static_cast<double>(bytes) / static_cast<double>(way.steps);
     std::printf("%-12s %8lld %8lld %8lld %12.4f", way.name, static_cast<long long>(way.steps),
                 static_cast<long long>(sent.frames), static_cast<long long>(bytes), cost);
+    const double all = static_cast<double>(all_bytes) / static_cast<double>(way.steps);
     if (way.goal == 0) {
-      std::printf("\n");
+      std::printf(" %8s %10.4f\n", "", all);
       continue;
     }
-    std::printf(" %8.2f\n", way.goal);
+    std::printf(" %8.2f %10.4f\n", way.goal, all);
     EXPECT_LE(cost, way.goal);
     if (way.most_frames != 0) {
       EXPECT_LE(sent.frames, way.most_frames);
