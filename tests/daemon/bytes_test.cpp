@@ -22,10 +22,12 @@ struct ByteWay {
 };
 
 constexpr ByteWay kWays[] = {
-    {.name = "TABLE_RUN", .manner = "fine_table", .steps = 200, .goal = 0.2, .most_frames = 1},
+    {.name = "TABLE_RUN", .manner = "fine_table", .steps = 200, .goal = 0.15, .most_frames = 1},
     {.name = "TABLE_TICKS", .manner = "fine", .steps = 200, .goal = 0.25, .most_frames = 1},
     {.name = "TICKS coarse", .manner = "coarse_ticks", .steps = 200, .goal = 0},
     {.name = "TICKS fine", .manner = "fine_ticks", .steps = 200, .goal = 0},
+    {.name = "TABLE_RUN", .manner = "fine_table", .steps = 2000, .goal = 0.03, .most_frames = 1},
+    {.name = "TABLE_TICKS", .manner = "fine", .steps = 2000, .goal = 0},
     {.name = "TABLE_RUN", .manner = "fine_table", .steps = 20000, .goal = 0.01, .most_frames = 1},
     {.name = "TABLE_TICKS", .manner = "fine", .steps = 20000, .goal = 0.03},
     {.name = "TICKS coarse", .manner = "coarse_ticks", .steps = 20000, .goal = 0},

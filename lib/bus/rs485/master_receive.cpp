@@ -13,6 +13,13 @@ bool decoded(const Transactions::Answer& answer,
   return decode(answer.payload.data(), answer.payload.size(), message) == BUSHD_OK;
 }
 
+// Together with the report of this number, 0: with none. One with news alone has the number after
+// that: otherwise it answers somebody else, by chance under the same sequence number.
+bool follows(std::uint8_t known, const bushd_report& report) {
+  if (bushd_report_is_whole(&report)) return true;
+  return known != 0 && report.number == known % UINT8_MAX + 1;
+}
+
 // The ticks from which an MCU has no data, unwrapped. Never before the present tick, whatever the
 // line says: ticks executed cannot be asked for again.
 void unwrap_known_until(McuView& view) {
@@ -41,7 +48,7 @@ bool Rs485Master::answered(std::int64_t now_us, const Transactions::Answer& answ
       if (!decoded(answer, bushd_decode_report, &report)) return false;
       const bool restarted = report.boot_number != mcu.view.identity.boot_number;
       if (report.number == 0 && !restarted) return poller_.no_room(answer.mcu);
-      if (mcu.known == 0 && !restarted && !bushd_report_is_whole(&report)) return false;
+      if (!restarted && !follows(mcu.known, report)) return false;
       handle_report(now_us, answer, report);
       return true;
     }

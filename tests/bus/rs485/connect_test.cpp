@@ -530,6 +530,42 @@ TEST(Connect, StrangeAnswersAreNotTaken) {
   EXPECT_TRUE(bus.online());
 }
 
+// Two masters may have used the same sequence number. What is new to the other one is not all that
+// is new to this one.
+TEST(Connect, NewsForAnotherMasterAreNotTaken) {
+  FakeBus bus;
+  bus.connect();
+  const bushd_report& told = bus.master->view(McuIndex{0}).report;
+  const auto answers = [&](unsigned number) {
+    bushd_report news = told;
+    news.number = static_cast<std::uint8_t>(number % 255 + 1);
+    news.sections = 0;
+    news.motors = 1;
+    news.motor[0].position_steps = 99;
+    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+    payload.resize(bushd_encode_report(&news, payload.data()));
+    for (unsigned sequence = 0; sequence < 256; ++sequence) {
+      Bytes wire(BUSHD_FRAME_MAX_WIRE);
+      wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
+                                     static_cast<std::uint8_t>(sequence), payload.data(),
+                                     payload.size(), wire.data()));
+      bus.master->receive(bus.now_us, wire);
+    }
+  };
+  bus.slaves[0].loses = [](const Heard& h) { return h.type == BUSHD_MSG_POLL; };
+  const auto asked = [&] {
+    bus.heard.clear();
+    return bus.run_until([&] { return !bus.heard_of(BUSHD_MSG_POLL).empty(); });
+  };
+  const unsigned known = told.number;
+  ASSERT_TRUE(asked());
+  answers(known + 1);
+  EXPECT_NE(told.motor[0].position_steps, 99);
+  ASSERT_TRUE(asked());
+  answers(known);
+  EXPECT_EQ(told.motor[0].position_steps, 99) << "of one that is its own";
+}
+
 TEST(Connect, ControlAndPositionAreAskedForOnceAndSeen) {
   FakeBus bus;
   bus.connect();
