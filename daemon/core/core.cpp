@@ -42,8 +42,9 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
           installation_, pseudo_axes_, open_moves_,
           [this](McuId mcu) { return programs_.text(mcu); }, outputs),
       line_tables_(installation_, lines_),
+      line_room_(installation_),
       waiting_requests_(
-          installation_, interlocks_, open_moves_, kept_, idle_drivers_, line_tables_,
+          installation_, interlocks_, open_moves_, kept_, idle_drivers_, line_tables_, line_room_,
           [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
             carry_out(now_us, asker, request);
           },

@@ -140,6 +140,7 @@ class Core {
   PseudoAxes pseudo_axes_;
   StatePublisher state_;
   LineTables line_tables_;
+  LineRoom line_room_;
   WaitingRequests waiting_requests_;
   HealthPublisher health_;
   MotorSettings settings_;

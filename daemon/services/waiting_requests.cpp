@@ -72,6 +72,8 @@ bool WaitingRequests::is_refused_anyway(const api::Request& request,
 }
 
 Result<bool> WaitingRequests::make_ready(std::int64_t now_us, Held& held) {
+  const auto room = line_room_.has_room(held.request, held.motors);
+  if (!room || !*room) return room;
   bool ready = true;
   const bool moves = !std::holds_alternative<api::SetPosition>(held.request);
   for (const MotorId motor : held.motors) {
@@ -87,13 +89,15 @@ Result<bool> WaitingRequests::make_ready(std::int64_t now_us, Held& held) {
 
 bool WaitingRequests::hold(std::int64_t now_us, const api::Asker& asker,
                            const api::Request& request) {
-  const bool may_wait = kept_.keeps() || !idle_drivers_.none() || LineTables::concerns(request);
+  const bool may_wait = kept_.keeps() || !idle_drivers_.none() || LineTables::concerns(request) ||
+                        line_room_.concerns_any();
   if (!may_wait && held_.empty()) return false;
   auto motors = motors_of(request);
   if (!motors || is_refused_anyway(request, *motors)) return false;
   Held held{.asker = asker, .request = request, .motors = std::move(*motors), .since_us = now_us};
   if (held_.size() >= kMostHeld) {
-    asker.answer(api::Refused{"too many requests wait for the disk; try again in a moment"});
+    asker.answer(
+        api::Refused{"too many requests wait for the disk or the line; try again in a moment"});
     return true;
   }
   // What comes later for a motor is carried out later.

@@ -2,7 +2,8 @@
 //
 // A request waits until the disk knows that its motors are no longer at rest, until their positions
 // are restored, and until their drivers are enabled. A line also waits until its MCUs have the
-// table. Most requests wait a millisecond or two, many not at all.
+// table, and what is streamed may wait for room on the line. Most requests wait a millisecond or
+// two, many not at all.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +17,7 @@
 #include "daemon/model/service.h"
 #include "daemon/services/idle_drivers.h"
 #include "daemon/services/kept_positions.h"
+#include "daemon/services/line_room.h"
 #include "daemon/services/line_tables.h"
 #include "daemon/services/open_moves.h"
 
@@ -28,14 +30,15 @@ class WaitingRequests final : public Service {
   // `would_take`: whether the request would be taken as things stand, as far as that is known.
   WaitingRequests(const Installation& installation, const Interlocks& interlocks,
                   const OpenMoves& open_moves, KeptPositions& kept, IdleDrivers& idle_drivers,
-                  LineTables& line_tables, CarryOut carry_out, std::function<bool()> busy,
-                  std::function<bool(const api::Request&)> would_take)
+                  LineTables& line_tables, const LineRoom& line_room, CarryOut carry_out,
+                  std::function<bool()> busy, std::function<bool(const api::Request&)> would_take)
       : installation_(installation),
         interlocks_(interlocks),
         open_moves_(open_moves),
         kept_(kept),
         idle_drivers_(idle_drivers),
         line_tables_(line_tables),
+        line_room_(line_room),
         carry_out_(std::move(carry_out)),
         busy_(std::move(busy)),
         would_take_(std::move(would_take)) {}
@@ -76,6 +79,7 @@ class WaitingRequests final : public Service {
   KeptPositions& kept_;
   IdleDrivers& idle_drivers_;
   LineTables& line_tables_;
+  const LineRoom& line_room_;
   CarryOut carry_out_;
   std::function<bool()> busy_;
   std::function<bool(const api::Request&)> would_take_;

@@ -1,6 +1,7 @@
 #include "bus/bus_budget.h"
 
 #include <algorithm>
+#include <vector>
 
 #include "bus/bus_times.h"
 
@@ -11,6 +12,9 @@ namespace {
 constexpr double kFrameCost = BUSHD_FRAME_OVERHEAD + 1.0;
 constexpr double kSyncBytes = 19.0;
 constexpr double kPollEntryBytes = BUSHD_POLL_ENTRY;
+// A frame of states holds 300 ms of a run, or the part of it that one state tells: a third of that
+// is what motors at the edges of their ramps may need.
+constexpr double kStatesPeriodS = 0.1;
 
 // The window of one whose motors all move, with the last SYNC, whether its report fills it or not.
 double report_bytes(std::uint8_t motors) {
@@ -22,25 +26,43 @@ double report_bytes(std::uint8_t motors) {
 
 }  // namespace
 
-double bus_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
-                std::span<const std::uint8_t> motors_per_mcu) {
-  const double tick_s = tick_ns * 1e-9;
-  const bool fine = format == BUSHD_FORMAT_FINE;
+double poll_load(std::uint32_t baud, std::span<const std::uint8_t> motors_per_mcu) {
   const double bytes_per_us = baud / 10.0 * 1e-6;
   const double polls_per_s = 1.0 / (kPollPeriodUs * 1e-6);
+  const double guard_bytes = static_cast<double>(window_guard_us(baud)) * bytes_per_us;
   double bytes_per_s = (kFrameCost + kSyncBytes) / (kSyncPeriodUs * 1e-6);
   bytes_per_s += (kFrameCost + 1.0 + kFirstWindowUs * bytes_per_us) * polls_per_s;
-  const double guard_bytes = static_cast<double>(window_guard_us(baud)) * bytes_per_us;
   for (const std::uint8_t motors : motors_per_mcu) {
-    const double report = kPollEntryBytes + kFrameCost + report_bytes(motors) + guard_bytes;
-    bytes_per_s += report * polls_per_s;
-    if (motors == 0) continue;
-    const double ticks = ticks_per_frame(motors, format, tick_ns);
-    const double frame =
-        kFrameCost + BUSHD_TICKS_HEADER + 2.0 * motors + ticks * motors * (fine ? 2.0 : 1.0);
-    bytes_per_s += frame / (ticks * tick_s);
+    bytes_per_s +=
+        (kPollEntryBytes + kFrameCost + report_bytes(motors) + guard_bytes) * polls_per_s;
   }
   return bytes_per_s * 10.0 / baud;
+}
+
+double stream_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
+                   std::span<const Streamed> mcus) {
+  const bool fine = format == BUSHD_FORMAT_FINE;
+  double bytes_per_s = 0;
+  for (const auto& [by_ticks, by_states] : mcus) {
+    if (by_ticks != 0) {
+      const double ticks = ticks_per_frame(by_ticks, format, tick_ns);
+      const double frame =
+          kFrameCost + BUSHD_TICKS_HEADER + 2.0 * by_ticks + ticks * by_ticks * (fine ? 2.0 : 1.0);
+      bytes_per_s += frame / (ticks * tick_ns * 1e-9);
+    }
+    const int frames = (by_states + kMotorsPerStates - 1) / kMotorsPerStates;
+    bytes_per_s += (frames * (kFrameCost + BUSHD_TABLE_TICKS_HEADER) +
+                    by_states * double{BUSHD_TABLE_TICKS_MAX_ENTRY}) /
+                   kStatesPeriodS;
+  }
+  return bytes_per_s * 10.0 / baud;
+}
+
+double bus_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
+                std::span<const std::uint8_t> motors_per_mcu) {
+  std::vector<Streamed> all;
+  for (const std::uint8_t motors : motors_per_mcu) all.push_back({.by_ticks = motors});
+  return poll_load(baud, motors_per_mcu) + stream_load(baud, tick_ns, format, all);
 }
 
 }  // namespace bushd::fieldbus

@@ -22,6 +22,10 @@ constexpr std::int64_t window_guard_us(std::uint32_t baud) {
   return kAnswerLateUs + (10'000'000 + baud - 1) / baud + BUSHD_REPLY_UNIT_NS / 1000;
 }
 
+// So many states of runs always fit into one frame.
+inline constexpr int kMotorsPerStates =
+    (BUSHD_FRAME_MAX_PAYLOAD - BUSHD_TABLE_TICKS_HEADER) / BUSHD_TABLE_TICKS_MAX_ENTRY;
+
 // Ticks that a full frame of TICKS holds. Precondition: motors > 0.
 inline unsigned ticks_per_frame(unsigned motors, bushd_format format, std::uint32_t tick_ns) {
   const auto in_time = static_cast<unsigned>(kMaxFrameUs * 1000 / tick_ns);

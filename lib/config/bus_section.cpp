@@ -32,7 +32,7 @@ Result<std::uint32_t> read_baud(const TomlReader& reader) {
 // Reads the keys of a bus of kind "rs485".
 Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
   if (auto known = reader.only({"name", "kind", "port", "baud", "tick_us", "format", "moves",
-                                "frames", "emergency_stop"});
+                                "frames", "streams", "emergency_stop"});
       !known) {
     return known;
   }
@@ -87,6 +87,12 @@ Result<void> read_manners(const TomlReader& reader, Bus* bus) {
     const auto moves = read_word(reader, "moves", {"stream", "table"});
     if (!moves) return fail(moves.error());
     bus->table_runs = *moves == 1;
+  }
+  bus->streams = bus->table_runs ? Streams::kRefuse : Streams::kFit;
+  if (reader.has("streams")) {
+    const auto streams = read_word(reader, "streams", {"fit", "refuse", "queue"});
+    if (!streams) return fail(streams.error());
+    bus->streams = static_cast<Streams>(*streams);
   }
   if (reader.has("frames")) {
     const auto frames = read_word(reader, "frames", {"auto", "ticks"});

@@ -233,10 +233,17 @@ Result<void> check_table_banks(const Loading& loading) {
   return {};
 }
 
+// What the line has to carry whatever happens.
+double load_of(const Bus& bus, std::uint32_t baud, std::uint32_t tick_ns, bushd_format format,
+               std::span<const std::uint8_t> motors) {
+  return bus.streams == Streams::kFit ? fieldbus::bus_load(baud, tick_ns, format, motors)
+                                      : fieldbus::poll_load(baud, motors);
+}
+
 // What would help, by itself: the lowest faster rate, the shortest longer tick.
 std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
   const auto fits = [&](std::uint32_t baud, std::uint32_t tick_us) {
-    return fieldbus::bus_load(baud, tick_us * 1000u, bus.format, motors) <= fieldbus::kMaxBusLoad;
+    return load_of(bus, baud, tick_us * 1000u, bus.format, motors) <= fieldbus::kMaxBusLoad;
   };
   std::string remedy;
   for (const std::uint32_t baud : kBaudRates) {
@@ -254,9 +261,12 @@ std::string line_remedy(const Bus& bus, std::span<const std::uint8_t> motors) {
     remedy += fmt::format("{}tick_us = {} or more", remedy.empty() ? "" : ", or ", high);
   }
   if (bus.format == BUSHD_FORMAT_FINE &&
-      fieldbus::bus_load(bus.baud, bus.tick_ns(), BUSHD_FORMAT_COARSE, motors) <=
-          fieldbus::kMaxBusLoad) {
+      load_of(bus, bus.baud, bus.tick_ns(), BUSHD_FORMAT_COARSE, motors) <= fieldbus::kMaxBusLoad) {
     remedy += fmt::format("{}format = \"coarse\"", remedy.empty() ? "" : ", or ");
+  }
+  if (bus.streams == Streams::kFit &&
+      fieldbus::poll_load(bus.baud, motors) <= fieldbus::kMaxBusLoad) {
+    remedy += fmt::format("{}streams = \"refuse\" or \"queue\"", remedy.empty() ? "" : ", or ");
   }
   return remedy.empty() ? "Spread the MCUs over more buses" : "Use " + remedy;
 }
@@ -272,14 +282,15 @@ Result<void> check_line(const Loading& loading, std::size_t index) {
         std::count_if(config.motors.begin(), config.motors.end(),
                       [&](const Motor& motor) { return motor.mcu == McuId{i}; })));
   }
-  const double load = fieldbus::bus_load(bus.baud, bus.tick_ns(), bus.format, motors);
+  const double load = load_of(bus, bus.baud, bus.tick_ns(), bus.format, motors);
   if (load <= fieldbus::kMaxBusLoad) return {};
+  const bool of_ticks = bus.streams == Streams::kFit;
   return fail(loading.buses[index].error(
-      "tick_us",
-      fmt::format("is {}: ticks, polls and sync would take {:.1f} % of the bus at {} baud; "
-                  "allowed: {:.0f} %. {}",
-                  bus.tick_us, load * 100, bus.baud, fieldbus::kMaxBusLoad * 100,
-                  line_remedy(bus, motors))));
+      of_ticks ? "tick_us" : "baud",
+      fmt::format("is {}: {} would take {:.1f} % of the bus at {} baud; allowed: {:.0f} %. {}",
+                  of_ticks ? bus.tick_us : bus.baud,
+                  of_ticks ? "ticks, polls and sync" : "polls and sync", load * 100, bus.baud,
+                  fieldbus::kMaxBusLoad * 100, line_remedy(bus, motors))));
 }
 
 }  // namespace

@@ -75,6 +75,13 @@ struct SerialPulse {
   MotorInputs inputs = {};    // inputs 0..3 are the modem lines CD, DSR, CTS, RI
 };
 
+// What becomes of motions whose streams would be more than the line of a bus can carry.
+enum class Streams {
+  kFit,     // there are none: the configuration is refused unless all motors can stream at once
+  kRefuse,  // they are refused
+  kQueue    // they begin as soon as there is room for them
+};
+
 struct Bus {
   std::string name;
   BusKind kind = BusKind::kRs485;
@@ -84,6 +91,7 @@ struct Bus {
   bushd_format format = BUSHD_FORMAT_FINE;
   bool table_runs = false;  // a move from rest is given to the MCU as a whole, if the MCU can
   bool table_ticks = true;  // streamed ticks may be told as states of the run
+  Streams streams = Streams::kFit;
   bushd_stop_mode emergency_stop = BUSHD_STOP_RAMP;
   SerialPulse serial_pulse = {};
   // The settings of a commutator board.

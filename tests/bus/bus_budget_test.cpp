@@ -18,20 +18,34 @@ namespace {
 
 TEST(BusBudget, ByHand) {
   // 16 fine motors: 6 ticks a frame; 1 delimiter + 9 + 9 + 2 x 16 + 6 x 32 = 243 bytes every 15.36
-  // ms. Every 50 ms a poll, 10 + 1 + 5 bytes and 1 ms, and the window of a report, 10 + 57 + 96
-  // bytes and 0.6 ms. A time mark: 10 + 19 bytes every 500 ms.
+  // ms. Every 50 ms a poll, 10 + 1 + 5 bytes and 1 ms, and the window of a report, 10 + 50 + 96
+  // bytes, 0.51 ms and a byte time. A time mark: 10 + 19 bytes every 500 ms.
   const std::array<std::uint8_t, 1> one = {16};
-  const double bytes_per_s = 243 / 0.01536 + (16 + 163) / 0.05 + 29 / 0.5;
+  const double bytes_per_s = 243 / 0.01536 + (16 + 156) / 0.05 + 29 / 0.5;
   EXPECT_NEAR(bus_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one),
-              bytes_per_s * 10 / 500'000 + 1.6 / 50, 1e-9);
+              bytes_per_s * 10 / 500'000 + 1.53 / 50, 1e-9);
   // Two MCUs without motors are still asked.
   const std::array<std::uint8_t, 2> idle = {0, 0};
   EXPECT_NEAR(bus_load(1'000'000, 2'560'000, BUSHD_FORMAT_COARSE, idle),
-              ((11 + 2 * (5 + 10 + 38)) / 0.05 + 29 / 0.5) * 10 / 1e6 + 2.2 / 50, 1e-9);
+              ((11 + 2 * (5 + 10 + 38)) / 0.05 + 29 / 0.5) * 10 / 1e6 + 2.04 / 50, 1e-9);
   // One coarse motor: 16 ticks a frame, 1 + 9 + 9 + 2 + 16 bytes every 16 ms.
   const std::array<std::uint8_t, 1> single = {1};
   EXPECT_NEAR(bus_load(250'000, 1'000'000, BUSHD_FORMAT_COARSE, single),
-              (37 / 0.016 + (16 + 10 + 63) / 0.05 + 29 / 0.5) * 10 / 250'000 + 1.6 / 50, 1e-9);
+              (37 / 0.016 + (16 + 10 + 56) / 0.05 + 29 / 0.5) * 10 / 250'000 + 1.55 / 50, 1e-9);
+}
+
+// Sixteen motors by states: two frames of a delimiter, 9 + 8 bytes and 21 for each motor, ten times
+// a second.
+TEST(BusBudget, OfPollsAndOfStreams) {
+  const std::array<std::uint8_t, 1> one = {16};
+  const std::array<Streamed, 1> states = {{{.by_states = 16}}};
+  EXPECT_NEAR(stream_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, states),
+              (2 * 18 + 16 * 21) / 0.1 * 10 / 500'000, 1e-9);
+  const std::array<Streamed, 1> ticks = {{{.by_ticks = 16}}};
+  EXPECT_NEAR(poll_load(500'000, one) + stream_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, ticks),
+              bus_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one), 1e-12);
+  const std::array<Streamed, 1> none = {};
+  EXPECT_EQ(stream_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, none), 0);
 }
 
 TEST(BusBudget, GrowsWithEverythingThatCosts) {

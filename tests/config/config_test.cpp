@@ -376,7 +376,7 @@ INSTANTIATE_TEST_SUITE_P(
                "unknown key; allowed here: lcm, control, state, bus, mcu, group, motor"),
         change("UnknownKey", "tick_us", "tick_ms", 8, "bus[0].tick_ms",
                "unknown key; allowed here: name, kind, port, baud, tick_us, format, moves, frames, "
-               "emergency_stop"),
+               "streams, emergency_stop"),
         change("KindUnknown", "tick_us", "kind = \"can\"\ntick_us", 8, "bus[0].kind",
                "is \"can\"; allowed: \"rs485\""),
         change("NameMissing", "name = \"hall\"\n", "", 4, "bus[0].name", "is missing"),

@@ -47,6 +47,29 @@ void write_tables(const ConfigFile& file, int count) {
   for (int t = 0; t < count; ++t) file.directory().write(fmt::format("t{}.toml", t), kTable);
 }
 
+// Where streams are admitted when they are asked for, polls alone have to fit.
+TEST(ConfigTogether, LineOfManyMcusNeedsRoomForPolls) {
+  const auto load = [](int baud, const std::string& keys) {
+    std::string text = wide(16, baud, 2560, "fine");
+    text.insert(text.find("[[group]]"), keys);
+    const ConfigFile file(text);
+    write_tables(file, 1);
+    return file.load();
+  };
+  const auto fit = load(1152000, "");
+  ASSERT_FALSE(fit.has_value());
+  EXPECT_THAT(fit.error().message, HasSubstr("streams = \"refuse\" or \"queue\""));
+  EXPECT_TRUE(load(1152000, "streams = \"refuse\"\n").has_value());
+  EXPECT_TRUE(load(1152000, "moves = \"table\"\n").has_value());
+  EXPECT_FALSE(load(1152000, "moves = \"table\"\nstreams = \"fit\"\n").has_value());
+  const auto polls = load(500000, "streams = \"queue\"\n");
+  ASSERT_FALSE(polls.has_value());
+  EXPECT_EQ(polls.error().key, "bus[0].baud");
+  EXPECT_THAT(polls.error().message, HasSubstr("is 500000: polls and sync would take "));
+  EXPECT_THAT(polls.error().message, HasSubstr("Use baud = "));
+  EXPECT_FALSE(load(4000000, "streams = \"all\"\n").has_value());
+}
+
 TEST(ConfigTogether, LineThatCannotCarryItsTicksIsRefusedWithLoadAndRemedy) {
   const ConfigFile file = wide_file(2, 230400, 2560, "fine");
   write_tables(file, 1);

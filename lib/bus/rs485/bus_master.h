@@ -84,6 +84,8 @@ class BusMaster {
   // What begins at this tick begins together: if it is not known in time that all MCUs have what
   // they need for it, StartUnconfirmed says so while none has begun. To be called before begin().
   virtual void confirm_start(Tick /*at*/) {}
+  // With these; 0: a bus on which nothing is streamed.
+  virtual LineLoad line_load(std::span<const ToBegin> /*more*/) const { return {}; }
   // A motion has missed its start: what begins at once next gets more time.
   virtual void start_missed() {}
   // The start that the motor has missed was told in time, as far as is known, and that was lost.

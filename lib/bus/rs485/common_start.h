@@ -23,6 +23,14 @@ struct ToBegin {
   StartMessages messages;
 };
 
+// What takes how much of the line, as shares of it.
+struct LineLoad {
+  double polls = 0;    // and their answers, while all motors move
+  double streams = 0;  // under way
+  double more = 0;     // what is to begin besides
+  double all() const { return polls + streams + more; }
+};
+
 struct CommonStart {
   Tick at = 0;
   // Some MCUs may get their first frames in time and others not: BusMaster::confirm_start keeps

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "bus/bus_budget.h"
 #include "bus/bus_times.h"
 #include "bus/rs485/mcu_fit.h"
 #include "engine/run_plan.h"
@@ -244,6 +245,19 @@ CommonStart Rs485Master::earliest_common_start(std::int64_t now_us,
   const std::int64_t again_us = frames_us + poller_.longest_cycle_us();
   const std::int64_t more_us = repair_us > 0 ? std::max(repair_us, again_us) : 0;
   return {.at = confirmed.at + clock().ticks_in(more_us), .to_confirm = true};
+}
+
+LineLoad Rs485Master::line_load(std::span<const ToBegin> more) const {
+  std::vector<std::uint8_t> motors;
+  for (const McuRecord& mcu : mcus_) {
+    const auto with_table = std::ranges::count_if(
+        mcu.setup.table_of_motor, [](const auto& table) { return table.has_value(); });
+    motors.push_back(static_cast<std::uint8_t>(with_table));
+  }
+  const double streams = streams_.load_with({});
+  return {.polls = fieldbus::poll_load(setup_.baud, motors),
+          .streams = streams,
+          .more = streams_.load_with(more) - streams};
 }
 
 bool Rs485Master::in_one_frame(std::span<const ToBegin> together) const {

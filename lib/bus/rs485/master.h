@@ -100,6 +100,7 @@ class Rs485Master final : public BusMaster,
   CommonStart earliest_common_start(std::int64_t now_us,
                                     std::span<const ToBegin> together) const override;
   void confirm_start(Tick at) override { streams_.confirm_start(at); }
+  LineLoad line_load(std::span<const ToBegin> more) const override;
   void start_missed() override { start_margin_.missed(stepped_us_); }
   bool start_was_lost(McuIndex mcu, std::uint8_t motor) const override {
     return streams_.start_was_lost(mcu, motor);

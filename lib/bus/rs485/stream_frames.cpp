@@ -236,7 +236,7 @@ bool StreamScheduler::send_table_ticks(std::int64_t now_us, McuIndex index, std:
   const std::size_t as_ticks = BUSHD_TICKS_HEADER + motors * (2 + width * ticks);
   if (size > BUSHD_FRAME_MAX_PAYLOAD) {
     std::uint16_t some = mask;
-    while (std::popcount(some) > kMotorsPerStates) some ^= std::bit_floor(some);
+    while (std::popcount(some) > fieldbus::kMotorsPerStates) some ^= std::bit_floor(some);
     return some != mask && send_table_ticks(now_us, index, some, first, max_ticks, flags);
   }
   if (size > as_ticks) return false;

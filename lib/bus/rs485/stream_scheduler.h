@@ -30,10 +30,6 @@ namespace bushd::link {
 // While there is something to send, it is looked for this often.
 inline constexpr std::int64_t kStreamWakeUs = 5'000;
 
-// So many states of runs always fit into one frame.
-inline constexpr int kMotorsPerStates =
-    (BUSHD_FRAME_MAX_PAYLOAD - BUSHD_TABLE_TICKS_HEADER) / BUSHD_TABLE_TICKS_MAX_ENTRY;
-
 // Motors of an MCU whose plan is to change, all with one frame.
 struct ToReplace {
   McuIndex mcu;
@@ -81,6 +77,8 @@ class StreamScheduler {
   std::int64_t first_frames_us(const ToBegin& begin) const;
   // How long it takes for frames that keep these from beginning.
   std::int64_t withdrawal_us(std::span<const ToBegin> together) const;
+  // The share of the line that all streams take that are not yet told to their ends, and these.
+  double load_with(std::span<const ToBegin> more) const;
   bool tells_states(McuIndex mcu) const;  // of runs, in place of ticks
   // See BusMaster. While it is not confirmed its MCUs are asked as soon as their frames are sent.
   void confirm_start(Tick at);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "bus/bus_budget.h"
+#include "bus/bus_times.h"
 #include "bus/rs485/horizon.h"
 #include "bus/rs485/stream_scheduler.h"
 
@@ -29,7 +31,7 @@ std::int64_t StreamScheduler::first_frames_us(const ToBegin& begin) const {
   if (begin.messages == StartMessages::kLineRun) {
     return frame(BUSHD_LINE_RUN_HEADER + motors * BUSHD_LINE_RUN_ENTRY);
   }
-  constexpr auto kMost = static_cast<std::size_t>(kMotorsPerStates);
+  constexpr auto kMost = static_cast<std::size_t>(fieldbus::kMotorsPerStates);
   const std::size_t frames = (motors + kMost - 1) / kMost;
   return static_cast<std::int64_t>(frames) * frame(BUSHD_TABLE_TICKS_HEADER) +
          writer_.line_us(motors * BUSHD_TABLE_TICKS_MAX_ENTRY);
@@ -39,6 +41,32 @@ std::int64_t StreamScheduler::withdrawal_us(std::span<const ToBegin> together) c
   std::int64_t us = 0;
   for (const ToBegin& begin : together) us += frame_us(begin.motors, 1);
   return us;
+}
+
+double StreamScheduler::load_with(std::span<const ToBegin> more) const {
+  std::vector<fieldbus::Streamed> streamed;
+  for (const McuIndex i : mcus_.indices()) {
+    std::uint16_t ticks = 0;
+    std::uint16_t states = 0;
+    for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+      const Stream& stream = mcus_[i].stream[m];
+      if (!stream.active || stream.run || stream.finished) continue;
+      const bool by_states = tells_states(i) && source_.plan_at(i, m, stream.next).has_value();
+      (by_states ? states : ticks) |= bit(m);
+    }
+    for (const ToBegin& begin : more) {
+      if (begin.mcu != i) continue;
+      if (begin.messages == StartMessages::kTicks) ticks |= begin.motors;
+      if (begin.messages == StartMessages::kStates) {
+        (tells_states(i) ? states : ticks) |= begin.motors;
+      }
+    }
+    states &= static_cast<std::uint16_t>(~ticks);
+    streamed.push_back({.by_ticks = static_cast<std::uint8_t>(std::popcount(ticks)),
+                        .by_states = static_cast<std::uint8_t>(std::popcount(states))});
+  }
+  return fieldbus::stream_load(setup_.baud, static_cast<std::uint32_t>(setup_.tick_ns),
+                               setup_.format, streamed);
 }
 
 void StreamScheduler::confirm_start(Tick at) {

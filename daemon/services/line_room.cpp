@@ -1,0 +1,84 @@
+#include "daemon/services/line_room.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "base/overloaded.h"
+#include "bus/bus_budget.h"
+
+namespace bushd::daemon {
+
+using link::StartMessages;
+
+bool LineRoom::concerns_any() const {
+  return std::ranges::any_of(installation_.config().buses, [](const config::Bus& bus) {
+    return bus.streams != config::Streams::kFit;
+  });
+}
+
+// How the motor's motion is told. None: its MCU makes it when the trigger comes, or nothing moves.
+// A motor that moves by a run of its MCU is streamed from its new target on.
+std::optional<StartMessages> LineRoom::messages_of(const api::Request& request, MotorId id) const {
+  const Mcu& mcu = installation_.mcu_of(id);
+  const auto whole = [&]() -> std::optional<StartMessages> {
+    constexpr bushd_delay kNoLimit = 0;
+    const bool by_table = installation_[id].stands() && installation_.by_table(mcu, 1, kNoLimit);
+    return by_table ? StartMessages::kTableRun : StartMessages::kStates;
+  };
+  const auto as_ticks = []() -> std::optional<StartMessages> { return StartMessages::kTicks; };
+  return std::visit(
+      Overloaded{[&](const api::Move&) { return whole(); },
+                 [&](const api::Jog&) { return std::optional(StartMessages::kStates); },
+                 [&](const api::MoveLine&) {
+                   return mcu.makes_lines() ? std::optional(StartMessages::kLineRun) : as_ticks();
+                 },
+                 [&](const api::MovePath&) { return as_ticks(); },
+                 [&](const api::Follow&) { return as_ticks(); },
+                 [](const auto&) -> std::optional<StartMessages> { return std::nullopt; }},
+      request);
+}
+
+Result<bool> LineRoom::has_room(const api::Request& request,
+                                const std::vector<MotorId>& motors) const {
+  std::map<BusId, std::map<std::pair<McuId, StartMessages>, std::uint16_t>> of_buses;
+  for (const MotorId id : motors) {
+    const auto messages = messages_of(request, id);
+    if (!messages) continue;
+    const Mcu& mcu = installation_.mcu_of(id);
+    of_buses[mcu.config.bus][{mcu.id, *messages}] |=
+        static_cast<std::uint16_t>(1u << installation_[id].output().value);
+  }
+  bool room = true;
+  for (const auto& [id, masks] : of_buses) {
+    const Bus& bus = installation_[id];
+    if (bus.config.streams == config::Streams::kFit) continue;
+    std::vector<link::ToBegin> together;
+    for (const auto& [key, mask] : masks) {
+      together.push_back({installation_[key.first].on_bus(), mask, key.second});
+    }
+    const auto fits = has_room_on(bus, std::move(together));
+    if (!fits) return fits;
+    room = room && *fits;
+  }
+  return room;
+}
+
+Result<bool> LineRoom::has_room_on(const Bus& bus, std::vector<link::ToBegin> together) const {
+  const link::LineLoad load = bus.master.line_load(together);
+  if (load.more <= 0 || load.all() <= fieldbus::kMaxBusLoad) return true;
+  const bool alone = load.polls + load.more <= fieldbus::kMaxBusLoad;
+  if (alone && bus.config.streams == config::Streams::kQueue) return false;
+  return fail(fmt::format(
+      "the line of bus {} has no room for it: polls take {:.0f} %, motions under way {:.0f} %, "
+      "this "
+      "one {:.0f} %; allowed: {:.0f} %. {}",
+      bus.config.name, load.polls * 100, load.streams * 100, load.more * 100,
+      fieldbus::kMaxBusLoad * 100,
+      alone ? "Wait until others have ended, or set streams = \"queue\" of the bus"
+            : "Move fewer motors at once, or from rest with moves = \"table\" of the bus"));
+}
+
+}  // namespace bushd::daemon

@@ -1,0 +1,104 @@
+// What a line cannot carry at once is refused, or waits, when it is asked for; what its MCUs make
+// by themselves takes none of it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "daemon/lab.h"
+
+namespace bushd::test {
+namespace {
+
+using testing::Each;
+using testing::HasSubstr;
+
+// Sixteen MCUs of sixteen motors at 1152000 baud: their polls take two thirds of the line, and the
+// ticks of all motors would take three times what it carries.
+std::string crowd(const std::string& manner, const std::string& streams) {
+  std::string toml = hall(16, 16, manner);
+  const std::string before = "baud = 500000\n";
+  return toml.replace(
+      toml.find(before), before.size(),
+      "baud = 1152000\n" + (streams.empty() ? "" : "streams = \"" + streams + "\"\n"));
+}
+
+std::vector<std::string> motors(int from, int to) {
+  std::vector<std::string> names;
+  for (int m = from; m <= to; ++m) names.push_back((m < 10 ? "m0" : "m") + std::to_string(m));
+  return names;
+}
+
+std::vector<std::int64_t> each(std::size_t count, std::int64_t steps) {
+  return std::vector<std::int64_t>(count, steps);
+}
+
+TEST(LineRoom, TableRunsOfAllMotorsTakeNone) {
+  Lab lab(crowd("fine_table", ""));
+  lab.connect();
+  const auto all = motors(1, 256);
+  const Answer result = lab.wait(lab.send(Ask::kMoveBy, all, each(all.size(), 400)));
+  EXPECT_EQ(result.result, "reached") << result.reason;
+  EXPECT_THAT(result.motor_results, Each("reached"));
+}
+
+// Each tick of a motor: two bytes in 2.56 ms, and its share of the frame.
+TEST(LineRoom, WhatDoesNotFitIsRefusedWithWhatTakesHowMuch) {
+  Lab lab(crowd("fine_ticks", "refuse"));
+  lab.connect();
+  const auto few = motors(1, 16);
+  const auto first = lab.send(Ask::kMoveBy, few, each(16, 20'000));
+  lab.run_for(0.3);
+  EXPECT_EQ(lab.last_reply(first).phase, Answer::kAccepted);
+  const auto second = lab.send(Ask::kMoveBy, motors(17, 32), each(16, 400));
+  const Answer refused = lab.wait(second);
+  EXPECT_EQ(refused.phase, Answer::kRefused);
+  EXPECT_THAT(refused.reason, HasSubstr("the line of bus hall has no room for it: polls take "));
+  EXPECT_THAT(refused.reason, HasSubstr("Wait until others have ended, or set streams = "));
+  EXPECT_EQ(lab.shaft_steps("m17"), 0);
+  const Answer never = lab.wait(lab.send(Ask::kMoveBy, motors(33, 128), each(96, 400)));
+  EXPECT_EQ(never.phase, Answer::kRefused);
+  EXPECT_THAT(never.reason, HasSubstr("Move fewer motors at once"));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done") << "a stop is not asked for room";
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, motors(17, 32), each(16, 400))).result, "reached");
+  EXPECT_EQ(lab.mcu_health("hall:1").ramp_downs, 0u);
+}
+
+TEST(LineRoom, WhatDoesNotFitWaitsWhereItMay) {
+  Lab lab(crowd("fine_ticks", "queue"));
+  lab.connect();
+  const auto first = lab.send(Ask::kMoveBy, motors(1, 16), each(16, 2'000));
+  lab.run_for(0.3);
+  const auto second = lab.send(Ask::kMoveBy, motors(17, 32), each(16, 400));
+  const auto third = lab.send(Ask::kMoveBy, motors(33, 48), each(16, 400));
+  lab.run_for(0.3);
+  EXPECT_EQ(lab.shaft_steps("m17"), 0);
+  EXPECT_FALSE(lab.has_result(first));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, motors(33, 48))).result, "done");
+  EXPECT_EQ(lab.wait(third).result, "stopped") << "it waits no more";
+  EXPECT_EQ(lab.wait(second).result, "reached");
+  EXPECT_TRUE(lab.has_result(first)) << "there was room when the first had ended";
+  EXPECT_EQ(lab.shaft_steps("m17"), 400);
+  EXPECT_EQ(lab.shaft_steps("m33"), 0);
+  const Answer never = lab.wait(lab.send(Ask::kMoveBy, motors(33, 128), each(96, 400)));
+  EXPECT_EQ(never.phase, Answer::kRefused) << "it never fits";
+}
+
+// A motor that its MCU moves is streamed from its new target on.
+TEST(LineRoom, NewTargetsAreStreamed) {
+  Lab lab(crowd("fine_table", "refuse"));
+  lab.connect();
+  const auto all = motors(1, 256);
+  const auto move = lab.send(Ask::kMoveBy, all, each(all.size(), 30'000));
+  lab.run_for(0.5);
+  const Answer refused = lab.wait(lab.send(Ask::kMoveBy, all, each(all.size(), 100)));
+  EXPECT_EQ(refused.phase, Answer::kRefused);
+  EXPECT_FALSE(lab.has_result(move)) << "it goes on";
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  EXPECT_EQ(lab.wait(move).motor_results.front(), "stopped");
+  EXPECT_EQ(lab.shaft_steps("m01"), 30'100);
+}
+
+}  // namespace
+}  // namespace bushd::test
