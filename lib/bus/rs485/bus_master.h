@@ -50,6 +50,8 @@ class BusMaster {
   virtual std::span<const std::uint8_t> step(std::int64_t now_us) = 0;
   // step() has nothing to do before this time, unless bytes arrive or a call below is made.
   virtual std::int64_t next_wake_us() const = 0;
+  // What is received before this time decides nothing: bytes may be left unread until then.
+  virtual std::int64_t listen_from_us() const { return INT64_MIN; }
   // Events since the last call.
   virtual std::vector<Event> take_events() = 0;
 

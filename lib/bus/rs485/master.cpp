@@ -76,6 +76,7 @@ Rs485Master::Rs485Master(BusSetup setup, TickSource& source)
       horizon_(clock(), transactions_.health().latency) {}
 
 void Rs485Master::port_opened(std::int64_t now_us) {
+  look_again();
   port_open_ = true;
   heard_ = false;
   transactions_.reset();
@@ -85,6 +86,7 @@ void Rs485Master::port_opened(std::int64_t now_us) {
 }
 
 void Rs485Master::port_lost(std::int64_t now_us, const std::string& cause) {
+  look_again();
   port_open_ = false;
   transactions_.abandon();
   for (const McuIndex i : mcus_.indices()) connector_.give_up(i, cause, now_us);
@@ -92,6 +94,7 @@ void Rs485Master::port_lost(std::int64_t now_us, const std::string& cause) {
 }
 
 void Rs485Master::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
+  look_again();
   notice_standing_still(now_us);
   transactions_.count_bytes(bytes.size());
   transactions_.receive(now_us, bytes);
@@ -103,6 +106,7 @@ void Rs485Master::receive(std::int64_t now_us, std::span<const std::uint8_t> byt
 void Rs485Master::notice_standing_still(std::int64_t now_us) {
   const std::int64_t still_us = now_us - stepped_us_;
   if (!port_open_ || still_us < Synchroniser::kOtherMasterUs) return;
+  look_again();
   transactions_.abandon();
   for (McuRecord& mcu : mcus_) {
     if (mcu.view.phase != McuPhase::kOnline) continue;
@@ -116,7 +120,7 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
   notice_standing_still(now_us);
   stepped_us_ = now_us;
   begun_ = false;
-  if (!port_open_) return {};
+  if (!port_open_ || now_us < due_us_) return {};
   synchroniser_.lines_run(streams_.runs_line() || connector_.runs_with_host());
   transactions_.expire(now_us);
   streams_.fail_late_replacements(now_us);
@@ -131,9 +135,12 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
     emergency_.send_due(now_us);
     if (streams_.withdraws()) transactions_.give_up(now_us);
   }
+  const bool was_open = transactions_.open();
   while (!transactions_.open() && writer_.has_room(now_us) && send_next(now_us)) {
   }
+  if (transactions_.open() && !was_open) listen_from_us_ = decided_from_us();
   transactions_.count_bytes(writer_.bytes().size());
+  due_us_ = wake_us();
   return writer_.bytes();
 }
 
@@ -172,7 +179,7 @@ bool Rs485Master::send_next(std::int64_t now_us) {
          connector_.send_request(now_us) || streams_.send_stream(now_us, below(target_us));
 }
 
-std::int64_t Rs485Master::next_wake_us() const {
+std::int64_t Rs485Master::wake_us() const {
   if (!port_open_) return INT64_MAX;
   if (transactions_.open()) {
     std::int64_t urgent_us = withdrawal_due_us();
@@ -184,6 +191,29 @@ std::int64_t Rs485Master::next_wake_us() const {
   if (emergency_.active()) wake = std::min(wake, emergency_.due_us());
   for (const McuIndex i : mcus_.indices()) wake = std::min(wake, wake_us(i));
   return std::max(wake, writer_.room_from_us());
+}
+
+// Reports that somebody may wait for are read as they come. All others can wait for the last of
+// their poll: until it is there nothing else can be sent.
+std::int64_t Rs485Master::decided_from_us() const {
+  if (emergency_.active() || !clock().valid()) return INT64_MIN;
+  for (const McuIndex i : mcus_.indices()) {
+    if (awaits_news(i, transactions_.quiet_us())) return INT64_MIN;
+  }
+  return transactions_.last_answer_us();
+}
+
+bool Rs485Master::awaits_news(McuIndex mcu, std::int64_t until_us) const {
+  const McuView& view = mcus_[mcu].view;
+  if (view.phase == McuPhase::kOffline) return false;
+  const unsigned unplanned = view.report.moving & ~unsigned{streams_.active(mcu)};
+  if (view.phase == McuPhase::kConnecting || busy(mcu) || uploads(mcu) ||
+      streams_.start_is_open(mcu) || streams_.replacement_open(mcu) ||
+      (view.report.autonomous | view.report.armed | unplanned) != 0) {
+    return true;
+  }
+  const std::optional<Tick> end = streams_.next_end(mcu);
+  return end && *end <= clock().tick_at(until_us) + 1;
 }
 
 std::int64_t Rs485Master::withdrawal_due_us() const {
@@ -296,6 +326,7 @@ bool Rs485Master::has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const 
 
 // What begins is to be sent, and its end to be asked for.
 void Rs485Master::note_begun(McuIndex mcu) {
+  look_again();
   begun_ = true;
   ask_at_end(stepped_us_, mcu);
 }
@@ -348,15 +379,18 @@ bool Rs485Master::can_upload(McuIndex mcu, const bushd_table& table) const {
 }
 
 void Rs485Master::end_upload(McuIndex mcu) {
+  look_again();
   if (uploads(mcu)) connector_.scratch(mcu).clear();
 }
 
 void Rs485Master::follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) {
+  look_again();
   streams_.follow_run(mcu, motor, start, run);
   if (std::holds_alternative<LineRun>(run)) synchroniser_.lines_run(true);
 }
 
 void Rs485Master::replace(McuIndex mcu, std::uint16_t motors, Tick first) {
+  look_again();
   streams_.replace(mcu, motors, first, stepped_us_);
 }
 
@@ -370,6 +404,7 @@ BusSnapshot Rs485Master::snapshot(std::int64_t now_us) const {
 
 std::uint8_t Rs485Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                               std::span<const Armed> moves) {
+  look_again();
   McuRecord& record = mcus_[mcu];
   std::vector<bushd_table_run_entry> entries;
   for (const Armed& move : moves) {
@@ -385,6 +420,7 @@ std::uint8_t Rs485Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay
 
 std::uint8_t Rs485Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                                    std::span<const ArmedOnLine> parts) {
+  look_again();
   std::vector<bushd_line_entry> entries;
   for (const auto& [motor, run] : parts) {
     entries.push_back({motor, static_cast<std::int8_t>(run.direction), run.increment});
@@ -400,12 +436,14 @@ std::uint8_t Rs485Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t 
 }
 
 std::uint8_t Rs485Master::travel(McuIndex mcu, bushd_travel message) {
+  look_again();
   message.number = next_trigger_number(mcus_[mcu]);
   connector_.queue(mcu).travel(message);
   return message.number;
 }
 
 void Rs485Master::end_travel(McuIndex mcu, std::uint8_t motor) {
+  look_again();
   bushd_travel message{};
   message.kind = BUSHD_TRAVEL_NONE;
   message.motor = motor;
@@ -413,6 +451,7 @@ void Rs485Master::end_travel(McuIndex mcu, std::uint8_t motor) {
 }
 
 void Rs485Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {
+  look_again();
   connector_.queue(mcu).position_compare(message);
 }
 
@@ -434,24 +473,29 @@ Tick Rs485Master::earliest_program_start(std::int64_t now_us,
 }
 
 void Rs485Master::stop_program(McuIndex mcu, bushd_stop_mode mode) {
+  look_again();
   if (mcus_[mcu].view.phase != McuPhase::kOffline) connector_.program(mcu).stop(mode);
 }
 
 void Rs485Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) {
+  look_again();
   connector_.queue(mcu).set_position(motor, position_steps);
 }
 
 void Rs485Master::emergency_stop(bushd_stop_mode mode) {
+  look_again();
   emergency_.begin(mode);
   for (const McuIndex i : mcus_.indices()) streams_.drop_all(i);
   connector_.emergency_stop(mode);
 }
 
 void Rs485Master::bind_to_stop(McuIndex mcu, bushd_stop_mode mode) {
+  look_again();
   connector_.bind_to_stop(mcu, mode);
 }
 
 void Rs485Master::reconfigure(McuIndex mcu, McuSetup setup) {
+  look_again();
   if (connector_.reconfigure(mcu, std::move(setup))) streams_.drop_all(mcu);
 }
 

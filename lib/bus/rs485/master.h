@@ -78,7 +78,10 @@ class Rs485Master final : public BusMaster,
   void port_lost(std::int64_t now_us, const std::string& cause) override;
   void receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) override;
   std::span<const std::uint8_t> step(std::int64_t now_us) override;
-  std::int64_t next_wake_us() const override;
+  std::int64_t next_wake_us() const override { return due_us_ == INT64_MIN ? wake_us() : due_us_; }
+  std::int64_t listen_from_us() const override {
+    return transactions_.open() ? listen_from_us_ : INT64_MIN;
+  }
   std::vector<Event> take_events() override;
 
   const McuView& view(McuIndex mcu) const override { return mcus_[mcu].view; }
@@ -99,9 +102,15 @@ class Rs485Master final : public BusMaster,
   Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const override;
   CommonStart earliest_common_start(std::int64_t now_us,
                                     std::span<const ToBegin> together) const override;
-  void confirm_start(Tick at) override { streams_.confirm_start(at); }
+  void confirm_start(Tick at) override {
+    look_again();
+    streams_.confirm_start(at);
+  }
   LineLoad line_load(std::span<const ToBegin> more) const override;
-  void start_missed() override { start_margin_.missed(stepped_us_); }
+  void start_missed() override {
+    look_again();
+    start_margin_.missed(stepped_us_);
+  }
   bool start_was_lost(McuIndex mcu, std::uint8_t motor) const override {
     return streams_.start_was_lost(mcu, motor);
   }
@@ -117,19 +126,29 @@ class Rs485Master final : public BusMaster,
   bool has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const override;
   void begin(McuIndex mcu, std::uint8_t motor, Tick start) override;
   void replace(McuIndex mcu, std::uint16_t motors, Tick first) override;
-  void drop(McuIndex mcu, std::uint8_t motor) override { streams_.drop(mcu, motor); }
+  void drop(McuIndex mcu, std::uint8_t motor) override {
+    look_again();
+    streams_.drop(mcu, motor);
+  }
   // Within two ticks of hearing it.
   void emergency_stop(bushd_stop_mode mode) override;
   void bind_to_stop(McuIndex mcu, bushd_stop_mode mode) override;
-  void enable_no_more() override { connector_.enable_no_more(); }
+  void enable_no_more() override {
+    look_again();
+    connector_.enable_no_more();
+  }
 
   void reconfigure(McuIndex mcu, McuSetup setup) override;
   Result<void> check_room(McuIndex mcu, const McuSetup& setup) const override;
   // Sent as soon as the line allows.
-  void control(McuIndex mcu, std::uint8_t actions) override { connector_.control(mcu, actions); }
+  void control(McuIndex mcu, std::uint8_t actions) override {
+    look_again();
+    connector_.control(mcu, actions);
+  }
   void set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) override;
 
   void home(McuIndex mcu, const bushd_home& message) override {
+    look_again();
     connector_.queue(mcu).home(message);
   }
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
@@ -144,6 +163,7 @@ class Rs485Master final : public BusMaster,
   std::optional<std::uint8_t> bank_of(McuIndex mcu, const bushd_table& table) const override;
   bool can_upload(McuIndex mcu, const bushd_table& table) const override;
   void upload(McuIndex mcu, const bushd_table& table) override {
+    look_again();
     connector_.scratch(mcu).upload(table);
   }
   bool uploads(McuIndex mcu) const override { return connector_.scratch(mcu).under_way(); }
@@ -152,11 +172,15 @@ class Rs485Master final : public BusMaster,
                    std::span<const Armed> moves) override;
   std::uint8_t arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                         std::span<const ArmedOnLine> parts) override;
-  void disarm(McuIndex mcu) override { connector_.queue(mcu).disarm(); }
+  void disarm(McuIndex mcu) override {
+    look_again();
+    connector_.queue(mcu).disarm();
+  }
   void follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) override;
   std::uint8_t travel(McuIndex mcu, bushd_travel message) override;
   void end_travel(McuIndex mcu, std::uint8_t motor) override;
   void inhibit_local(McuIndex mcu, std::uint16_t motors) override {
+    look_again();
     connector_.inhibit_local(mcu, motors);
   }
   void position_compare(McuIndex mcu, const bushd_position_compare& message) override;
@@ -164,16 +188,27 @@ class Rs485Master final : public BusMaster,
 
   const ProgramView& program(McuIndex mcu) const override { return connector_.program(mcu).view(); }
   void put_program(McuIndex mcu, std::vector<std::uint8_t> bytes) override {
+    look_again();
     connector_.program(mcu).put(std::move(bytes));
   }
-  void erase_program(McuIndex mcu) override { connector_.program(mcu).erase(); }
+  void erase_program(McuIndex mcu) override {
+    look_again();
+    connector_.program(mcu).erase();
+  }
   Tick earliest_program_start(std::int64_t now_us, std::span<const McuIndex> mcus) const override;
   void run_program(McuIndex mcu, std::uint8_t number, Tick start) override {
+    look_again();
     connector_.program(mcu).run(number, start);
   }
   void stop_program(McuIndex mcu, bushd_stop_mode mode) override;
-  void pause_program(McuIndex mcu) override { connector_.program(mcu).pause(); }
-  void resume_program(McuIndex mcu) override { connector_.program(mcu).resume(); }
+  void pause_program(McuIndex mcu) override {
+    look_again();
+    connector_.program(mcu).pause();
+  }
+  void resume_program(McuIndex mcu) override {
+    look_again();
+    connector_.program(mcu).resume();
+  }
 
  private:
   bool answered(std::int64_t now_us, const Transactions::Answer& answer) override;
@@ -187,6 +222,9 @@ class Rs485Master final : public BusMaster,
   void refused(McuIndex mcu, std::uint8_t type, std::uint8_t status) override;
   void program_reported(McuIndex mcu) override;
 
+  // Something has come by which step() may have more to do.
+  void look_again() { due_us_ = INT64_MIN; }
+  std::int64_t wake_us() const;
   void notice_standing_still(std::int64_t now_us);
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,
                      const bushd_report& report);
@@ -201,6 +239,8 @@ class Rs485Master final : public BusMaster,
   void ask_again_for_start(std::int64_t now_us, McuIndex mcu);
   std::int64_t withdrawal_due_us() const;
   std::int64_t wake_us(McuIndex mcu) const;
+  std::int64_t decided_from_us() const;
+  bool awaits_news(McuIndex mcu, std::int64_t until_us) const;
   const BusClock& clock() const { return synchroniser_.clock(); }
 
   const BusSetup setup_;
@@ -209,6 +249,7 @@ class Rs485Master final : public BusMaster,
   bool port_open_ = false;
   bool heard_ = false;
   std::int64_t stepped_us_ = 0;
+  std::int64_t due_us_ = INT64_MIN;  // step() has nothing to do before
   FrameWriter writer_;
   Transactions transactions_;
   Connector connector_;
@@ -220,6 +261,7 @@ class Rs485Master final : public BusMaster,
   StartMargin start_margin_;
   StartMargin repair_time_;  // for frames that begin motors together: none on a good line
   bool begun_ = false;       // something, since the last step
+  std::int64_t listen_from_us_ = INT64_MIN;  // of the transaction under way
 };
 
 }  // namespace bushd::link

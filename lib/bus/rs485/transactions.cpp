@@ -49,6 +49,9 @@ void Transactions::ask_all(std::int64_t now_us, std::uint8_t type,
                               .longest_us = sent_us + window.end_us,
                               .longest = window.payload});
   }
+  if (windows.size() > 1) {
+    open_->last_answer_us = expected_of(open_->awaited.back(), bushd_report_size(0, 0));
+  }
 }
 
 void Transactions::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
@@ -81,7 +84,7 @@ void Transactions::handle_frame(std::int64_t now_us, const bushd_frame& frame) {
   }
   from->answered = true;
   const std::int64_t expected_us = expected_of(*from, frame.payload_size);
-  note_latency(now_us, expected_us);
+  note_latency(now_us, *from, expected_us);
   const McuIndex mcu = from->mcu;
   const Answer answer = {.mcu = mcu,
                          .type = open_->type,
@@ -127,9 +130,12 @@ void Transactions::be_more_patient() {
   patience_us_ = std::min(2 * patience_us_, kMaxPatienceUs);
 }
 
-// In which of several windows an answer came is not known here.
-void Transactions::note_latency(std::int64_t now_us, std::int64_t expected_us) {
-  if (open_->several) return;
+// In which of several windows an answer came is not known here. And one that is read when the last
+// may be there has perhaps been left unread until then.
+void Transactions::note_latency(std::int64_t now_us, const Awaited& from,
+                                std::int64_t expected_us) {
+  const bool left_unread = now_us >= open_->last_answer_us && &from != &open_->awaited.back();
+  if (open_->several || left_unread) return;
   const std::int64_t latency_us = std::max<std::int64_t>(now_us - expected_us, 0);
   health_.latency.add(latency_us);
   patience_us_ = std::clamp(std::max(4 * latency_us, patience_us_ - patience_us_ / 8),

@@ -87,6 +87,9 @@ class Transactions {
   // open().
   std::int64_t quiet_us() const { return open_->quiet_us; }
   std::int64_t timeout_us() const { return open_->timeout_us; }
+  // When the shortest answer of the last who is asked will have passed: with the others nothing
+  // ends. INT64_MIN: one is asked. Precondition: open().
+  std::int64_t last_answer_us() const { return open_->last_answer_us; }
 
   // How long beyond that an answer is waited for at present.
   std::int64_t patience_us() const { return patience_us_; }
@@ -111,6 +114,7 @@ class Transactions {
     std::int64_t quiet_us;
     std::int64_t timeout_us;
     bool several;  // MCUs may answer in the place of one
+    std::int64_t last_answer_us = INT64_MIN;
   };
 
   struct Expired {
@@ -121,7 +125,7 @@ class Transactions {
   void handle_frame(std::int64_t now_us, const bushd_frame& frame);
   Awaited* awaited_from(const bushd_frame& frame);
   std::int64_t expected_of(const Awaited& from, std::size_t payload) const;
-  void note_latency(std::int64_t now_us, std::int64_t expected_us);
+  void note_latency(std::int64_t now_us, const Awaited& from, std::int64_t expected_us);
   // An answer to what has expired is taken once.
   bool take_if_expired(const bushd_frame& frame);
   void be_more_patient();

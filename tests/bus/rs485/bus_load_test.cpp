@@ -70,5 +70,69 @@ TEST(BusLoad, AtRestIsAFewPercent) {
   EXPECT_LE(share_at_rest(16, 1'000'000), 0.15);
 }
 
+// The reads of so many polls, ten seconds of them.
+double reads_of_a_poll(FakeBus& bus) {
+  bus.reads = 0;
+  bus.heard.clear();
+  bus.run_for(10'000'000);
+  return static_cast<double>(bus.reads) / static_cast<double>(bus.heard_of(BUSHD_MSG_POLL).size());
+}
+
+void begin_all(FakeBus& bus) {
+  for (std::size_t i = 0; i < bus.slaves.size(); ++i) {
+    bus.master->begin(McuIndex{i}, 0, bus.master->earliest_start(bus.now_us, McuIndex{i}, 0));
+  }
+  bus.run_for(1'000'000);
+}
+
+// What wakes the daemon is what many motors cost it.
+TEST(BusLoad, AllAnswersOfAPollThatNobodyWaitsForAreReadAtOnce) {
+  FakeBus bus(4);
+  bus.connect();
+  bus.run_for(2'000'000);
+  // The last answer by itself, where the one before is there when the first could be over.
+  EXPECT_LE(reads_of_a_poll(bus), 2.0);
+  begin_all(bus);
+  EXPECT_LE(reads_of_a_poll(bus), 2.0) << "in motion too";
+  bus.slaves[3].answers = false;
+  bus.run_for(100'000);
+  EXPECT_LE(reads_of_a_poll(bus), 2.1) << "the last one owes its answer, and is looked for";
+}
+
+TEST(BusLoad, AnswersAreReadAsTheyComeWhereOneTellsOfAnEnd) {
+  FakeBus bus(4);
+  bus.connect();
+  begin_all(bus);
+  const auto listens_at_once = [&bus] { return bus.master->listen_from_us() == INT64_MIN; };
+  const auto polled = [&bus] { return !bus.heard_of(BUSHD_MSG_POLL).empty(); };
+  bus.heard.clear();
+  ASSERT_TRUE(bus.run_until(polled));
+  EXPECT_FALSE(listens_at_once()) << "their ends are far off";
+  bus.run_for(30'000);
+  const link::Tick end = bus.master->tick_at(bus.now_us) + 2;
+  bus.source.end = [end](std::uint8_t) { return end; };
+  bus.heard.clear();
+  ASSERT_TRUE(bus.run_until(polled));
+  EXPECT_TRUE(listens_at_once());
+}
+
+// Two answers took as long as the line, and were read late by what the third one took.
+TEST(BusLoad, WhatIsLeftUnreadIsNoLatency) {
+  FakeBus bus(4);
+  bus.turnaround_us = 0;
+  bus.connect();
+  bus.run_for(5'000'000);
+  EXPECT_LE(bus.master->bus_health().latency.recent_us, 1'000);
+}
+
+TEST(BusLoad, OneMcuIsListenedToAtAnyTime) {
+  FakeBus bus;
+  bus.connect();
+  for (int i = 0; i < 1000; ++i) {
+    bus.run_for(137);
+    EXPECT_EQ(bus.master->listen_from_us(), INT64_MIN);
+  }
+}
+
 }  // namespace
 }  // namespace bushd::test

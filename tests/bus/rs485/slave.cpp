@@ -136,7 +136,7 @@ void FakeBus::advance(std::int64_t limit_us) {
 
   std::int64_t next = std::min(std::max(master->next_wake_us(), now_us + 1), limit_us);
   if (!frames_.empty()) next = std::min(next, frames_.begin()->first);
-  if (!arrivals_.empty()) next = std::min(next, arrivals_.begin()->first + adapter_latency_us);
+  next = std::min(next, read_due_us());
   now_us = std::max(next, now_us);
   while (!frames_.empty() && frames_.begin()->first <= now_us) {
     const auto [frame, sequence] = frames_.begin()->second;
@@ -144,12 +144,24 @@ void FakeBus::advance(std::int64_t limit_us) {
     heard.push_back(frame);
     hear(frame, sequence);
   }
-  while (!arrivals_.empty() && arrivals_.begin()->first + adapter_latency_us <= now_us) {
-    const Bytes bytes = arrivals_.begin()->second;
-    arrivals_.erase(arrivals_.begin());
-    master->receive(now_us, bytes);
-  }
+  if (now_us >= read_due_us()) read();
   for (const link::Event& event : master->take_events()) events.push_back(event);
+}
+
+std::int64_t FakeBus::read_due_us() const {
+  if (arrivals_.empty()) return INT64_MAX;
+  return std::max(arrivals_.begin()->first + adapter_latency_us, master->listen_from_us());
+}
+
+void FakeBus::read() {
+  ++reads;
+  Bytes bytes;
+  while (!arrivals_.empty() && arrivals_.begin()->first + adapter_latency_us <= now_us) {
+    const Bytes& more = arrivals_.begin()->second;
+    bytes.insert(bytes.end(), more.begin(), more.end());
+    arrivals_.erase(arrivals_.begin());
+  }
+  master->receive(now_us, bytes);
 }
 
 std::int64_t FakeBus::line_us(std::size_t bytes) const {

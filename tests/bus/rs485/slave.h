@@ -172,11 +172,15 @@ class FakeBus {
   std::unique_ptr<link::Rs485Master> master;
   std::vector<Heard> heard;  // every frame of the master
   std::vector<link::Event> events;
+  int reads = 0;  // of what slaves have sent, as a program that waits for it
   std::int64_t master_bytes = 0;
   std::int64_t slave_bytes = 0;
 
  private:
   void advance(std::int64_t limit_us);
+  void read();
+  // When the program comes to read; INT64_MAX: nothing is on its way.
+  std::int64_t read_due_us() const;
   std::int64_t line_us(std::size_t bytes) const;
   void hear(const Heard& frame, std::uint8_t sequence);
   void act(Slave& slave, const Heard& frame, std::uint8_t sequence);

@@ -113,6 +113,24 @@ TEST_F(Transacting, AnswerThatIsShorterThanItsWindowIsExpectedSooner) {
   EXPECT_EQ(transactions.health().latency.recent_us, 300);
 }
 
+// Who asks may wait for the last one: what it reads then of the others tells nothing of the line.
+TEST_F(Transacting, LatencyIsThatOfAnswersReadAsTheyCome) {
+  longest = 100;
+  poll();
+  EXPECT_EQ(
+      transactions.last_answer_us(),
+      writer.free_us() + 6'000 - 20 * (100 - static_cast<std::int64_t>(bushd_report_size(0, 0))));
+  now_us = transactions.last_answer_us();
+  answer(9, BUSHD_MSG_POLL);
+  EXPECT_EQ(transactions.health().latency.recent_us, 0) << "it may have waited";
+  poll();
+  now_us = transactions.last_answer_us() - 1;
+  answer(9, BUSHD_MSG_POLL);
+  EXPECT_GT(transactions.health().latency.recent_us, 0);
+  ask();
+  EXPECT_EQ(transactions.last_answer_us(), INT64_MIN) << "one answers";
+}
+
 TEST_F(Transacting, NobodyAnswersUntilTheTimeout) {
   poll();
   transactions.expire(transactions.timeout_us() - 1);
