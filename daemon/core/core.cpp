@@ -130,6 +130,7 @@ void Core::pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus&
 }
 
 void Core::request(std::int64_t now, const api::Asker& who, const api::Request& as_written) {
+  state_.look_anew();
   const auto of_patterns = with_motors_of_patterns(installation_, as_written);
   const api::Request& as_asked = of_patterns ? *of_patterns : as_written;
   // Where a computed axis would go is asked where its motors stand: after a stop, elsewhere.
@@ -255,6 +256,7 @@ std::int64_t Core::next_wake_us() const {
 
 void Core::shut_down(std::int64_t now_us) {
   installation_.shutting_down = true;
+  state_.look_anew();
   const std::vector<MotorId> all = *installation_.find_or_all({});
   const std::string by = "the daemon, which ends";
   open_moves_.precedence().note_all(by);

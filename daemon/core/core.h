@@ -61,6 +61,10 @@ class Core {
   void receive(std::int64_t now_us, BusId bus, std::span<const std::uint8_t> bytes);
   // Something of the bus has answered since its port was opened.
   bool heard(BusId bus) const { return installation_[bus].heard(); }
+  // What the bus's port receives before this time may be left unread until then.
+  std::int64_t listen_from_us(BusId bus) const {
+    return installation_[bus].master.listen_from_us();
+  }
   // To be called soon after the output that ordered it.
   void pulse_status(std::int64_t now_us, BusId bus, const link::PulseStatus& status);
 
@@ -92,9 +96,15 @@ class Core {
   }
 
   // Answers to what the outputs were asked, what the daemon has kept from before, and checks.
-  TablesInService& tables() { return tables_; }
+  TablesInService& tables() {
+    state_.look_anew();
+    return tables_;
+  }
   // The store of positions: its answers, what the daemon has kept from before, and checks.
-  KeptPositions& kept() { return kept_; }
+  KeptPositions& kept() {
+    state_.look_anew();
+    return kept_;
+  }
 
   // Ramps down all motors and takes no more moves.
   void shut_down(std::int64_t now_us);

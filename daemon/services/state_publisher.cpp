@@ -10,6 +10,23 @@
 namespace bushd::daemon {
 namespace {
 
+bool same_positions(const bushd_report& a, const bushd_report& b) {
+  for (unsigned m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if (a.motor[m].position_steps != b.motor[m].position_steps) return false;
+  }
+  return true;
+}
+
+// All that a snapshot tells of a report of motors at rest. Times, SYNCs and counters go on.
+bool tell_the_same(const bushd_report& a, const bushd_report& b) {
+  return a.state == b.state && a.faults == b.faults && a.flags == b.flags &&
+         a.boot_number == b.boot_number && a.moving == b.moving && a.inputs == b.inputs &&
+         a.forbidden_positive == b.forbidden_positive &&
+         a.forbidden_negative == b.forbidden_negative && a.system_inputs == b.system_inputs &&
+         a.autonomous == b.autonomous && a.homed == b.homed && a.armed == b.armed &&
+         same_positions(a, b);
+}
+
 api::McuState state_word(const link::McuView& view) {
   if (view.phase == link::McuPhase::kOffline) return api::McuState::kOffline;
   if (view.phase == link::McuPhase::kConnecting || view.outdated_us > 0)
@@ -98,19 +115,52 @@ StatePublisher::StatePublisher(Installation& installation, const PseudoAxes& pse
       program_of_(std::move(program_of)),
       outputs_(outputs) {
   for (std::size_t i = 0; i < installation.config().state_parts(); ++i) described_.add();
+  for ([[maybe_unused]] const McuId id : installation.mcus()) told_.add();
 }
 
 void StatePublisher::step(std::int64_t now_us) {
-  due_us_ = std::min(due_us_, next_wake_us());
-  if (now_us >= due_us_) publish_all(now_us);
+  if (installation_.changed) due_us_ = std::min(due_us_, next_wake_us());
+  if (now_us >= due_us_) publish_due(now_us);
 }
 
 void StatePublisher::publish_all(std::int64_t now_us) {
+  anew_ = true;
+  publish_due(now_us);
+}
+
+void StatePublisher::publish_due(std::int64_t now_us) {
+  anew_ |= installation_.changed;
+  all_rest_ = true;
   for (const McuId id : installation_.mcus()) {
     const Mcu& mcu = installation_[id];
-    if (describes(now_us, id)) publish(now_us, id, description_of(mcu));
-    outputs_.publish(id, state_of(mcu));
+    const bool rests = installation_.rests(mcu);
+    all_rest_ &= rests;
+    if (anew_ || !rests || !is_as_told(now_us, mcu)) publish(now_us, id);
   }
+  publish_axes(now_us);
+  installation_.changed = anew_ = false;
+  sent_us_ = now_us;
+  due_us_ = now_us + kPeriodUs;
+}
+
+// A snapshot is long, and most MCUs rest. Precondition: this one does.
+bool StatePublisher::is_as_told(std::int64_t now_us, const Mcu& mcu) const {
+  const Told& told = told_[mcu.id];
+  const link::McuView& view = mcu.view();
+  return now_us < told.due_us && mcu.online() && view.outdated_us == 0 &&
+         tell_the_same(view.report, told.report) && view.note == told.note &&
+         program_of_(mcu.id).empty();
+}
+
+void StatePublisher::publish(std::int64_t now_us, McuId id) {
+  const Mcu& mcu = installation_[id];
+  if (describes(now_us, id)) publish(now_us, id, description_of(mcu));
+  outputs_.publish(id, state_of(mcu));
+  told_[id] = {
+      .due_us = now_us + kRestingPeriodUs, .report = mcu.view().report, .note = mcu.view().note};
+}
+
+void StatePublisher::publish_axes(std::int64_t now_us) {
   const auto of_motor = [this](MotorId motor) {
     return state_of(installation_.mcu_of(motor), installation_[motor]);
   };
@@ -119,13 +169,11 @@ void StatePublisher::publish_all(std::int64_t now_us) {
     if (describes(now_us, part)) publish(now_us, part, pseudo_axes_.description(i));
     outputs_.publish(part, pseudo_axes_.state(i, of_motor));
   }
-  installation_.changed = false;
-  sent_us_ = now_us;
-  due_us_ = now_us + kPeriodUs;
 }
 
 std::int64_t StatePublisher::next_wake_us() const {
-  return installation_.changed ? std::min(due_us_, sent_us_ + kMinPeriodUs) : due_us_;
+  if (installation_.changed) return std::min(due_us_, sent_us_ + kMinPeriodUs);
+  return all_rest_ ? due_us_ + kRestingSlackUs : due_us_;
 }
 
 // A description changes with what is marked as changed, and is long.
@@ -207,6 +255,7 @@ api::StateSnapshot StatePublisher::state_of(const Mcu& mcu) const {
   state.program = program_of_(mcu.id);
   state.boot = view.identified ? view.identity.boot_number : 0;
   state.tick = view.tick;
+  state.motors.reserve(mcu.motors().size());
   for (const MotorId motor : mcu.motors()) {
     state.motors.push_back(state_of(mcu, installation_[motor]));
   }

@@ -1,5 +1,6 @@
-// Tells clients what motors and MCUs do: 20 times a second, and at once on change; and what rarely
-// changes, every few seconds and on change.
+// Tells clients what motors and MCUs do: 20 times a second, and at once on change; of an MCU that
+// rests and tells nothing new, twice a second. And what rarely changes, every few seconds and on
+// change.
 #pragma once
 
 #include <cstdint>
@@ -17,11 +18,15 @@ namespace bushd::daemon {
 class StatePublisher {
  public:
   static constexpr std::int64_t kPeriodUs = 50'000;
+  static constexpr std::int64_t kRestingPeriodUs = 500'000;
+  // While all rest, what has come is told this much later at most: reports come as often, and with
+  // them the time to tell of them, so nothing is woken for that alone.
+  static constexpr std::int64_t kRestingSlackUs = 5'000;
   // "At once on change", but not more often than this: a client that sends many requests must not
   // make the daemon flood the network.
   static constexpr std::int64_t kMinPeriodUs = 5'000;
   // Passed on to clients every few seconds only (Publishing).
-  static constexpr std::int64_t kDescriptionPeriodUs = 500'000;
+  static constexpr std::int64_t kDescriptionPeriodUs = 1'000'000;
 
   // What an MCU has under way, and where, in words; "": nothing.
   using ProgramOf = std::function<std::string(McuId)>;
@@ -30,11 +35,24 @@ class StatePublisher {
                  const OpenMoves& open_moves, ProgramOf program_of, Outputs& outputs);
 
   void step(std::int64_t now_us);
+  // Something other than reports may have changed what clients see: nothing is taken to be as it
+  // was when it is published next.
+  void look_anew() { anew_ = true; }
   // As it is now, whether due or not.
   void publish_all(std::int64_t now_us);
   std::int64_t next_wake_us() const;
 
  private:
+  // What the snapshot of an MCU at rest was made of.
+  struct Told {
+    std::int64_t due_us = 0;  // whatever it tells
+    bushd_report report{};
+    std::string note;
+  };
+  void publish_due(std::int64_t now_us);
+  void publish(std::int64_t now_us, McuId id);
+  void publish_axes(std::int64_t now_us);
+  bool is_as_told(std::int64_t now_us, const Mcu& mcu) const;
   api::StateSnapshot state_of(const Mcu& mcu) const;
   api::MotorState state_of(const Mcu& mcu, const motion::Motor& motor) const;
   api::Description description_of(const Mcu& mcu) const;
@@ -51,6 +69,9 @@ class StatePublisher {
   ProgramOf program_of_;
   Outputs& outputs_;
   ById<McuId, Described> described_;  // then computed axes
+  ById<McuId, Told> told_;
+  bool anew_ = true;
+  bool all_rest_ = false;  // all MCUs, when they were published last
   std::int64_t due_us_ = 0;
   std::int64_t sent_us_ = INT64_MIN / 2;
 };

@@ -36,17 +36,19 @@ PositionTrust MotorTrust::judged(std::optional<std::uint16_t> boot_number,
                                  std::int64_t position_steps,
                                  const units::Coordinates& coordinates) const {
   using words::Trust;
-  const std::string mcu = "MCU " + mcu_;
-  if (!boot_number_) return {Trust::kUnknown, mcu + " has not reported where it stands yet"};
+  if (!boot_number_) {
+    return {Trust::kUnknown, "MCU " + mcu_ + " has not reported where it stands yet"};
+  }
   if (boot_number && *boot_number != *boot_number_) {
     std::string at = std::to_string(position_steps);
     if (coordinates.has_unit()) at += " (" + coordinates.text(position_steps) + ")";
-    return {Trust::kUnknown, mcu + " restarted; before, it was heard at " + at};
+    return {Trust::kUnknown, "MCU " + mcu_ + " restarted; before, it was heard at " + at};
   }
   if (restoring_) return {Trust::kUnknown, "its position is being restored"};
   if (lost_) {
-    std::string reason = lost_->in_motion ? mcu + " was lost while it moved, so it may have run on"
-                                          : mcu + " is out of reach; it rested when it was heard";
+    std::string reason = "MCU " + mcu_ +
+                         (lost_->in_motion ? " was lost while it moved, so it may have run on"
+                                           : " is out of reach; it rested when it was heard");
     if (uncertain_reason_) reason += "; besides, " + *uncertain_reason_;
     return {Trust::kStale, std::move(reason), lost_->heard_utime_us};
   }

@@ -342,8 +342,11 @@ void Lab::advance() {
   tell_pulse_status();
   std::int64_t next = std::max(core().next_wake_us() * 1000, now_ns_ + 1000);
   if (read_period_us > 0) next = std::min(next, now_ns_ + read_period_us * 1000);
-  for (const SimulatedBus& bus : buses_) {
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    const std::int64_t listen_us = core().listen_from_us(BusId{b});
+    if (listen_us > now_us()) next = std::min(next, listen_us * 1000);
     if (read_period_us != 0) continue;
+    const SimulatedBus& bus = buses_[b];
     next = std::min(next, bus.board ? bus.board->next_event_ns() : bus.bus->next_event_ns());
   }
   for (const auto& [due_us, answer] : state_jobs_) next = std::min(next, due_us * 1000);
@@ -363,6 +366,7 @@ void Lab::run_buses() {
     }
     if (buses_[b].drive) buses_[b].drive->advance_to(now_ns_);
     if (!core_ || buses_[b].received.empty()) continue;
+    if (core().listen_from_us(BusId{b}) > now_us()) continue;  // as bushd does
     const std::vector<std::uint8_t> bytes = std::exchange(buses_[b].received, {});
     core().receive(now_us(), BusId{b}, bytes);
   }

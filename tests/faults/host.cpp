@@ -102,8 +102,13 @@ void Host::take_in() {
   arriving_.clear();
 }
 
+bool Host::may_read() const {
+  return !inbox_.empty() && inbox_.front().due_ns <= now_ns_ &&
+         daemon_->core().listen_from_us({}) <= now_us();
+}
+
 void Host::deliver() {
-  while (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) {
+  while (may_read()) {
     core().receive(now_us(), {}, inbox_.front().bytes);
     inbox_.pop_front();
   }
@@ -121,8 +126,8 @@ void Host::step() {
 
 bool Host::anything_due() const {
   return (ends_at_ns_ && now_ns_ >= *ends_at_ns_) || now_ns_ >= wake_ns_ || !messages_.empty() ||
-         !disk_.empty() || (!inbox_.empty() && inbox_.front().due_ns <= now_ns_) ||
-         (kept_ && kept_->next_ns() <= now_ns_) || (bare_ != nullptr && bare_->due(now_ns_));
+         !disk_.empty() || may_read() || (kept_ && kept_->next_ns() <= now_ns_) ||
+         (bare_ != nullptr && bare_->due(now_ns_));
 }
 
 void Host::run(TimeNs now_ns) {

@@ -103,6 +103,8 @@ class Host final : public bushd::daemon::Outputs {
   void plug_in();
   bool end_if_due();
   void take_in();
+  // Something has arrived that the daemon listens for.
+  bool may_read() const;
   void deliver();
   void step();
   bool anything_due() const;

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "daemon/bench.h"
+#include "daemon/live_bench.h"
 
 namespace bushd::daemon {
 namespace {
@@ -35,6 +38,71 @@ TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   EXPECT_EQ(bench.states.back().state, api::McuState::kOffline);
   EXPECT_EQ(bench.states.back().motors.at(0).name, "m03");
   EXPECT_EQ(bench.states.back().program, "scan runs");
+}
+
+class OfResting : public testing::Test {
+ protected:
+  OfResting() {
+    bench.connect(service);
+    publisher.publish_all(bench.now_us());
+    bench.states.clear();
+  }
+  // For so long, as the core does it.
+  std::size_t publish_for(std::int64_t us) {
+    bench.states.clear();
+    const std::int64_t until_us = bench.now_us() + us;
+    while (bench.now_us() < until_us) {
+      bench.run_for(0.005);
+      publisher.step(bench.now_us());
+    }
+    return bench.states.size();
+  }
+
+  test::LiveBench bench;
+  Service service;
+  PseudoAxes none{bench.installation};
+  OpenMoves nobody{bench.installation};
+  std::string program;
+  StatePublisher publisher{bench.installation, none, nobody, [this](McuId) { return program; },
+                           bench};
+};
+
+TEST_F(OfResting, McusIsPublishedTwiceASecond) {
+  const std::size_t mcus = bench.installation.mcus().size();
+  publish_for(1'000'000);
+  const std::size_t states = publish_for(10'000'000);
+  EXPECT_GE(states, 18 * mcus);
+  EXPECT_LE(states, 20 * mcus) << "a state takes many times as long as a look at its report";
+}
+
+TEST_F(OfResting, McusIsPublishedAtOnceWhenItsReportIsAnotherOne) {
+  publish_for(1'000'000);
+  bench.installation[McuId{0}].bus().control(bench.installation[McuId{0}].on_bus(),
+                                             BUSHD_CONTROL_DISABLE);
+  bench.installation.changed = false;
+  const std::int64_t before_us = bench.now_us();
+  const auto told = [&] {
+    return std::ranges::any_of(bench.states, [](const api::StateSnapshot& state) {
+      return state.detail == "drivers disabled";
+    });
+  };
+  bench.states.clear();
+  while (!told() && bench.now_us() < before_us + 1'000'000) {
+    bench.run_for(0.005);
+    publisher.step(bench.now_us());
+  }
+  EXPECT_LE(bench.now_us() - before_us, 150'000);
+}
+
+TEST_F(OfResting, McusIsPublishedWhenAnythingElseMayHaveChanged) {
+  publish_for(1'000'000);
+  publisher.look_anew();
+  EXPECT_EQ(publish_for(StatePublisher::kPeriodUs + 5'000), bench.installation.mcus().size());
+  EXPECT_LE(publisher.next_wake_us() - bench.now_us(),
+            StatePublisher::kPeriodUs + StatePublisher::kRestingSlackUs);
+  program = "scan runs, frame 3";
+  EXPECT_GE(publish_for(5 * StatePublisher::kPeriodUs), 4 * bench.installation.mcus().size())
+      << "a program goes on without a report that tells of it";
 }
 
 }  // namespace
