@@ -2,18 +2,12 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/epoll.h>
-#include <systemd/sd-event.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <csignal>
-#include <cstring>
 #include <limits>
 
 #include "base/printable.h"
-#include "daemon/shell/event_loop_source.h"
 #include "daemon/shell/process.h"
 #include "daemon/shell/service_manager.h"
 #include "daemon/shell/table_service.h"
@@ -24,8 +18,13 @@ namespace {
 constexpr std::size_t kMaxTableJobs = 64;  // anybody may ask for tables
 constexpr int kMaxTableJobsPerClient = 4;
 
-std::string loop_text(int error) {
-  return std::string("event loop: ") + std::strerror(-error);
+// What is due within a step is done at its end, in one turn: the polls of many buses, as a rule.
+// They may be late by as much, and the clock of an MCU is told to no less.
+constexpr std::int64_t kStepUs = 500;
+
+std::int64_t in_step(std::int64_t due_us) {
+  if (due_us > std::numeric_limits<std::int64_t>::max() - kStepUs) return due_us;
+  return (due_us + kStepUs - 1) / kStepUs * kStepUs;
 }
 
 }  // namespace
@@ -82,40 +81,27 @@ EventLoop::EventLoop(const config::Config& config, Fronts fronts, MoveLogWriter*
 }
 
 EventLoop::~EventLoop() {
-  sources_.clear();
-  keypads_.clear();
-  for (Port& port : ports_) port.source.reset();
-  sd_event_unref(event_);
+  watches_.clear();  // before the descriptors of the workers are closed
 }
 
-Result<std::unique_ptr<EventLoop::Source>> EventLoop::watch(int fd, Handler handler) {
-  auto source = std::make_unique<Source>(std::move(handler));
-  if (const int error = source->watch(event_, fd); error < 0) return fail(loop_text(error));
-  return source;
-}
-
-Result<void> EventLoop::keep_watching(int fd, Handler handler) {
-  auto source = watch(fd, std::move(handler));
-  if (!source) return fail(source.error());
-  sources_.push_back(std::move(*source));
+Result<void> EventLoop::keep_watching(int fd, PollSet::Handler handler) {
+  auto watched = poll_set_.watch(fd, PollSet::Turn::kFirst, std::move(handler));
+  if (!watched) return fail(watched.error());
+  watches_.push_back(std::move(*watched));
   return {};
 }
 
 Result<void> EventLoop::set_up_signals() {
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2}) {
-    sources_.push_back(std::make_unique<Source>(
-        [this, signal](std::uint32_t) { handle_signal(now_us(), signal); }));
-    if (const int error = sources_.back()->watch_signal(event_, signal); error < 0) {
-      return fail(loop_text(error));
-    }
+  if (const auto opened = signals_.open({SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2}); !opened) {
+    return opened;
   }
-  return {};
+  return keep_watching(signals_.fd(), [this](std::uint32_t) { handle_signals(now_us()); });
 }
 
 Result<void> EventLoop::set_up() {
-  if (const int error = sd_event_new(&event_); error < 0) return fail(loop_text(error));
+  if (const auto opened = poll_set_.open(); !opened) return opened;
   if (const auto watched = set_up_signals(); !watched) return watched;
-  const Handler lcm = [this](std::uint32_t) { lcm_front_.handle(); };
+  const PollSet::Handler lcm = [this](std::uint32_t) { lcm_front_.handle(); };
   if (const auto watched = keep_watching(fronts_.lcm.fd(), lcm); !watched) return watched;
   if (fronts_.stops != nullptr) {
     if (const auto watched = keep_watching(fronts_.stops->fd(), lcm); !watched) return watched;
@@ -180,7 +166,7 @@ Result<void> EventLoop::run() {
     tell_systemd(now);
     const bool done = core_.at_rest() && core_.settled();
     if (shut_down_by_us_ && (done || now >= *shut_down_by_us_)) break;
-    if (const auto handled = handle_sources(); !handled) return handled;
+    if (const auto handled = handle_ready(); !handled) return handled;
     carry_out_some();
     core_.work();
   }
@@ -204,17 +190,21 @@ void EventLoop::keep_up(std::int64_t now) {
     if (const auto status = std::exchange(ports_[bus].status, std::nullopt)) {
       core_.pulse_status(now_us(), bus, *status);
     }
+    update_interest(now, bus);
   }
 }
 
-Result<void> EventLoop::handle_sources() {
-  std::int64_t wait_us = std::max<std::int64_t>(0, next_wake_us() - now_us());
-  // One call dispatches one source, the one that has waited longest. The others come before any
-  // work in slices; where there is none, run() looks again.
-  for (std::size_t i = 0; i < sources_.size() + ports_.size() + keypads_.size(); ++i) {
-    const int dispatched = sd_event_run(event_, static_cast<std::uint64_t>(wait_us));
-    if (dispatched < 0 && dispatched != -EINTR) return fail(loop_text(dispatched));
-    if (dispatched <= 0 || (reception_.idle() && !core_.has_work())) return {};
+Result<void> EventLoop::handle_ready() {
+  const std::int64_t now = now_us();
+  const std::int64_t due_us = next_wake_us();
+  std::int64_t wait_us = due_us <= now ? 0 : in_step(due_us) - now;
+  // All that is ready comes before any work in slices, but not what comes meanwhile; where there is
+  // no work, run() looks again.
+  const std::size_t most = (watches_.size() + ports_.size() + keypads_.size()) / PollSet::kAtOnce;
+  for (std::size_t i = 0; i <= most; ++i) {
+    const auto handled = poll_set_.handle(wait_us);
+    if (!handled) return fail(handled.error());
+    if (!*handled || (reception_.idle() && !core_.has_work())) return {};
     keep_up(now_us());
     wait_us = 0;
   }
@@ -227,12 +217,17 @@ std::int64_t EventLoop::next_wake_us() const {
       {core_.next_wake_us(), publishing_.next_wake_us(), next_keypad_wake_us(), alive_due_us_});
   for (const Port& port : ports_) {
     if (port.lost) return 0;
+    if (port.serial && port.listen_us > 0) wake = std::min(wake, port.listen_us);
     if (port.opening) continue;
     wake = std::min(wake, port.serial ? port.search.due_us() : port.open_due_us);
   }
   if (socket_front_) wake = std::min(wake, socket_front_->next_wake_us());
   if (shut_down_by_us_) wake = std::min(wake, *shut_down_by_us_);
   return wake;
+}
+
+void EventLoop::handle_signals(std::int64_t now) {
+  while (const auto signal = signals_.take()) handle_signal(now, *signal);
 }
 
 void EventLoop::handle_signal(std::int64_t now, int signal) {

@@ -26,14 +26,14 @@
 #include "daemon/shell/bus_port.h"
 #include "daemon/shell/log_limit.h"
 #include "daemon/shell/move_log_writer.h"
+#include "daemon/shell/poll_set.h"
 #include "daemon/shell/port_search.h"
+#include "daemon/shell/signals.h"
 #include "daemon/shell/table_library.h"
 #include "daemon/shell/worker.h"
 #include "lcm/transport.h"
 #include "state/keeper.h"
 #include "state/store.h"
-
-struct sd_event;
 
 namespace bushd::daemon {
 
@@ -62,10 +62,6 @@ class EventLoop : private Outputs, private state::Backend {
   // from ending.
   static constexpr std::int64_t kShutDownSlackUs = 3'000'000;
 
-  // What is done when there is something; lives as long as it is watched.
-  class Source;
-  using Handler = std::function<void(std::uint32_t events)>;
-
   struct Port {
     explicit Port(PortSearch its_search);
     Port(Port&&) noexcept;
@@ -74,10 +70,11 @@ class EventLoop : private Outputs, private state::Backend {
     std::unique_ptr<BusPort> serial{};
     bool opening = false;                       // a worker opens it, or another match
     std::optional<link::PulseStatus> status{};  // to be told to the core
-    std::unique_ptr<Source> source{};           // of its descriptor
+    std::unique_ptr<PollSet::Watch> watch{};    // of its descriptor
+    std::int64_t listen_us = 0;                 // what comes before is left unread
     std::int64_t open_due_us = 0;
     std::string last_error{};  // so that a missing port is logged once, not twice a second
-    // Why it is to be given up, as soon as neither the core nor its source is at work.
+    // Why it is to be given up, as soon as neither the core nor its watch is at work.
     std::optional<std::string> lost{};
   };
 
@@ -88,7 +85,7 @@ class EventLoop : private Outputs, private state::Backend {
     Keypad keypad;
     std::optional<serial::SerialPort> serial{};
     bool opening = false;
-    std::unique_ptr<Source> source{};
+    std::unique_ptr<PollSet::Watch> watch{};
     std::int64_t open_due_us = 0;
     std::string last_error{};
     std::optional<std::string> lost{};  // as of Port
@@ -96,8 +93,7 @@ class EventLoop : private Outputs, private state::Backend {
 
   Result<void> set_up();
   Result<void> set_up_signals();
-  Result<std::unique_ptr<Source>> watch(int fd, Handler handler);
-  Result<void> keep_watching(int fd, Handler handler);
+  Result<void> keep_watching(int fd, PollSet::Handler handler);
   void open_due_ports(std::int64_t now_us);
   void port_opened(std::int64_t now_us, BusId bus, Result<std::unique_ptr<BusPort>> opened);
   void search_ports(std::int64_t now_us);
@@ -115,18 +111,19 @@ class EventLoop : private Outputs, private state::Backend {
   void handle_keypad(std::int64_t now_us, KeypadPort& port);
   void step_keypads(std::int64_t now_us);
   std::int64_t next_keypad_wake_us() const;
+  void handle_signals(std::int64_t now_us);
   void handle_signal(std::int64_t now_us, int signal);
   Result<void> restore_tables();
   // The core has what is due done, and hears at once what became of it.
   void keep_up(std::int64_t now_us);
-  // Waits until something comes, then handles each source that has something, once: a stop among
-  // them comes before any more of the requests that wait.
-  Result<void> handle_sources();
+  // Waits until something comes, and handles what has come: a stop among it comes before any more
+  // of the requests that wait.
+  Result<void> handle_ready();
   // Some of the requests that wait, for as long as nothing else has to wait for that.
   void carry_out_some();
   void post_table_job(const api::Asker& asker, const api::Request& request);
   void answer_table_job(const api::Asker& asker, const api::Reply& reply);
-  void update_write_interest(BusId bus);
+  void update_interest(std::int64_t now_us, BusId bus);
   std::int64_t next_wake_us() const;
   void log_cpu_share() const;
   api::Asker with_log(const api::Asker& asker, const api::Request& request);
@@ -165,15 +162,17 @@ class EventLoop : private Outputs, private state::Backend {
   Reception reception_;
   LcmFront lcm_front_;
   std::unique_ptr<SocketFront> socket_front_;  // null: no control socket
+  PollSet poll_set_;
+  Signals signals_;
   ById<BusId, Port> ports_;
   std::vector<std::unique_ptr<KeypadPort>> keypads_;
+  std::vector<std::uint8_t> received_;               // by one read
   ById<McuId, api::McuState> mcu_states_;            // as published last
   std::unordered_map<std::string, int> table_jobs_;  // waiting, by client
   LogLimit log_limit_;
   LogLimit stop_limit_;  // of stops in the log of moves
   LcmWatch lcm_watch_;
-  sd_event* event_ = nullptr;
-  std::vector<std::unique_ptr<Source>> sources_;  // those of ports aside
+  std::vector<std::unique_ptr<PollSet::Watch>> watches_;  // those of ports aside
   std::int64_t started_us_ = 0;
   std::optional<std::string> status_;  // to be told to systemd
   const std::int64_t alive_us_;        // of alive_period_us()

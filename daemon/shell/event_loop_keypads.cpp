@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "daemon/shell/event_loop.h"
-#include "daemon/shell/event_loop_source.h"
 #include "daemon/shell/process.h"
 
 namespace bushd::daemon {
@@ -41,9 +40,10 @@ void EventLoop::keypad_opened(std::int64_t now, KeypadPort& port,
                               Result<serial::SerialPort> opened) {
   port.opening = false;
   port.open_due_us = now + kReopenUs;
-  Result<std::unique_ptr<Source>> watched;
+  Result<std::unique_ptr<PollSet::Watch>> watched;
   if (opened) {
-    watched = watch(opened->fd(), [this, &port](std::uint32_t) { handle_keypad(now_us(), port); });
+    watched = poll_set_.watch(opened->fd(), PollSet::Turn::kFirst,
+                              [this, &port](std::uint32_t) { handle_keypad(now_us(), port); });
   }
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
@@ -53,7 +53,7 @@ void EventLoop::keypad_opened(std::int64_t now, KeypadPort& port,
                fmt::format("keypad: {}; trying again twice a second", error));
   }
   port.serial = std::move(*opened);
-  port.source = std::move(*watched);
+  port.watch = std::move(*watched);
   port.last_error.clear();
   log(LogLevel::kInfo, port.config.motor,
       fmt::format("keypad: port {} opened at {} baud", port.serial->path(), port.config.baud));
@@ -65,7 +65,7 @@ void EventLoop::lose_keypad(std::int64_t now, KeypadPort& port) {
       fmt::format("keypad: port {} lost: {}; trying again twice a second", port.serial->path(),
                   *port.lost));
   port.lost.reset();
-  port.source.reset();
+  port.watch.reset();
   close_in_worker(std::make_shared<serial::SerialPort>(std::move(*port.serial)));
   port.serial.reset();
   port.open_due_us = now + kReopenUs;

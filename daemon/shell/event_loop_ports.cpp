@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "daemon/shell/event_loop.h"
-#include "daemon/shell/event_loop_source.h"
 #include "daemon/shell/process.h"
 
 namespace bushd::daemon {
@@ -88,10 +87,11 @@ void EventLoop::port_opened(std::int64_t now, BusId bus, Result<std::unique_ptr<
   const config::Bus& config = config_[bus];
   port.opening = false;
   port.open_due_us = now + kReopenUs;
-  Result<std::unique_ptr<Source>> watched;
+  Result<std::unique_ptr<PollSet::Watch>> watched;
   if (opened) {
-    watched = watch((*opened)->fd(),
-                    [this, bus](std::uint32_t events) { handle_port(now_us(), bus, events); });
+    watched =
+        poll_set_.watch((*opened)->fd(), PollSet::Turn::kUsual,
+                        [this, bus](std::uint32_t events) { handle_port(now_us(), bus, events); });
   }
   if (!opened || !watched) {
     const std::string error = opened ? watched.error().text() : opened.error().text();
@@ -105,7 +105,7 @@ void EventLoop::port_opened(std::int64_t now, BusId bus, Result<std::unique_ptr<
     return;
   }
   port.serial = std::move(*opened);
-  port.source = std::move(*watched);
+  port.watch = std::move(*watched);
   port.last_error.clear();
   port.search.opened(now, port.serial->path());
   const std::string text = fmt::format("bus {}: port {} opened {}", config.name,
@@ -131,7 +131,7 @@ void EventLoop::lose_port(std::int64_t now, BusId bus, const std::string& cause)
 
 void EventLoop::release_port(BusId bus) {
   Port& port = ports_[bus];
-  port.source.reset();
+  port.watch.reset();
   close_in_worker(std::shared_ptr<BusPort>(std::move(port.serial)));
   port.status.reset();
 }
@@ -143,14 +143,14 @@ void EventLoop::close_in_worker(std::shared_ptr<void> port) {
   });
 }
 
-// What is lost is given up in the loop: its source cannot go while it is being handled.
+// What is lost is given up in the loop: its watch cannot go while it is being handled.
 void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
   if (!ports_[bus].serial) return;
   BusPort& serial = *ports_[bus].serial;
   if (events & EPOLLIN) {
-    std::vector<std::uint8_t> bytes;
-    const auto read = serial.read(bytes);
-    if (!bytes.empty()) core_.receive(now, bus, bytes);
+    received_.clear();
+    const auto read = serial.read(received_);
+    if (!received_.empty()) core_.receive(now, bus, received_);
     if (!read) ports_[bus].lost = read.error().text();
   } else if (events & (EPOLLHUP | EPOLLERR)) {
     ports_[bus].lost = "hung up";
@@ -158,22 +158,26 @@ void EventLoop::handle_port(std::int64_t now, BusId bus, std::uint32_t events) {
   if (events & EPOLLOUT) {
     const auto flushed = serial.flush();
     if (!flushed) ports_[bus].lost = flushed.error().text();
-    update_write_interest(bus);
   }
 }
 
-void EventLoop::update_write_interest(BusId bus) {
-  const bool writes = ports_[bus].serial->wants_to_write();
-  ports_[bus].source->await(EPOLLIN | (writes ? static_cast<std::uint32_t>(EPOLLOUT) : 0u));
+// A port whose answers decide nothing yet is not listened to: each wakes the daemon, and all are
+// read at once when the last of them may be there.
+void EventLoop::update_interest(std::int64_t now, BusId bus) {
+  Port& port = ports_[bus];
+  if (!port.serial) return;
+  const std::int64_t from_us = core_.listen_from_us(bus);
+  port.listen_us = from_us > now ? from_us : 0;
+  std::uint32_t events = 0;
+  if (port.listen_us == 0) events |= EPOLLIN;
+  if (port.serial->wants_to_write()) events |= EPOLLOUT;
+  port.watch->await(events);
 }
 
 void EventLoop::send(BusId bus, std::span<const std::uint8_t> bytes) {
   if (!ports_[bus].serial) return;
-  const bool waited = ports_[bus].serial->wants_to_write();
   if (const auto written = ports_[bus].serial->write(bytes); !written) {
     ports_[bus].lost = written.error().text();
-  } else if (waited != ports_[bus].serial->wants_to_write()) {
-    update_write_interest(bus);
   }
 }
 
