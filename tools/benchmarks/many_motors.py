@@ -3,12 +3,14 @@
     tests/tools/with-loopback-multicast python3 tools/benchmarks/many_motors.py --buses 8 --mcus 4
 
 Each bus is a bushsim of its own, whose MCUs have 16 motors each and make runs of their tables. Needs bushd, bushsim and
-bushctl of build/release. Other programs on the machine make the figures larger, so compare builds in turns: --bushd FILE.
+bushctl of build/release. Other programs on the machine make the figures larger, so builds are compared in turns:
+--bushd BEFORE --bushd AFTER --turns 3 prints the medians of each.
 """
 
 import argparse
 import os
 import pathlib
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -18,6 +20,7 @@ TOP = pathlib.Path(__file__).resolve().parents[2]
 BIN = TOP / "build" / "release" / "bin"
 TABLES = ["bushd2-constant", "bushd2-scurve", "bushd2-exponential", "bushd2-resonance"]
 MOTORS_PER_MCU = 16
+MOTORS_PER_REQUEST = 1024  # more do not fit into one
 FAR_STEPS = 400_000  # 160 s
 GIVE_UP_S = 60
 
@@ -59,11 +62,13 @@ def measure(what, pid, seconds):
     time.sleep(seconds)
     passed_s = time.monotonic() - begin_s
     more_s, more_switches = used(pid)
-    share, rate = (more_s - used_s) / passed_s, (more_switches - switches) / passed_s
-    print(f"{what}: {100 * share:.2f} % of a core, {rate:.0f} changes of context a second", flush=True)
+    share, rate = 100 * (more_s - used_s) / passed_s, (more_switches - switches) / passed_s
+    print(f"{what}: {share:.2f} % of a core, {rate:.0f} changes of context a second", flush=True)
+    return share
 
 
-def run(options, folder, programs):
+def run(options, bushd, folder, programs):
+    """Percent of a core at rest, and while all move."""
     text, motors = configuration(options, folder)
     config = folder / "bushd.toml"
     config.write_text(text, encoding="utf-8")
@@ -75,7 +80,9 @@ def run(options, folder, programs):
         return programs[-1]
 
     def bushctl(*arguments):
-        subprocess.run([BIN / "bushctl", *arguments, "--socket", folder / "control"], check=True, stdout=subprocess.DEVNULL)
+        command = [BIN / "bushctl", *arguments, "--socket", folder / "control"]
+        if subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode != 0:
+            sys.exit(f"bushctl {arguments[0]} has failed: this machine may be too slow for so many bushsim")
 
     ports = [folder / f"port{bus}" for bus in range(options.buses)]
     for bus, port in enumerate(ports):
@@ -85,16 +92,28 @@ def run(options, folder, programs):
         if time.monotonic() > give_up_s or any(program.poll() is not None for program in programs):
             sys.exit((folder / "0.log").read_text(encoding="utf-8"))
         time.sleep(0.05)
-    daemon = start(options.bushd, "--config", config)
+    daemon = start(bushd, "--config", config)
     bushctl("status", "--wait-s", str(GIVE_UP_S))
     time.sleep(2)
-    measure(f"{motors} motors at rest", daemon.pid, options.seconds)
-    moves = []
-    for motor in range(motors):
-        moves += [f"m{motor}", str(FAR_STEPS if motor % 2 else -FAR_STEPS)]
-    bushctl("move", "--steps", *moves)
+    at_rest = measure(f"{motors} motors at rest", daemon.pid, options.seconds)
+    for first in range(0, motors, MOTORS_PER_REQUEST):
+        moves = []
+        for motor in range(first, min(first + MOTORS_PER_REQUEST, motors)):
+            moves += [f"m{motor}", str(FAR_STEPS if motor % 2 else -FAR_STEPS)]
+        bushctl("move", "--steps", *moves)
     time.sleep(4)
-    measure(f"{motors} motors moving", daemon.pid, options.seconds)
+    return at_rest, measure(f"{motors} motors moving", daemon.pid, options.seconds)
+
+
+def run_in_folder(options, bushd):
+    programs = []
+    with tempfile.TemporaryDirectory(prefix="bushd-many-") as folder:
+        try:
+            return run(options, bushd, pathlib.Path(folder), programs)
+        finally:
+            for program in programs:
+                program.kill()
+                program.wait()
 
 
 def main():
@@ -102,16 +121,18 @@ def main():
     parser.add_argument("--buses", type=int, default=8)
     parser.add_argument("--mcus", type=int, default=4, help="of each bus, 16 motors each")
     parser.add_argument("--seconds", type=float, default=10, help="of each measurement")
-    parser.add_argument("--bushd", type=pathlib.Path, default=BIN / "bushd")
+    parser.add_argument("--bushd", type=pathlib.Path, action="append", help="several: in turns")
+    parser.add_argument("--turns", type=int, default=1)
     options = parser.parse_args()
-    programs = []
-    with tempfile.TemporaryDirectory(prefix="bushd-many-") as folder:
-        try:
-            run(options, pathlib.Path(folder), programs)
-        finally:
-            for program in programs:
-                program.kill()
-                program.wait()
+    builds = options.bushd or [BIN / "bushd"]
+    seen = {bushd: [] for bushd in builds}
+    for _ in range(options.turns):
+        for bushd in builds:
+            print(f"{bushd}, load average {os.getloadavg()[0]:.1f}", flush=True)
+            seen[bushd].append(run_in_folder(options, bushd))
+    for bushd, shares in seen.items():
+        at_rest, moving = (statistics.median(column) for column in zip(*shares))
+        print(f"{bushd}: medians of {options.turns}: at rest {at_rest:.2f} %, moving {moving:.2f} % of a core")
 
 
 if __name__ == "__main__":
