@@ -12,7 +12,6 @@
 namespace bushd::daemon {
 namespace {
 
-constexpr int kLastN = 31;
 constexpr const char* kMemory = "memory";  // in the store
 constexpr const char* kMotion = "motion";
 constexpr int kWrites = 16;  // the function
@@ -32,27 +31,26 @@ camac::AdjustableDelay adjusts(const config::CamacModule& module) {
              : camac::AdjustableDelay::kReturn;
 }
 
-Result<void> in_range(const char* what, std::int64_t value, std::int64_t least, std::int64_t most) {
-  if (value >= least && value <= most) return {};
-  return fail(std::string(what) + " " + std::to_string(value) +
-              " is out of range; allowed: " + std::to_string(least) + ".." + std::to_string(most));
+Result<void> in_range(const char* what, std::int64_t value, fields::Range<std::int64_t> allowed) {
+  if (allowed.has(value)) return {};
+  return fail(std::string(what) + " " + std::to_string(value) + " is out of range; allowed: " +
+              std::to_string(allowed.least) + ".." + std::to_string(allowed.most));
 }
 
 Result<void> check(const camac::Naf& naf) {
-  auto good = in_range("station", naf.station, 1, kLastN);
-  if (good) good = in_range("subaddress", naf.subaddress, 0, camac::kLastSubaddress);
-  if (good) good = in_range("function", naf.function, 0, camac::kLastFunction);
-  if (good) good = in_range("data", naf.data, 0, camac::kDataMask);
+  auto good = in_range("station", naf.station, camac::kStation);
+  if (good) good = in_range("subaddress", naf.subaddress, camac::kSubaddress);
+  if (good) good = in_range("function", naf.function, camac::kFunction);
+  if (good) good = in_range("data", naf.data, camac::kData);
   return good;
 }
 
 Result<void> check(const camac::Block& block) {
-  constexpr std::int64_t kMost = api::Camac::kMostCycles;
   const auto cycles = static_cast<std::int64_t>(block.cycles.size());
-  auto good = in_range("number of cycles", cycles, 1, kMost);
-  if (good) good = in_range("count", block.count, 1, kMost);
-  if (good) good = in_range("last station", block.last_station, 1, camac::kStations);
-  if (good) good = in_range("last subaddress", block.last_subaddress, 0, camac::kLastSubaddress);
+  auto good = in_range("number of cycles", cycles, camac::Block::kWords);
+  if (good) good = in_range("count", block.count, camac::Block::kWords);
+  if (good) good = in_range("last station", block.last_station, camac::kModules);
+  if (good) good = in_range("last subaddress", block.last_subaddress, camac::kSubaddress);
   for (std::size_t i = 0; good && i < block.cycles.size(); ++i) good = check(block.cycles[i]);
   if (!good) return good;
   const bool words =

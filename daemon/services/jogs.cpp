@@ -19,11 +19,10 @@ std::string ms_text(std::int64_t us) {
 Result<void> in_range(const api::Jog& request) {
   using Jog = api::Jog;
   if (request.per_s == 0 && !request.renew) return {};
-  if (request.keepalive_ms < Jog::kLeastKeepaliveMs ||
-      request.keepalive_ms > Jog::kMostKeepaliveMs) {
+  if (!Jog::kKeepaliveMs.has(request.keepalive_ms)) {
     return fail("keepalive time of " + std::to_string(request.keepalive_ms) +
-                " ms; allowed: " + std::to_string(Jog::kLeastKeepaliveMs) + " to " +
-                std::to_string(Jog::kMostKeepaliveMs) + " ms");
+                " ms; allowed: " + std::to_string(Jog::kKeepaliveMs.least) + " to " +
+                std::to_string(Jog::kKeepaliveMs.most) + " ms");
   }
   if (!request.steps_after) return {};
   return fail("steps after the stop event belong to the request that ends the jog, of speed 0");

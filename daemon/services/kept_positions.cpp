@@ -12,7 +12,6 @@ namespace bushd::daemon {
 namespace {
 
 constexpr std::int64_t kSeenPeriodUs = 1'000'000;
-constexpr std::int32_t kMostPast = 1000;
 constexpr int kMostReading = 16;  // anybody may ask for a history
 
 // "" of a motor without a unit: its positions are steps.
@@ -161,10 +160,10 @@ void KeptPositions::answer_open(std::int64_t now_us) {
 void KeptPositions::request(const api::Asker& asker, const api::GetHistory& request) {
   const auto motor = installation_.find(request.motor);
   if (!motor) return asker.answer(api::Refused{motor.error().text()});
-  if (request.most < 1 || request.most > kMostPast) {
+  if (!api::GetHistory::kMost.has(request.most)) {
     return asker.answer(api::Refused{std::to_string(request.most) +
                                      " lines of history; allowed: 1 to " +
-                                     std::to_string(kMostPast)});
+                                     std::to_string(api::GetHistory::kMost.most)});
   }
   if (!keeper_) {
     return asker.answer(

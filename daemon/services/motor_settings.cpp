@@ -1,5 +1,7 @@
 #include "daemon/services/motor_settings.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -87,11 +89,8 @@ Result<MotorSettings::Plan> MotorSettings::plan_of(
       for (const config::SettingKey each : config::kSettingKeys) known.push_back(name_of(each));
       return fail(name + ": \"" + word + "\" cannot be changed in operation" +
                   did_you_mean(word, known) +
-                  "; allowed: offset, direction, soft_limits, "
-                  "input_active, local, keypad, velocity, currents, max_speed, acceleration, "
-                  "phase_sequence. Edit "
-                  "bushd.toml and restart "
-                  "bushd for other keys");
+                  fmt::format("; allowed: {}. Edit bushd.toml and restart bushd for other keys",
+                              fmt::join(known, ", ")));
     }
     for (const MotorId motor : changed_by(*id, *key)) {
       if (auto added = add(plan, motor, *key, value, from); !added) return fail(added.error());

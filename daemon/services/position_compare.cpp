@@ -50,14 +50,14 @@ Result<MotorId> PositionCompare::check(const api::PositionCompare& request) cons
     return fail(request.motor + ": positions lie within +-" +
                 std::to_string(motion::Motor::kMaxPosition));
   }
-  if (!within(request.delay_us, 0, BUSHD_POSITION_COMPARE_MAX_DELAY_US)) {
+  if (!api::PositionCompare::kDelayUs.has(request.delay_us)) {
     return fail("a delay of " + std::to_string(request.delay_us) +
                 " us before the pulse; allowed: 0 to " +
-                std::to_string(BUSHD_POSITION_COMPARE_MAX_DELAY_US));
+                std::to_string(api::PositionCompare::kDelayUs.most));
   }
-  if (!within(request.width_us, 1, BUSHD_POSITION_COMPARE_MAX_WIDTH_US)) {
+  if (!api::PositionCompare::kWidthUs.has(request.width_us)) {
     return fail("a pulse of " + std::to_string(request.width_us) + " us; allowed: 1 to " +
-                std::to_string(BUSHD_POSITION_COMPARE_MAX_WIDTH_US));
+                std::to_string(api::PositionCompare::kWidthUs.most));
   }
   return id;
 }

@@ -67,8 +67,9 @@ auto Trajectories::begin(const api::Asker& asker, const api::Follow& request) ->
     return fail(fmt::format("{} motors are named; a trajectory has at most {}", motors->size(),
                             api::Follow::kMostMotors));
   }
-  if (!(request.stretch >= 0.001 && request.stretch <= 1000)) {
-    return fail(fmt::format("times stretched by {}; allowed: 0.001 to 1000", request.stretch));
+  if (!api::Follow::kStretch.has(request.stretch)) {
+    return fail(fmt::format("times stretched by {}; allowed: {} to {}", request.stretch,
+                            api::Follow::kStretch.least, api::Follow::kStretch.most));
   }
   Loaded loaded{
       .client = client_of(asker),

@@ -11,10 +11,12 @@
 namespace bushd::daemon {
 
 Result<void> check_trigger_delay(std::int64_t delay_us) {
-  if (delay_us >= BUSHD_TRIGGER_MIN_DELAY_US && delay_us <= BUSHD_TRIGGER_MAX_DELAY_US) return {};
-  return fail("a delay of " + std::to_string(delay_us) +
-              " us after the trigger; allowed: " + std::to_string(BUSHD_TRIGGER_MIN_DELAY_US) +
-              " to " + std::to_string(BUSHD_TRIGGER_MAX_DELAY_US));
+  constexpr auto kAllowed = api::Arm::kDelayUs;
+  static_assert(kAllowed.least == BUSHD_TRIGGER_MIN_DELAY_US &&
+                kAllowed.most == BUSHD_TRIGGER_MAX_DELAY_US);
+  if (kAllowed.has(delay_us)) return {};
+  return fail("a delay of " + std::to_string(delay_us) + " us after the trigger; allowed: " +
+              std::to_string(kAllowed.least) + " to " + std::to_string(kAllowed.most));
 }
 
 void Trigger::request(const api::Asker& asker, const api::Arm& request) {

@@ -129,7 +129,7 @@ void WaitingRequests::refuse(Held& held, const std::string& reason) {
 bool WaitingRequests::is_let_go(std::int64_t now_us, const Held& held) {
   const auto* jog = std::get_if<api::Jog>(&held.request);
   if (jog == nullptr) return false;
-  const std::int64_t keepalive_ms = std::max(jog->keepalive_ms, api::Jog::kLeastKeepaliveMs);
+  const std::int64_t keepalive_ms = std::max(jog->keepalive_ms, api::Jog::kKeepaliveMs.least);
   return now_us >= held.since_us + keepalive_ms * 1000 ||
          (held.asker.session && held.asker.session->gone());
 }

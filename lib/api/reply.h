@@ -18,113 +18,135 @@
 
 namespace bushd::api {
 
-// Which table it is, in short.
 struct TableRef {
   std::string name{};
-  std::uint32_t revision = 0;  // counted by bushtab from 1; 0: the table's file tells none
-  std::string hash{};          // first kHashLength digits of the SHA-256 of what moves a motor
-  static constexpr std::size_t kHashLength = 8;
+  std::uint32_t revision = 0;
+  std::string hash{};
+  static constexpr std::size_t kHashLength = 8;  // digits
+
+  static constexpr std::string_view kName = "table ref";
+  static constexpr std::string_view kMeaning = "Which table it is, in short.";
   static void fields(auto& self, auto& visit) {
     visit("name", self.name);
-    visit("revision", self.revision, fields::OrZero<std::int32_t>{INT32_MAX});
-    visit("hash", self.hash);
+    visit({"revision", "counted by bushtab from 1; 0: the table's file tells none"}, self.revision,
+          fields::OrZero<std::int32_t>{INT32_MAX});
+    visit({"hash", "the first 8 digits of the SHA-256 of what moves a motor (docs/tables.md)"},
+          self.hash);
   }
   friend bool operator==(const TableRef&, const TableRef&) = default;
 };
 
 // A number of decimals.
+inline constexpr fields::Range<int> kDecimals{0, units::Coordinates::kMostDecimals};
 struct Decimals {
   static std::int8_t told(int decimals) { return static_cast<std::int8_t>(decimals); }
   static bool taken(std::int8_t told, int& decimals) {
-    decimals = std::clamp<int>(told, 0, units::Coordinates::kMostDecimals);
+    decimals = std::clamp<int>(told, kDecimals.least, kDecimals.most);
     return true;
   }
 };
 
-// What became of one motor of a move.
 struct MotorResult {
   std::string motor{};
   Outcome outcome = Outcome::kFault;
-  std::int64_t position_steps = 0;  // where its MCU says that it stands
-  double user = 0;                  // the same for people (units/coordinates.h)
+  std::int64_t position_steps = 0;
+  double user = 0;
   double dial = 0;
   std::string unit = "steps";
-  int precision = 0;            // decimals of both
-  TableRef table{};             // by which it has moved
-  std::string who{};            // asked for it
-  int legs = 1;                 // how many its motion had, as planned
-  double most_steps_per_s = 0;  // not exceeded by any of them; 0 of what the MCU makes by itself
+  int precision = 0;
+  TableRef table{};
+  std::string who{};
+  int legs = 1;
+  double most_steps_per_s = 0;
 
+  static constexpr std::string_view kName = "motor result";
+  static constexpr std::string_view kMeaning = "What became of one motor of a move.";
   static void fields(auto& self, auto& visit) {
     visit("motor", self.motor);
-    visit("outcome", self.outcome, fields::Word{outcome_of});
-    visit("position_steps", self.position_steps);
-    visit("user_position", self.user);
-    visit("dial_position", self.dial);
-    visit("unit", self.unit);
-    visit("precision", self.precision, Decimals{});
-    visit("table", self.table);
-    visit("asked_by", self.who);
-    visit("legs", self.legs, fields::As<std::int8_t>{});
-    visit("most_steps_per_s", self.most_steps_per_s);
+    visit({"outcome", "as in reply_header_t"}, self.outcome, fields::Word{outcome_of});
+    visit({"position_steps", "where its MCU says that it stands"}, self.position_steps);
+    visit({"user_position", kMotorUnit, "the same on the user's scale"}, self.user);
+    visit({"dial_position", kMotorUnit, "the same on the dial"}, self.dial);
+    visit({"unit", "\"steps\" of a motor without one"}, self.unit);
+    visit({"precision", "decimals of both positions for people", kDecimals}, self.precision,
+          Decimals{});
+    visit({"table", "by which it has moved"}, self.table);
+    visit({"asked_by", "who asked for it"}, self.who);
+    visit({"legs", "how many its motion had, as planned"}, self.legs, fields::As<std::int8_t>{});
+    visit({"most_steps_per_s", "not exceeded by any of them; 0 of what the MCU makes by itself"},
+          self.most_steps_per_s);
   }
 };
 
-// What a move would be.
 struct MovePlan {
   struct Motor {
     std::string motor{};
     std::int64_t steps = 0;
-    std::int64_t duration_us = 0;  // to its last step
+    std::int64_t duration_us = 0;
     double peak_steps_per_s = 0;
+
+    static constexpr std::string_view kName = "planned motor";
+    static constexpr std::string_view kMeaning = "One leg of one motor of a planned move.";
     static void fields(auto& self, auto& visit) {
       visit("motor", self.motor);
-      visit("steps", self.steps);
-      visit("duration_us", self.duration_us);
+      visit({"steps", fields::Unit{"steps"}, ""}, self.steps);
+      visit({"duration_us", "to its last step"}, self.duration_us);
       visit("peak_steps_per_s", self.peak_steps_per_s);
     }
   };
   // Frames of the motion alone: no polls, synchronisation and repeats.
   struct Traffic {
     std::int64_t frames = 0;
-    std::int64_t bytes = 0;  // on the bus
+    std::int64_t bytes = 0;
   };
-  std::int64_t duration_us = 0;  // from the first tick to the end of the last one
+  std::int64_t duration_us = 0;
   std::int64_t ticks = 0;
-  std::optional<Traffic> traffic{};  // none: it is too much to be counted
-  std::string limited_by{};          // of a line: the motor that makes it take so long
-  std::vector<Motor> motors{};       // in the request's order, each leg of a motor by itself
-  // When each point of a path of at most kMostPoints is reached, from the first tick on.
+  std::optional<Traffic> traffic{};
+  std::string limited_by{};
+  std::vector<Motor> motors{};
   std::vector<std::int64_t> points_us{};
   static constexpr std::size_t kMostPoints = 2048;
+
+  static constexpr std::string_view kName = "move plan";
+  static constexpr std::string_view kMeaning = "What a move would be.";
   static void fields(auto& self, auto& visit) {
     Traffic traffic = self.traffic.value_or(Traffic{.frames = -1, .bytes = -1});
-    visit("duration_us", self.duration_us);
-    visit("ticks", self.ticks);
+    visit({"duration_us", "from the first tick to the end of the last one"}, self.duration_us);
+    visit({"ticks", "so many"}, self.ticks);
     const fields::If counted{self.traffic.has_value()};
-    visit("frames", traffic.frames, counted);
-    visit("bytes", traffic.bytes, counted);
-    visit("limited_by", self.limited_by, fields::If{!self.limited_by.empty()});
-    visit.list("motor_count", "motors", self.motors);
-    visit.list("point_count", "points_us", self.points_us);
+    visit({"frames",
+           "to the MCUs, for the motion alone: no polls, synchronisation and repeats; -1: too many "
+           "to be counted"},
+          traffic.frames, counted);
+    visit({"bytes", "of these frames on the bus"}, traffic.bytes, counted);
+    visit({"limited_by", "of a line: the motor that makes it take so long; else \"\""},
+          self.limited_by, fields::If{!self.limited_by.empty()});
+    visit.list("motor_count", {"motors", "in the request's order, each leg of a motor by itself"},
+               self.motors);
+    visit.list({"point_count", "of a path of at most 2048 points: all; else 0"},
+               {"points_us", "when each of them is reached, from the first tick on"},
+               self.points_us);
     visit.set(self.traffic, traffic.frames < 0 ? std::optional<Traffic>{} : traffic);
   }
 };
 
-// One of the tables that the daemon finds.
 struct TableEntry {
-  std::string name{};   // its file's name without ".toml"
-  std::string fault{};  // why it cannot be used; "": it can, and the rest means something
+  std::string name{};
+  std::string fault{};
   TableRef table{};
-  std::int32_t codes = 0;  // of both sides, of one if they mirror each other
+  std::int32_t codes = 0;
   double start_steps_per_s = 0;
   double max_steps_per_s = 0;
+
+  static constexpr std::string_view kName = "table entry";
+  static constexpr std::string_view kMeaning = "One of the tables that the daemon finds.";
   static void fields(auto& self, auto& visit) {
-    visit("name", self.name);
+    visit({"name", "by which it is asked for: its file's name without \".toml\""}, self.name);
     const fields::If good{self.fault.empty()};
     visit("table", self.table, good);
-    visit("fault", self.fault);
-    visit("codes", self.codes, good);
+    visit({"fault", "why it cannot be used; \"\": it can, and the rest means something"},
+          self.fault);
+    visit({"codes", "of both sides, of one if they mirror each other"}, self.codes, good);
     visit("start_steps_per_s", self.start_steps_per_s, good);
     visit("max_steps_per_s", self.max_steps_per_s, good);
   }
@@ -133,143 +155,178 @@ struct TableList {
   std::vector<TableEntry> entries{};
 };
 
-// What has moved a motor, or made its position known.
 struct PastMotion {
-  std::int64_t utime_us = 0;  // when it ended
-  std::string what{};         // move, home, arm, jog, set, config, confirm
+  std::int64_t utime_us = 0;
+  std::string what{};
   std::string who{};
   std::int64_t from_steps = 0;
   std::int64_t to_steps = 0;
   std::string outcome{};
   std::string reason{};
-  // As they were shown to people then.
   std::string from_text{};
   std::string to_text{};
+
+  static constexpr std::string_view kName = "past motion";
+  static constexpr std::string_view kMeaning =
+      "What has moved a motor, or made its position known.";
   static void fields(auto& self, auto& visit) {
-    visit("utime_us", self.utime_us);
-    visit("what", self.what);
-    visit("who", self.who);
+    visit({"utime_us", "when it ended, microseconds since 1970"}, self.utime_us);
+    visit({"what",
+           "\"move\", \"home\", \"arm\", \"jog\", \"line\", \"travel\", \"set\", \"config\" or "
+           "\"confirm\""},
+          self.what);
+    visit({"who", "who asked for it"}, self.who);
     visit("from_steps", self.from_steps);
-    visit("to_steps", self.to_steps);
-    visit("outcome", self.outcome);
+    visit({"to_steps", "where the motor stood in the end"}, self.to_steps);
+    visit({"outcome", "as in answer_t"}, self.outcome);
     visit("reason", self.reason);
-    visit("from_text", self.from_text);
-    visit("to_text", self.to_text);
+    visit({"from_text",
+           "as it was shown to people then: \"12.345 mm\"; \"\" of a motor without a unit"},
+          self.from_text);
+    visit({"to_text", "the same of where it stood"}, self.to_text);
   }
   friend bool operator==(const PastMotion&, const PastMotion&) = default;
 };
 struct MotionHistory {
   std::vector<PastMotion> motions{};
+
+  static constexpr std::string_view kName = "history answer";
+  static constexpr std::string_view kMeaning = "Answers get_history_t.";
   static void fields(auto& self, auto& visit) {
-    visit.list("motion_count", "motions", self.motions);
+    visit.list("motion_count", {"motions", "the newest first; in parts"}, self.motions);
   }
 };
 
-// What may be changed in operation, and what bushd.toml says of it.
 struct MotorSetting {
   std::string motor{};
   std::string key{};
   std::string value{};
   std::string in_file{};
+
+  static constexpr std::string_view kName = "motor setting";
+  static constexpr std::string_view kMeaning = "What may be changed of a motor in operation.";
   static void fields(auto& self, auto& visit) {
     visit("motor", self.motor);
     visit("key", self.key);
-    visit("value", self.value);
-    visit("value_in_file", self.in_file);
+    visit({"value", "now, as in motor_change_t"}, self.value);
+    visit({"value_in_file", "in bushd.toml"}, self.in_file);
   }
   friend bool operator==(const MotorSetting&, const MotorSetting&) = default;
 };
 struct Configuration {
-  std::string path{};    // of bushd.toml, absolute, on the daemon's PC
-  std::string sha256{};  // of its text as the daemon knows it
+  std::string path{};
+  std::string sha256{};
   std::vector<MotorSetting> settings{};
+
+  static constexpr std::string_view kName = "configuration answer";
+  static constexpr std::string_view kMeaning = "Answers configure_t.";
   static void fields(auto& self, auto& visit) {
-    visit("path", self.path);
-    visit("sha256", self.sha256);
-    visit.list("setting_count", "settings", self.settings);
+    visit({"path", "of bushd.toml, absolute, on the daemon's PC"}, self.path);
+    visit({"sha256", "of its text as the daemon knows it"}, self.sha256);
+    visit.list("setting_count", {"settings", "in parts"}, self.settings);
   }
 };
 
-// What a crate has answered.
 struct CamacResult {
   camac::BlockResult block{};
-  std::uint32_t requests = 0;  // L lines of its stations afterwards; bit n - 1 is station n
+  std::uint32_t requests = 0;
+
+  static constexpr std::string_view kName = "camac reply";
+  static constexpr std::string_view kMeaning = "Answers camac_request_t.";
   static void fields(auto& self, auto& visit) {
-    visit("tally", self.block.tally);
-    visit("requests", self.requests);
-    visit.list("response_count", "responses", self.block.responses);
+    visit({"tally", "words that were moved; of SINGLE cycles that were made"}, self.block.tally);
+    visit({"requests", "stations that raise L afterwards: bit n - 1 is station n"}, self.requests);
+    visit.list("response_count",
+               {"responses",
+                "of the cycles that moved a word, and of the one that ended a block at one "
+                "address; in parts"},
+               self.block.responses);
   }
   friend bool operator==(const CamacResult&, const CamacResult&) = default;
 };
 
-// The program of an MCU.
 struct ProgramEntry {
-  // What it does to a motor, by a walk through its frames from where the motor stands; of a repeat
-  // without end one pass. Of a program that the daemon does not know only the name.
   struct Motor {
     std::string motor{};
-    std::int64_t least_steps = 0;  // where it comes to, its beginning included
+    std::int64_t least_steps = 0;
     std::int64_t most_steps = 0;
     std::int64_t end_steps = 0;
-    std::int64_t edges = 0;  // steps that it makes
+    std::int64_t edges = 0;
+
+    static constexpr std::string_view kName = "program motor";
+    static constexpr std::string_view kMeaning =
+        "What a program does to a motor, from where the motor stands; of a repeat without end one "
+        "pass.";
     static void fields(auto& self, auto& visit) {
       visit("motor", self.motor);
-      visit("least_steps", self.least_steps);
+      visit({"least_steps", "where it comes to, its beginning included"}, self.least_steps);
       visit("most_steps", self.most_steps);
       visit("end_steps", self.end_steps);
-      visit("edges", self.edges);
+      visit({"edges", fields::Unit{"steps"}, "that it makes"}, self.edges);
     }
     friend bool operator==(const Motor&, const Motor&) = default;
   };
   std::string mcu{};
-  std::string program{};   // its name; "": none, or one that the daemon does not know
-  std::string checksum{};  // CRC-32 of its bytes, 8 hexadecimal digits; "": the MCU has none
-  std::string stage{};   // none, loading, loaded, waits, runs, pauses, paused, ends, ended, unknown
-  std::string reason{};  // why its last run has ended, in words; "": it has not
+  std::string program{};
+  std::string checksum{};
+  std::string stage{};
+  std::string reason{};
   bool without_host = false;
-  bool at_power_on = false;  // it begins by itself when the power comes
-  bool kept = false;         // it is to outlive power cuts
-  bool stored = false;       // and would now
-  std::int32_t bytes = 0;    // of it, or of what has arrived of it
-  std::int32_t memory = 0;   // bytes that one may have
-  std::int32_t frame = 0;    // that is carried out, or was last, from 1; 0: none yet
-  std::int32_t point = 0;    // of it, if it is a line, from 1
+  bool at_power_on = false;
+  bool kept = false;
+  bool stored = false;
+  std::int32_t bytes = 0;
+  std::int32_t memory = 0;
+  std::int32_t frame = 0;
+  std::int32_t point = 0;
   std::int64_t repeats = 0;
-  // The walk; of a program that the daemon knows.
-  std::int64_t duration_us = 0;  // without the time in which it waits for inputs
+  std::int64_t duration_us = 0;
   std::int64_t pulses = 0;
-  bool endless = false;  // it repeats without end: the rest is of one pass
+  bool endless = false;
   bool waits_for_inputs = false;
-  bool cut = false;  // there are more frames to carry out than a walk has
+  bool cut = false;
   std::vector<Motor> motors{};
+
+  static constexpr std::string_view kName = "program";
+  static constexpr std::string_view kMeaning = "The program of an MCU.";
   static void fields(auto& self, auto& visit) {
     visit("mcu", self.mcu);
-    visit("program", self.program);
-    visit("checksum", self.checksum);
-    visit("stage", self.stage);
-    visit("reason", self.reason);
-    visit("without_host", self.without_host);
-    visit("at_power_on", self.at_power_on);
-    visit("kept", self.kept);
-    visit("stored", self.stored);
-    visit("bytes", self.bytes);
-    visit("memory", self.memory);
-    visit("frame", self.frame);
-    visit("point", self.point);
+    visit({"program", "its name; \"\": none, or one that the daemon does not know"}, self.program);
+    visit({"checksum", "CRC-32 of its bytes, 8 hexadecimal digits; \"\": the MCU has none"},
+          self.checksum);
+    visit({"stage",
+           "\"none\", \"loading\", \"loaded\", \"waits\", \"runs\", \"pauses\", \"paused\", "
+           "\"ends\", \"ended\" or \"unknown\""},
+          self.stage);
+    visit({"reason", "why its last run has ended, in words; \"\": it has not"}, self.reason);
+    visit({"without_host", "it goes on when no host is heard"}, self.without_host);
+    visit({"at_power_on", "it begins by itself when the power comes"}, self.at_power_on);
+    visit({"kept", "it is to outlive power cuts"}, self.kept);
+    visit({"stored", "and would now"}, self.stored);
+    visit({"bytes", "of it, or of what has arrived of it"}, self.bytes);
+    visit({"memory", "bytes that one may have"}, self.memory);
+    visit({"frame", "that is carried out, or was last, from 1; 0: none yet"}, self.frame);
+    visit({"point", "of it, if it is a line, from 1"}, self.point);
     visit("repeats", self.repeats);
-    visit("duration_us", self.duration_us);
+    visit({"duration_us",
+           "without the time in which it waits for inputs; this and what follows: by a walk "
+           "through its frames, of a program that this daemon has checked"},
+          self.duration_us);
     visit("pulses", self.pulses);
-    visit("endless", self.endless);
+    visit({"endless", "it repeats without end: what is told is of one pass"}, self.endless);
     visit("waits_for_inputs", self.waits_for_inputs);
-    visit("cut", self.cut);
+    visit({"cut", "there are more frames to carry out than were looked at"}, self.cut);
     visit.list("motor_count", "motors", self.motors);
   }
   friend bool operator==(const ProgramEntry&, const ProgramEntry&) = default;
 };
 struct ProgramList {
   std::vector<ProgramEntry> programs{};
+
+  static constexpr std::string_view kName = "program reply";
+  static constexpr std::string_view kMeaning = "Answers put_program_t and list_programs_t.";
   static void fields(auto& self, auto& visit) {
-    visit.list("program_count", "programs", self.programs);
+    visit.list("program_count", {"programs", "in parts"}, self.programs);
   }
   friend bool operator==(const ProgramList&, const ProgramList&) = default;
 };
@@ -277,7 +334,7 @@ struct ProgramList {
 struct Accepted {};
 
 struct Refused {
-  std::string reason{};  // what, why with the figure, what to do
+  std::string reason{};
 };
 
 // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
@@ -296,7 +353,7 @@ struct Detail : std::variant<std::monostate, std::vector<MotorResult>, MovePlan,
 
 struct Completed {
   Outcome outcome = Outcome::kDone;
-  std::string reason{};  // names motor and cause; never empty
+  std::string reason{};
   Detail detail{};
 };
 

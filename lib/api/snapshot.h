@@ -8,11 +8,13 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include "api/reply.h"
 #include "api/words.h"
+#include "base/fields.h"
 #include "base/ids.h"
 #include "base/units/coordinates.h"
 
@@ -31,87 +33,122 @@ struct InSeconds : fields::If {
 
 struct MotorState {
   std::string name{};
-  std::int64_t position_steps = 0;  // as its MCU reported last; no number while Trust::kUnknown
-  double user = 0;                  // the same for people (units/coordinates.h)
+  std::int64_t position_steps = 0;
+  double user = 0;
   double dial = 0;
-  // Where it will stand in the end, also after a stop; without a move of the daemon's where it is.
   std::int64_t target_steps = 0;
   double user_target = 0;
-  double velocity_steps_per_s = 0;  // signed, of the running step; 0 unless Activity::kMoving
+  double velocity_steps_per_s = 0;
   Activity activity = Activity::kResting;
-  bool moving = false;     // it makes steps, or is about to; not while armed
-  bool enabled = false;    // drivers powered
-  bool input = false;      // one of its switches is active
-  std::string inputs{};    // active ones: of positive, negative, home, step, blanks between
-  Directions inhibited{};  // by its limit switches
+  bool moving = false;
+  bool enabled = false;
+  bool input = false;
+  std::string inputs{};
+  Directions inhibited{};
   Trust trust = Trust::kKnown;
-  std::string uncertain_reason{};  // why it is not known; "" while it is
-  // When the position was heard, microseconds since 1970, if Trust::kStale.
+  std::string uncertain_reason{};
   std::optional<std::int64_t> heard_utime_us{};
-  bool paused = false;     // it ramps down, or stands, on the way to its target
-  bool held = false;       // no motion begins
-  std::string armed_by{};  // whose request it is to wait for the trigger by; "": it does not
-  // While it moves on a line: the share of the line's run that has been made, as reported last, and
-  // the time that the rest of it takes.
+  bool paused = false;
+  bool held = false;
+  std::string armed_by{};
   struct Line {
     double fraction = 0;
     std::int64_t left_us = 0;
     friend bool operator==(const Line&, const Line&) = default;
   };
   std::optional<Line> line{};
+
+  static constexpr std::string_view kName = "motor";
+  static constexpr std::string_view kMeaning = "What changes of one motor as it moves.";
   static void fields(auto& self, auto& visit) {
     const fields::If known{self.trust != Trust::kUnknown};
     bool on_line = self.line.has_value();
     Line line_now = self.line.value_or(Line{});
     visit("name", self.name);
-    visit("position_steps", self.position_steps, known);
-    visit("user_position", self.user, known);
-    visit("dial_position", self.dial, known);
-    visit("target_steps", self.target_steps, known);
-    visit("user_target", self.user_target, known);
-    visit("velocity_steps_per_s", self.velocity_steps_per_s);
-    visit("moving", self.moving);
-    visit("activity", self.activity, fields::Word{activity_of});
-    visit("enabled", self.enabled);
-    visit("input", self.input);
-    visit("inputs", self.inputs);
-    visit("inhibited", self.inhibited, fields::Word{directions_of});
-    visit("trust", self.trust, fields::Word{trust_of});
-    visit("uncertain_reason", self.uncertain_reason);
-    visit("heard_utime_us", self.heard_utime_us, fields::NoneIs<std::int64_t>{0});
-    visit("paused", self.paused);
-    visit("held", self.held);
-    visit("armed_by", self.armed_by);
-    visit("on_line", on_line);
-    visit("line_fraction", line_now.fraction, fields::If{on_line});
-    visit("line_left_s", line_now.left_us, InSeconds{on_line});
+    visit({"position_steps",
+           "as its MCU reported last; while `trust` is \"unknown\" it says nothing, nor do the "
+           "other positions and targets"},
+          self.position_steps, known);
+    visit({"user_position", kMotorUnit, "the same on the user's scale"}, self.user, known);
+    visit({"dial_position", kMotorUnit, "the same on the dial"}, self.dial, known);
+    visit({"target_steps",
+           "where it will stand in the end, also after a stop; without a move of the daemon's "
+           "where it is"},
+          self.target_steps, known);
+    visit({"user_target", kMotorUnit, "the same on the user's scale"}, self.user_target, known);
+    visit({"velocity_steps_per_s", "signed, of the running step; 0 unless `activity` is \"move\""},
+          self.velocity_steps_per_s);
+    visit({"moving", "it makes steps, or is about to; not while it is armed"}, self.moving);
+    visit({"activity",
+           "\"rest\", \"move\", \"arming\": is to wait for the trigger, \"armed\": waits for it "
+           "(its MCU has confirmed that), \"home\" (or waits for it), \"local\": moved by the "
+           "inputs at its MCU, or by another master"},
+          self.activity, fields::Word{activity_of});
+    visit({"enabled", "drivers powered"}, self.enabled);
+    visit({"input", "one of its switches is active"}, self.input);
+    visit({"inputs",
+           "active ones of its inputs, blanks between: \"positive\", \"negative\", \"home\", "
+           "\"step\""},
+          self.inputs);
+    visit({"inhibited",
+           "directions that a limit switch inhibits: \"\", \"positive\", \"negative\" or \"both\""},
+          self.inhibited, fields::Word{directions_of});
+    visit({"trust", "\"unknown\", \"known\", \"restored\", \"stale\" or \"uncertain\""}, self.trust,
+          fields::Word{trust_of});
+    visit({"uncertain_reason", "why it is not known; \"\" while it is"}, self.uncertain_reason);
+    visit({"heard_utime_us",
+           "while `trust` is \"stale\": when position_steps was heard, microseconds since 1970; "
+           "else 0"},
+          self.heard_utime_us, fields::NoneIs<std::int64_t>{0});
+    visit({"paused", "it ramps down, or stands, on the way to its target"}, self.paused);
+    visit({"held", "no motion begins"}, self.held);
+    visit({"armed_by", "while it is \"arming\" or \"armed\": whose request that is; else \"\""},
+          self.armed_by);
+    visit({"on_line",
+           "it moves on a line with others, or stands on the way; then the next two say something"},
+          on_line);
+    visit({"line_fraction", "share of the line that has been made, as reported last",
+           fields::Range{0, 1}},
+          line_now.fraction, fields::If{on_line});
+    visit({"line_left_s", "time that the rest of it takes"}, line_now.left_us, InSeconds{on_line});
     visit.set(self.line, on_line ? std::optional(line_now) : std::nullopt);
   }
   friend bool operator==(const MotorState&, const MotorState&) = default;
 };
 
-// One MCU and its motors. Or axes that are computed from motors: their positions are those of
-// `user`, and their steps count the last decimal that people are shown.
 struct StateSnapshot {
   std::string bus{};
-  std::string mcu{};  // "<bus>:<address>", or "<bus>:<name of the first axis>"
+  std::string mcu{};
   McuState state = McuState::kOffline;
-  std::string detail{};   // cause of kOffline or kFault, else ""
-  std::string inputs{};   // active ones: of emergency, forward, reverse, trigger, blanks between
-  std::string program{};  // under way, and where: "scan runs, frame 3, without host"; "": none
-  std::int32_t boot = 0;  // its boot number; 0 until it was heard
-  std::int64_t tick = 0;  // bus tick of the report behind this
-  std::vector<MotorState> motors{};  // by output
+  std::string detail{};
+  std::string inputs{};
+  std::string program{};
+  std::int32_t boot = 0;
+  std::int64_t tick = 0;
+  std::vector<MotorState> motors{};
+
+  static constexpr std::string_view kName = "mcu state";
+  static constexpr std::string_view kMeaning =
+      "One message per MCU, so that each fits one datagram: at once on change, 20 times a second "
+      "while a motor moves, else twice. The newest ones of the parts 0 .. parts-1 together are the "
+      "whole. Of axes that are computed from motors positions are those of people, and steps count "
+      "the last decimal that these are shown.";
   static void fields(auto& self, auto& visit) {
     visit("bus", self.bus);
-    visit("mcu", self.mcu);
-    visit("state", self.state, fields::Word{mcu_state_of});
-    visit("detail", self.detail);
-    visit("inputs", self.inputs);
-    visit("program", self.program);
-    visit("boot_number", self.boot);
-    visit("tick", self.tick);
-    visit.list("motor_count", "motors", self.motors);
+    visit({"mcu", "\"<bus>:<address>\"; of axes that are computed: \"<bus>:<first axis>\""},
+          self.mcu);
+    visit({"state", "OFFLINE, BUSY, READY, RUN, FAULT"}, self.state, fields::Word{mcu_state_of});
+    visit({"detail", "cause of OFFLINE or FAULT, else \"\""}, self.detail);
+    visit(
+        {"inputs",
+         "the MCU's that are active: of emergency, forward, reverse, trigger, with blanks between"},
+        self.inputs);
+    visit({"program",
+           "that is under way, and where it is: \"scan runs, frame 3, without host\"; \"\": none"},
+          self.program);
+    visit({"boot_number", "0 until the MCU was heard"}, self.boot);
+    visit({"tick", "bus tick of the report behind this message"}, self.tick);
+    visit.list("motor_count", {"motors", "by output"}, self.motors);
   }
   friend bool operator==(const StateSnapshot&, const StateSnapshot&) = default;
 };
@@ -120,7 +157,7 @@ struct StateSnapshot {
 // them.
 struct ToldScale {
   std::string unit{};
-  std::string steps_per_unit{};  // exact: "320" or "1/3"
+  std::string steps_per_unit{};
   bool negative = false;
   double offset = 0;
   std::int8_t precision = 0;
@@ -128,20 +165,23 @@ struct ToldScale {
   units::SoftLimits dial{};
   units::SoftLimits user{};
   static void fields(auto& self, auto& visit) {
-    visit("unit", self.unit);
-    visit("steps_per_unit", self.steps_per_unit);
-    visit("negative", self.negative);
-    visit("offset", self.offset);
-    visit("precision", self.precision);
-    visit("soft_limits", self.soft_limits);
+    visit({"unit", "\"steps\" of a motor without one"}, self.unit);
+    visit({"steps_per_unit", "exact: \"320\" or \"1/3\""}, self.steps_per_unit);
+    visit({"negative",
+           "user position = offset - dial; otherwise offset + dial. dial = steps / steps_per_unit"},
+          self.negative);
+    visit({"offset", kMotorUnit, "of the user's scale"}, self.offset);
+    visit({"precision", "decimals of positions for people", kDecimals}, self.precision);
+    visit({"soft_limits", "it has some"}, self.soft_limits);
     const fields::If limited{self.soft_limits};
-    visit("dial_low", self.dial.low, limited);
-    visit("dial_high", self.dial.high, limited);
-    visit("user_low", self.user.low, limited);
-    visit("user_high", self.user.high, limited);
+    visit({"dial_low", kMotorUnit}, self.dial.low, limited);
+    visit({"dial_high", kMotorUnit}, self.dial.high, limited);
+    visit({"user_low", kMotorUnit, "the same on the user's scale, low below high"}, self.user.low,
+          limited);
+    visit({"user_high", kMotorUnit}, self.user.high, limited);
   }
   bool is_good() const;
-  units::Scale scale() const;  // of one that is not good: any
+  units::Scale scale() const;
   std::optional<units::SoftLimits> limits() const;
 };
 ToldScale told_scale(const units::Scale& scale, const std::optional<units::SoftLimits>& limits);
@@ -150,17 +190,20 @@ struct MotorDescription {
   std::string name{};
   std::uint8_t output = 0;
   std::string group{};
-  TableRef table{};      // in service, for the next move
-  std::string text{};    // what people call it; may be empty
-  units::Scale scale{};  // with the number of decimals
+  TableRef table{};
+  std::string text{};
+  units::Scale scale{};
   std::optional<units::SoftLimits> soft_limits{};
+
+  static constexpr std::string_view kName = "motor description";
+  static constexpr std::string_view kMeaning = "What rarely changes of one motor.";
   static void fields(auto& self, auto& visit) {
     ToldScale scale = told_scale(self.scale, self.soft_limits);
     visit("name", self.name);
     visit("output", self.output, fields::As<std::int16_t>{});
     visit("group", self.group);
-    visit("table", self.table);
-    visit("description", self.text);
+    visit({"table", "in service, for the next move"}, self.table);
+    visit({"description", "of the configuration; may be empty"}, self.text);
     ToldScale::fields(scale, visit);
     if constexpr (std::remove_cvref_t<decltype(visit)>::kReads) {
       visit.require(scale.is_good());
@@ -174,114 +217,157 @@ struct MotorDescription {
 struct Description {
   std::string bus{};
   std::string mcu{};
-  std::int32_t address = 0;  // 0: axes that are computed from motors
+  std::int32_t address = 0;
   std::int64_t tick_ns = 0;
   StopMode emergency_stop = StopMode::kRamp;
-  std::string port{};                      // of the bus, that is open; "": none
-  std::vector<MotorDescription> motors{};  // by output
+  std::string port{};
+  std::vector<MotorDescription> motors{};
   // Else axes that are computed from motors.
   bool is_mcu() const { return address != 0; }
+
+  static constexpr std::string_view kName = "mcu description";
+  static constexpr std::string_view kMeaning =
+      "One message per MCU, on change and every three seconds. Parts as in mcu_state_t.";
   static void fields(auto& self, auto& visit) {
     visit("bus", self.bus);
     visit("mcu", self.mcu);
-    visit("address", self.address);
+    visit({"address", "0: axes that are computed from motors"}, self.address);
     visit("tick_ns", self.tick_ns);
-    visit("emergency_stop", self.emergency_stop, fields::Word{stop_mode_of});
-    visit("port", self.port);
-    visit.list("motor_count", "motors", self.motors);
+    visit({"emergency_stop", "how its motors stop then: \"ramp\", \"immediate\" or \"disable\""},
+          self.emergency_stop, fields::Word{stop_mode_of});
+    visit({"port", "of the bus, that is open: of a pattern the one in use; \"\": none"}, self.port);
+    visit.list("motor_count", {"motors", "by output"}, self.motors);
   }
   friend bool operator==(const Description&, const Description&) = default;
 };
 
-// Counted since the daemon's start, over all boots of the MCU that it saw.
 struct McuHealth {
   std::string mcu{};
   std::int32_t address = 0;
-  std::string unique_id{};  // 16 hexadecimal digits; "" until the MCU was heard
+  std::string unique_id{};
   std::int32_t firmware_version = 0;
   std::int32_t boot = 0;
-  std::string reset_cause{};  // "power-on", "external", "brown-out", "watchdog"; "" if unknown
-  std::int32_t current = 0;   // of the supply, as read last: 0..1023 of what the MCU can measure
+  std::string reset_cause{};
+  std::int32_t current = 0;
   std::uint64_t crc_errors = 0;
   std::uint64_t rejected_frames = 0;
-  std::uint64_t ramp_downs = 0;  // motors that ran dry and came to rest by their own table
+  std::uint64_t ramp_downs = 0;
   std::uint64_t timeouts = 0;
   std::uint64_t repeats = 0;
   std::uint64_t missed_ticks = 0;
   std::uint64_t restarts = 0;
-  std::optional<std::int32_t> low_water_ticks{};  // since the snapshot before; none: nothing moved
+  std::optional<std::int32_t> low_water_ticks{};
   double rate_ppm = 0;
   double clock_offset_us = 0;
   bool two_masters = false;
+
+  static constexpr std::string_view kName = "mcu health";
+  static constexpr std::string_view kMeaning =
+      "Counted since the daemon's start, over all boots of the MCU that it saw.";
   static void fields(auto& self, auto& visit) {
-    visit("mcu", self.mcu);
+    visit({"mcu", "\"<bus>:<address>\""}, self.mcu);
     visit("address", self.address);
-    visit("unique_id", self.unique_id);
-    visit("firmware_version", self.firmware_version);
-    visit("boot_number", self.boot);
-    visit("reset_cause", self.reset_cause);
-    visit("current", self.current);
-    visit("crc_errors", self.crc_errors);
-    visit("rejected_frames", self.rejected_frames);
-    visit("ramp_downs", self.ramp_downs);
-    visit("timeouts", self.timeouts);
-    visit("repeats", self.repeats);
-    visit("missed_ticks", self.missed_ticks);
-    visit("restarts", self.restarts);
-    visit("low_water_ticks", self.low_water_ticks, fields::NegativeIsNone<std::int32_t>{});
-    visit("rate_ppm", self.rate_ppm);
-    visit("clock_offset_us", self.clock_offset_us);
-    visit("two_masters", self.two_masters);
+    visit({"unique_id", "16 hexadecimal digits; \"\" until the MCU was heard"}, self.unique_id);
+    visit({"firmware_version", "0 until the MCU was heard"}, self.firmware_version);
+    visit({"boot_number", "0 until the MCU was heard"}, self.boot);
+    visit({"reset_cause",
+           "of that boot: \"power-on\", \"external\", \"brown-out\", \"watchdog\"; \"\" if it is "
+           "not known"},
+          self.reset_cause);
+    visit({"current", "of the supply, as read last: share of what the MCU can measure",
+           fields::Range{0, 1023}},
+          self.current);
+    visit({"crc_errors", "frames that reached the MCU broken"}, self.crc_errors);
+    visit({"rejected_frames", "valid ones that it could not use"}, self.rejected_frames);
+    visit({"ramp_downs", "motors whose queue ran dry and that came to rest by their own table"},
+          self.ramp_downs);
+    visit({"timeouts", "requests that it did not answer"}, self.timeouts);
+    visit({"repeats", "stream frames sent to it again"}, self.repeats);
+    visit({"missed_ticks", "ticks that were sent to it and found missing"}, self.missed_ticks);
+    visit({"restarts", "boots that the daemon saw, but the first"}, self.restarts);
+    visit({"low_water_ticks",
+           "the fewest ticks that a moving motor had queued, since the message before; -1: none "
+           "moved"},
+          self.low_water_ticks, fields::NegativeIsNone<std::int32_t>{});
+    visit({"rate_ppm", "how much faster than its crystal it counts, to follow the bus"},
+          self.rate_ppm);
+    visit({"clock_offset_us",
+           "by how much its last SYNC differed from that of the first MCU that is in step; of a "
+           "serial port that makes pulses: by how much it was ahead of the slowest port of its "
+           "last line"},
+          self.clock_offset_us);
+    visit({"two_masters", "it hears two of them"}, self.two_masters);
   }
 };
 
-// One bus and its MCUs.
 struct HealthSnapshot {
   struct Latency {
-    std::int64_t below_us = 0;  // the last one is INT64_MAX
-    std::uint64_t answers = 0;  // below this and not below the one before
+    std::int64_t below_us = 0;
+    std::uint64_t answers = 0;
+
+    static constexpr std::string_view kName = "latency bin";
+    static constexpr std::string_view kMeaning = "Answers by the time that they took.";
     static void fields(auto& self, auto& visit) {
-      visit("below_us", self.below_us, fields::If{self.below_us != INT64_MAX});
-      visit("answers", self.answers);
+      visit({"below_us", "of the last bin the largest number of 64 bits"}, self.below_us,
+            fields::If{self.below_us != INT64_MAX});
+      visit({"answers", "below this bound and not below that of the bin before"}, self.answers);
     }
   };
   std::string bus{};
-  std::string port_state{};  // "open", or why it is not
+  std::string port_state{};
   bool two_masters = false;
   std::uint64_t crc_errors = 0;
   std::uint64_t stray_frames = 0;
   std::int64_t recent_latency_us = 0;
-  std::int64_t start_margin_us = 0;   // left to the daemon at a start; 0: a bus without MCUs
-  std::uint64_t line_bytes = 0;       // sent and received; 0: a bus without MCUs
-  std::int64_t line_bytes_per_s = 0;  // that its line can carry
+  std::int64_t start_margin_us = 0;
+  std::uint64_t line_bytes = 0;
+  std::int64_t line_bytes_per_s = 0;
   std::vector<Latency> latency{};
   std::vector<McuHealth> mcus{};
+
+  static constexpr std::string_view kName = "health";
+  static constexpr std::string_view kMeaning =
+      "One message per bus, once a second. `part` 0 .. parts-1 together are the whole.";
   static void fields(auto& self, auto& visit) {
     visit("bus", self.bus);
-    visit("port_state", self.port_state);
-    visit("two_masters", self.two_masters);
-    visit("crc_errors", self.crc_errors);
-    visit("stray_frames", self.stray_frames);
-    visit("recent_latency_us", self.recent_latency_us);
-    visit("start_margin_us", self.start_margin_us);
-    visit("line_bytes", self.line_bytes);
-    visit("line_bytes_per_s", self.line_bytes_per_s);
-    visit.list("latency_count", "latency", self.latency);
+    visit({"port_state", "\"open\", or why it is not"}, self.port_state);
+    visit({"two_masters", "another master was heard on this line within the last seconds"},
+          self.two_masters);
+    visit({"crc_errors", "frames that reached the daemon broken"}, self.crc_errors);
+    visit({"stray_frames", "valid ones that nobody had been asked for"}, self.stray_frames);
+    visit({"recent_latency_us", "of late: the largest, fading"}, self.recent_latency_us);
+    visit({"start_margin_us",
+           "left to the daemon when a motion of one motor begins, longer after missed starts; 0: a "
+           "bus without MCU firmware"},
+          self.start_margin_us);
+    visit({"line_bytes", "sent and received on the line; 0: a bus without MCU firmware"},
+          self.line_bytes);
+    visit({"line_bytes_per_s", "that the line can carry"}, self.line_bytes_per_s);
+    visit.list("latency_count",
+               {"latency",
+                "of the adapter, from when the bus has carried an answer's last byte to when the "
+                "daemon had it; with rising bounds"},
+               self.latency);
     visit.list("mcu_count", "mcus", self.mcus);
   }
 };
 
-// Stations of a CAMAC crate have raised L.
 struct CamacLam {
   std::int32_t crate = 0;
-  std::uint32_t raised = 0;    // bit n - 1: station n, just now
-  std::uint32_t requests = 0;  // all that raise it
-  bool demand = false;         // somebody has enabled the crate's demand
+  std::uint32_t raised = 0;
+  std::uint32_t requests = 0;
+  bool demand = false;
+
+  static constexpr std::string_view kName = "camac lam";
+  static constexpr std::string_view kMeaning =
+      "Stations of a CAMAC crate have raised L. Told once, on the control socket with the state; "
+      "N30 A0 F0 reads the "
+      "requests again.";
   static void fields(auto& self, auto& visit) {
     visit("crate", self.crate);
-    visit("raised", self.raised);
-    visit("requests", self.requests);
-    visit("demand", self.demand);
+    visit({"raised", "bit n - 1: station n, just now"}, self.raised);
+    visit({"requests", "all that raise L"}, self.requests);
+    visit({"demand", "the crate's demand is enabled"}, self.demand);
   }
   friend bool operator==(const CamacLam&, const CamacLam&) = default;
 };

@@ -1,6 +1,7 @@
-// The words of lib/words, as requests, replies and snapshots use them.
+// The words of lib/words, as requests, replies and snapshots use them, and units.
 #pragma once
 
+#include "base/fields.h"
 #include "words/amount.h"
 #include "words/words.h"
 
@@ -16,6 +17,10 @@ using words::Speed;
 using words::StopMode;
 using words::Trust;
 using words::UserUnits;
+
+// Units of fields whose names do not tell them.
+inline constexpr fields::Unit kMotorUnit{"motor's unit"};
+inline constexpr fields::Unit kMotorUnitPerS{"motor's unit/s"};
 
 using words::activity_of;
 using words::directions_of;

@@ -1,20 +1,28 @@
-// How a type of requests, replies and snapshots declares its fields: once, in its header.
+// How a type of requests, replies and snapshots declares its fields: once, in its header, with all
+// that is told of them.
 //
+//   static constexpr std::string_view kName = "jog";
+//   static constexpr std::string_view kMeaning = "A motor moves on at this speed ...";
+//   static constexpr std::string_view kResult = "done, ...";  // of requests
 //   static void fields(auto& self, auto& visit) {
 //     visit("motor", self.motor);
-//     visit("keepalive_ms", self.keepalive_ms);
-//     visit("steps_after", self.steps_after, fields::NoneIs<std::int64_t>{-1});
+//     visit({"speed", fields::Unit{"unit/s"}, "signed; 0 ends the jog"}, self.per_s);
+//     visit({"keepalive_ms", "it is ramped down then", kKeepaliveMs}, self.keepalive_ms);
+//     visit({"steps_after", "-1: as soon as possible"}, self.steps_after, kNoneIsMinus1);
 //   }
 //
-// Names and order are those of its .lcm file. Whoever does something with all fields of a type
-// writes a visitor: lib/lcm/wire.h has those that write, read and fingerprint LCM's bytes.
+// Whoever does something with all fields of a type writes a visitor: lib/lcm/wire.h has those that
+// write, read and fingerprint LCM's bytes, tests/lcm/type_description.h the one that tells what a
+// type is, of which the .lcm files and docs/messages.md are made. The order is that of the bytes.
 //
 // What a visitor can be asked:
 //
-// visit(name, member) or visit(name, member, form): a bool, a number, a text, or a type with
-// fields.
+// visit(field, member) or visit(field, member, form): a bool, a number, a text, or a type with
+// fields. A field is its name, or {name, unit, meaning, range}, of which all but the name may be
+// left out.
 //
-// visit.list(count, name, vector) or with a form: a vector, one element after the other.
+// visit.list(count, field, vector) or with a form: a vector, one element after the other. `count`
+// is a field too, the number of elements.
 //
 // visit.set(member, value): does something in a visitor that reads only. For a member that is made
 // of several fields, which are visited as local variables before.
@@ -29,11 +37,13 @@
 //
 // A form converts a member to another type and back. told(value) is what is told of it; taken(told,
 // value) puts it back, and returns false for what is not allowed. nothing(value), optional: true
-// where the member has no value; told() gives something in its place then. A form is made before a
-// visitor that reads has read the field. An unsigned number of 32 or 64 bits without a form is told
-// by the signed one of the same bits.
+// where the member has no value; told() gives something in its place then. constants(), optional:
+// the numbers that have names. A form is made before a visitor that reads has read the field. An
+// unsigned number of 32 or 64 bits without a form is told by the signed one of the same bits.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -42,6 +52,49 @@
 #include <utility>
 
 namespace bushd::fields {
+
+// From least to most, both included: one constant for who checks and who tells.
+template <class T>
+struct Range {
+  T least;
+  T most;
+  constexpr bool has(T value) const { return value >= least && value <= most; }
+};
+
+// Where the name of a field does not end with its unit.
+struct Unit {
+  const char* text;
+};
+
+struct Field {
+  const char* name;
+  Unit unit{""};
+  const char* meaning = "";
+  Range<double> range{};  // of numbers far below 2^53
+  bool has_range = false;
+
+  constexpr Field(const char* its_name) : name(its_name) {}
+  constexpr Field(const char* its_name, const char* its_meaning)
+      : name(its_name), meaning(its_meaning) {}
+  constexpr Field(const char* its_name, Unit its_unit, const char* its_meaning = "")
+      : name(its_name), unit(its_unit), meaning(its_meaning) {}
+  template <class T>
+  constexpr Field(const char* its_name, const char* its_meaning, Range<T> its_range)
+      : Field(its_name, Unit{""}, its_meaning, its_range) {}
+  template <class T>
+  constexpr Field(const char* its_name, Unit its_unit, const char* its_meaning, Range<T> its_range)
+      : name(its_name),
+        unit(its_unit),
+        meaning(its_meaning),
+        range{static_cast<double>(its_range.least), static_cast<double>(its_range.most)},
+        has_range(true) {}
+};
+
+// A number of an enumeration, or of a sum of bits, as it is named where the number is told.
+struct Constant {
+  const char* name;
+  const char* meaning = "";
+};
 
 // As it is.
 struct Same {
@@ -114,28 +167,38 @@ struct NegativeIsNone {
   }
 };
 
-// One of the first `kCount` of an enumeration, counted from 1.
-template <int kCount>
-struct OneOf {
+// One of an enumeration, whose constants are these, in this order. The first one is told as
+// `kFirst`.
+template <int kFirst, std::size_t kCount>
+struct Enumeration {
+  std::array<Constant, kCount> all{};
+  constexpr explicit Enumeration(const Constant (&constants)[kCount]) {
+    for (std::size_t i = 0; i < kCount; ++i) all[i] = constants[i];
+  }
   static std::int8_t told(auto value) {
-    return static_cast<std::int8_t>(static_cast<int>(value) + 1);
+    return static_cast<std::int8_t>(static_cast<int>(value) + kFirst);
   }
   template <class T>
   static bool taken(std::int8_t told, T& value) {
-    value = static_cast<T>(told - 1);
-    return told >= 1 && told <= kCount;
+    value = static_cast<T>(told - kFirst);
+    return told >= kFirst && told < kFirst + static_cast<int>(kCount);
+  }
+  std::array<std::pair<int, Constant>, kCount> constants() const {
+    std::array<std::pair<int, Constant>, kCount> numbered;
+    for (std::size_t i = 0; i < kCount; ++i) numbered[i] = {kFirst + static_cast<int>(i), all[i]};
+    return numbered;
   }
 };
-
-// The same, counted from 0: the first one is that of whoever does not know the field.
-template <int kCount>
-struct OneFrom0 {
-  static std::int8_t told(auto value) { return static_cast<std::int8_t>(value); }
-  template <class T>
-  static bool taken(std::int8_t told, T& value) {
-    value = static_cast<T>(told);
-    return told >= 0 && told < kCount;
-  }
+template <std::size_t kCount>
+struct OneOf : Enumeration<1, kCount> {
+  constexpr explicit OneOf(const Constant (&constants)[kCount])
+      : Enumeration<1, kCount>(constants) {}
+};
+// 0, the first one, is that of whoever does not know the field.
+template <std::size_t kCount>
+struct OneFrom0 : Enumeration<0, kCount> {
+  constexpr explicit OneFrom0(const Constant (&constants)[kCount])
+      : Enumeration<0, kCount>(constants) {}
 };
 
 // By its word: word(value), and back by `parse`.

@@ -28,11 +28,13 @@ class FieldsFromJson {
   static constexpr bool kReads = true;
 
   template <class T, class Form = fields::Same>
-  void operator()(const char* name, T& value, const Form& form = {}) {
-    if (const auto* told = find(name)) take(*told, name, value, form);
+  void operator()(const fields::Field& field, T& value, const Form& form = {}) {
+    if (const auto* told = find(field.name)) take(*told, field.name, value, form);
   }
   template <class T, class Form = fields::Same>
-  void list(const char* /*count*/, const char* name, std::vector<T>& list, const Form& form = {}) {
+  void list(const fields::Field& /*count*/, const fields::Field& field, std::vector<T>& list,
+            const Form& form = {}) {
+    const char* const name = field.name;
     const auto* told = find(name);
     if (told == nullptr) return;
     if (!told->is_array()) return wrong(name, "a list is expected");

@@ -16,12 +16,13 @@ class JsonFields {
   static constexpr bool kReads = false;
 
   template <class T, class Form = fields::Same>
-  void operator()(const char* name, const T& value, const Form& form = {}) {
-    object_[name] = told(value, form);
+  void operator()(const fields::Field& field, const T& value, const Form& form = {}) {
+    object_[field.name] = told(value, form);
   }
   template <class List, class Form = fields::Same>
-  void list(const char* /*count*/, const char* name, const List& list, const Form& form = {}) {
-    auto& array = object_[name] = nlohmann::ordered_json::array();
+  void list(const fields::Field& /*count*/, const fields::Field& field, const List& list,
+            const Form& form = {}) {
+    auto& array = object_[field.name] = nlohmann::ordered_json::array();
     for (const auto& element : list) array.push_back(told(element, form));
   }
   static void set(const auto& /*member*/, const auto& /*value*/) {}

@@ -13,15 +13,6 @@ namespace {
 
 using Decoder = std::optional<ClientMessage> (*)(Payload);
 
-std::string channel_of(std::string_view name) {
-  std::string channel(name);
-  for (char& c : channel) {  // not by toupper(): that depends on the program's locale
-    if (c == ' ') c = '_';
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  }
-  return channel;
-}
-
 template <class Content>
 std::optional<ClientMessage> decode_request(Payload payload) {
   auto message = decode<RequestMessage<Content>>(payload);
@@ -57,7 +48,7 @@ struct Channels {
 
   template <class... Content>
   explicit Channels(const std::variant<Content...>* /*requests*/)
-      : names{channel_of(Content::kName)..., "HELLO", "SUBSCRIBE", "GET_STATUS"},
+      : names{channel_of_request(Content::kName)..., "HELLO", "SUBSCRIBE", "GET_STATUS"},
         views(names.begin(), names.end()) {
     const std::vector<Decoder> all{decode_request<Content>..., decode_hello, decode_subscription,
                                    decode_request<GetStatus>};
@@ -75,6 +66,15 @@ const Channels& channels() {
 }
 
 }  // namespace
+
+std::string channel_of_request(std::string_view name) {
+  std::string channel(name);
+  for (char& c : channel) {  // not by toupper(): that depends on the program's locale
+    if (c == ' ') c = '_';
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  }
+  return channel;
+}
 
 std::span<const std::string_view> client_channels() {
   return channels().views;
@@ -104,15 +104,15 @@ bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id,
 }
 
 bushd::Result<Packet> encode(std::int64_t utime_us, const RequestId& id, GetStatus) {
-  return packet("GET_STATUS", RequestMessage<GetStatus>{{utime_us, id}, {}});
+  return packet(RequestMessage<GetStatus>{{utime_us, id}, {}});
 }
 
 bushd::Result<Packet> encode(std::int64_t utime_us, const Hello& hello) {
-  return packet("HELLO", Timed<Hello>{utime_us, hello});
+  return packet(Timed<Hello>{utime_us, hello});
 }
 
 bushd::Result<Packet> encode(const Subscription& subscription) {
-  return packet("SUBSCRIBE", subscription);
+  return packet(subscription);
 }
 
 }  // namespace bushd::lcm

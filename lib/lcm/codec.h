@@ -27,15 +27,21 @@ struct Packet {
   std::vector<std::uint8_t> payload{};
 };
 
+inline constexpr fields::Field kUtimeOfDaemon{"utime_us", fields::Unit{"us since 1970"},
+                                              "the daemon's clock"};
+
 // Whose request it is: what begins every request and is repeated in every answer.
 struct RequestId {
   std::int64_t session = 0;
   std::string client_id{};
   std::int64_t number = 0;
   static void fields(auto& self, auto& visit) {
-    visit("session", self.session);
-    visit("client_id", self.client_id);
-    visit("number", self.number);
+    visit({"session",
+           "of this run of the daemon, as welcome_t gave it; on the control socket and with stops "
+           "0 will do"},
+          self.session);
+    visit({"client_id", "1..64 printable characters without blanks"}, self.client_id);
+    visit({"number", "the client's own count of requests in this session"}, self.number);
   }
   friend bool operator==(const RequestId&, const RequestId&) = default;
 };
@@ -43,34 +49,50 @@ struct RequestId {
 struct Hello {
   std::string client_id{};
   std::int64_t nonce = 0;
+
+  static constexpr std::string_view kName = "hello";
+  static constexpr std::string_view kMeaning =
+      "Asks for a session; answered on <prefix>_WELCOME. May be repeated until it is answered.";
   static void fields(auto& self, auto& visit) {
-    visit("client_id", self.client_id);
-    visit("nonce", self.nonce);
+    visit({"client_id", "1..64 printable characters without blanks"}, self.client_id);
+    visit({"nonce",
+           "random: the same client_id and nonce get the same session, another nonce another one"},
+          self.nonce);
   }
 };
 struct Welcome {
   Hello hello;
   std::int64_t run = 0;
   std::int64_t session = 0;
+
+  static constexpr std::string_view kName = "welcome";
+  static constexpr std::string_view kMeaning = "Answers hello_t.";
   static void fields(auto& self, auto& visit) {
-    visit("run", self.run);
+    visit({"run", "of the daemon, as in mcu_state_t"}, self.run);
     Hello::fields(self.hello, visit);
-    visit("session", self.session);
+    visit({"session", "never 0"}, self.session);
   }
 };
-// What a connection of the control socket hears without asking.
 struct Subscription {
   bool state = false;
   bool description = false;
   bool health = false;
+
+  static constexpr std::string_view kName = "subscribe";
+  static constexpr std::string_view kMeaning =
+      "On the control socket only: what this connection hears without asking, at first nothing.";
   static void fields(auto& self, auto& visit) {
     visit("state", self.state);
     visit("description", self.description);
     visit("health", self.health);
   }
 };
-// Description, state and health of everything, at once.
 struct GetStatus {
+  static constexpr std::string_view kName = "get status";
+  static constexpr std::string_view kMeaning =
+      "Description, state and health at once, and then answer_t: on the control socket to who "
+      "asks, else published.";
+  static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };
 
@@ -105,17 +127,17 @@ bushd::Result<Packet> encode(std::int64_t utime_us, const Welcome& welcome);
 
 // Which one of the snapshots that together are the whole.
 struct Part {
-  std::int64_t utime_us = 0;  // of the daemon's clock
-  std::int64_t run = 0;       // of the daemon
-  std::int64_t sequence = 0;  // of the message
+  std::int64_t utime_us = 0;
+  std::int64_t run = 0;
+  std::int64_t sequence = 0;
   std::int32_t part = 0;
   std::int32_t parts = 1;
   static void fields(auto& self, auto& visit) {
-    visit("utime_us", self.utime_us);
-    visit("run", self.run);
-    visit("sequence", self.sequence);
-    visit("part", self.part);
-    visit("parts", self.parts);
+    visit(kUtimeOfDaemon, self.utime_us);
+    visit({"run", "of the daemon: another one tells of a restart"}, self.run);
+    visit({"sequence", "of the message, growing within a run"}, self.sequence);
+    visit({"part", "0 .. parts - 1"}, self.part);
+    visit({"parts", "that together are the whole"}, self.parts);
   }
 };
 bushd::Result<Packet> encode(const Part& part, std::int64_t dropped_messages,
@@ -146,6 +168,7 @@ struct SnapshotMessage {
   using Value = SnapshotMessage<std::remove_cvref_t<Snapshot>>;
   Part part;
   Snapshot snapshot;
+  using About = std::remove_cvref_t<Snapshot>;
   static void fields(auto& self, auto& visit) {
     Part::fields(self.part, visit);
     std::remove_cvref_t<Snapshot>::fields(self.snapshot, visit);
@@ -157,9 +180,11 @@ struct StateMessageOf {
   Part part;
   std::int64_t dropped_messages = 0;
   Snapshot snapshot;
+  using About = std::remove_cvref_t<Snapshot>;
   static void fields(auto& self, auto& visit) {
     Part::fields(self.part, visit);
-    visit("dropped_messages", self.dropped_messages);
+    visit({"dropped_messages", "that the daemon could not use so far: broken, hostile or too many"},
+          self.dropped_messages);
     std::remove_cvref_t<Snapshot>::fields(self.snapshot, visit);
   }
 };
@@ -170,8 +195,9 @@ using HealthMessage = SnapshotMessage<api::HealthSnapshot>;
 struct CamacLamMessage {
   std::int64_t utime_us = 0;
   api::CamacLam lam;
+  using About = api::CamacLam;
   static void fields(auto& self, auto& visit) {
-    visit("utime_us", self.utime_us);
+    visit(kUtimeOfDaemon, self.utime_us);
     api::CamacLam::fields(self.lam, visit);
   }
 };

@@ -57,8 +57,8 @@ using Packets = bushd::Result<std::vector<Packet>>;
 
 // In one message.
 template <class Message>
-Packets whole(std::string_view channel, const Message& message) {
-  auto made = packet(channel, message);
+Packets whole(const Message& message) {
+  auto made = packet(message);
   if (!made) return fail(made.error());
   return std::vector<Packet>{std::move(*made)};
 }
@@ -66,10 +66,10 @@ Packets whole(std::string_view channel, const Message& message) {
 // In one message, or in as many as it takes, each with an equal piece of its list. `message_with`
 // makes a message of a detail.
 template <class Detail>
-Packets in_parts(std::string_view channel, const Detail& detail, auto message_with) {
+Packets in_parts(const Detail& detail, auto message_with) {
   bool good = true;
   const std::vector<std::uint8_t> bytes = bytes_of(message_with(detail), good);
-  if (!good || bytes.size() <= kMaxMessageBytes) return whole(channel, message_with(detail));
+  if (!good || bytes.size() <= kMaxMessageBytes) return whole(message_with(detail));
   Detail piece = detail;
   const auto list = std::exchange(list_of(piece), {});
   for (std::size_t parts = bytes.size() / kMaxMessageBytes + 1;; ++parts) {
@@ -82,7 +82,7 @@ Packets in_parts(std::string_view channel, const Detail& detail, auto message_wi
       auto message = message_with(piece);
       message.reply.part = static_cast<std::int32_t>(part);
       message.reply.parts = static_cast<std::int32_t>(parts);
-      auto made = packet(channel, message);
+      auto made = packet(message);
       if (!made && parts < kMaxParts) break;  // too long: in more parts
       if (!made) return fail(made.error());
       packets.push_back(std::move(*made));
@@ -133,49 +133,36 @@ bushd::Result<std::vector<Packet>> encode(std::int64_t utime_us, const RequestId
                                           const api::Reply& reply) {
   const ReplyHeader begin = header(utime_us, id, reply);
   const auto* completed = std::get_if<api::Completed>(&reply);
-  if (completed == nullptr) return whole("REPLY", Answer{begin});
-  const auto with = [&begin](const auto& content) {
-    return AnswerWith<std::decay_t<decltype(content)>>{begin, content};
-  };
+  if (completed == nullptr) return whole(Answer{begin});
   return std::visit(
       Overloaded{
-          [&](std::monostate) { return whole("REPLY", Answer{begin}); },
+          [&](std::monostate) { return whole(Answer{begin}); },
           [&](const std::vector<api::MotorResult>& motors) {
-            return in_parts("REPLY", motors,
-                            [&](const auto& piece) { return Answer{begin, piece}; });
+            return in_parts(motors, [&](const auto& piece) { return Answer{begin, piece}; });
           },
           [&](const api::MovePlan& plan) {
-            return in_parts("REPLY", plan,
-                            [&](const auto& piece) { return Answer{begin, {}, {piece}}; });
+            return in_parts(plan, [&](const auto& piece) { return Answer{begin, {}, {piece}}; });
           },
           [&](const api::TableList& list) {
-            return in_parts("TABLE_REPLY", list,
+            return in_parts(list,
                             [&](const auto& piece) { return TableAnswer{begin, piece.entries}; });
           },
-          [&](const api::TableFile& table) {
-            return whole("TABLE_REPLY", TableAnswer{begin, {}, {table}});
-          },
-          [&](const api::MotionHistory& history) {
-            return in_parts("HISTORY_REPLY", history, with);
-          },
-          [&](const api::Configuration& configuration) {
-            return in_parts("CONFIGURATION_REPLY", configuration, with);
-          },
-          [&](const api::CamacResult& result) { return in_parts("CAMAC_REPLY", result, with); },
-          [&](const api::ProgramList& list) { return in_parts("PROGRAM_REPLY", list, with); }},
+          [&](const api::TableFile& table) { return whole(TableAnswer{begin, {}, {table}}); },
+          [&]<class Content>(const Content& content) {
+            return in_parts(
+                content, [&](const Content& piece) { return AnswerWith<Content>{begin, piece}; });
+          }},
       completed->detail);
 }
 
 std::optional<DaemonMessage> decode_reply(std::string_view channel, Payload payload) {
-  if (channel == "REPLY") return decode_answer<Answer>(payload);
-  if (channel == "TABLE_REPLY") return decode_answer<TableAnswer>(payload);
-  if (channel == "HISTORY_REPLY") return decode_answer<AnswerWith<api::MotionHistory>>(payload);
-  if (channel == "CONFIGURATION_REPLY") {
-    return decode_answer<AnswerWith<api::Configuration>>(payload);
-  }
-  if (channel == "CAMAC_REPLY") return decode_answer<AnswerWith<api::CamacResult>>(payload);
-  if (channel == "PROGRAM_REPLY") return decode_answer<AnswerWith<api::ProgramList>>(payload);
-  return std::nullopt;
+  std::optional<DaemonMessage> reply;
+  for_each_message(kOfDaemon, [&]<class Message>(const On<Message>& on) {
+    if constexpr (kIsAnswer<Message>) {
+      if (on.channel == channel) reply = decode_answer<Message>(payload);
+    }
+  });
+  return reply;
 }
 
 std::optional<api::Reply> ReplyParts::add(ReplyMessage message) {

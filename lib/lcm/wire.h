@@ -79,12 +79,13 @@ class Writer {
   static constexpr bool kReads = false;
   explicit Writer(std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
 
-  void operator()(const char* /*name*/, const auto& value) { put(value); }
-  void operator()(const char* /*name*/, const auto& value, const auto& form) {
+  void operator()(const fields::Field& /*field*/, const auto& value) { put(value); }
+  void operator()(const fields::Field& /*field*/, const auto& value, const auto& form) {
     put(form.told(value));
   }
   template <class List, class Form = fields::Same>
-  void list(const char* /*count*/, const char* /*name*/, const List& list, const Form& form = {}) {
+  void list(const fields::Field& /*count*/, const fields::Field& /*field*/, const List& list,
+            const Form& form = {}) {
     put(static_cast<std::int32_t>(list.size()));
     for (const auto& element : list) put(form.told(element));
   }
@@ -127,13 +128,13 @@ class Reader {
   static constexpr bool kReads = true;
   explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
 
-  void operator()(const char* /*name*/, auto& value) { get(value); }
+  void operator()(const fields::Field& /*field*/, auto& value) { get(value); }
   template <class T, class Form>
-  void operator()(const char* /*name*/, T& value, const Form& form) {
+  void operator()(const fields::Field& /*field*/, T& value, const Form& form) {
     take(value, form);
   }
   template <class T, class Form = fields::Same>
-  void list(const char* /*count*/, const char* /*name*/, std::vector<T>& list,
+  void list(const fields::Field& /*count*/, const fields::Field& /*field*/, std::vector<T>& list,
             const Form& form = {}) {
     const std::size_t count = get_count(least_bytes<Told<Form, T>>());
     list.clear();
@@ -215,20 +216,20 @@ class Fingerprint {
   }
 
   template <class T>
-  void operator()(const char* name, const T& /*value*/) {
-    field<T>(name);
+  void operator()(const fields::Field& field, const T& /*value*/) {
+    add_field<T>(field.name);
     add('\0');  // dimensions
   }
   template <class T, class Form>
-  void operator()(const char* name, const T& /*value*/, const Form& /*form*/) {
-    field<Told<Form, T>>(name);
+  void operator()(const fields::Field& field, const T& /*value*/, const Form& /*form*/) {
+    add_field<Told<Form, T>>(field.name);
     add('\0');
   }
   template <class T, class Form = fields::Same>
-  void list(const char* count, const char* name, const std::vector<T>& /*list*/,
+  void list(const fields::Field& count, const fields::Field& field, const std::vector<T>& /*list*/,
             const Form& /*form*/ = {}) {
-    counted_by(count);
-    array<Told<Form, T>>(count, name);
+    counted_by(count.name);
+    array<Told<Form, T>>(count.name, field.name);
   }
   static void set(const auto& /*member*/, const auto& /*value*/) {}
   static void require(bool /*condition*/) {}
@@ -244,7 +245,7 @@ class Fingerprint {
     for (const char c : text) add(c);
   }
   template <class T>
-  void field(std::string_view name) {
+  void add_field(std::string_view name) {
     add(name);
     if constexpr (type_name<T>().empty()) {
       within_ += of<T>();
@@ -253,12 +254,12 @@ class Fingerprint {
     }
   }
   void counted_by(std::string_view count) {
-    field<std::int32_t>(count);
+    add_field<std::int32_t>(count);
     add('\0');
   }
   template <class T>
   void array(std::string_view count, std::string_view name) {
-    field<T>(name);
+    add_field<T>(name);
     add('\1');  // dimension,
     add('\1');  // of variable size
     add(count);

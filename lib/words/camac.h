@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "base/fields.h"
@@ -12,6 +13,12 @@ inline constexpr int kStations = 23;  // for modules, 1 .. 23
 inline constexpr int kLastSubaddress = 15;
 inline constexpr int kLastFunction = 31;
 inline constexpr std::uint32_t kDataMask = 0xFFFFFF;
+// What can be asked for. N24 and above are of the crate's controller.
+inline constexpr bushd::fields::Range<std::int64_t> kStation{1, 31};
+inline constexpr bushd::fields::Range<std::int64_t> kModules{1, kStations};
+inline constexpr bushd::fields::Range<std::int64_t> kSubaddress{0, kLastSubaddress};
+inline constexpr bushd::fields::Range<std::int64_t> kFunction{0, kLastFunction};
+inline constexpr bushd::fields::Range<std::int64_t> kData{0, kDataMask};
 
 // The others carry no data.
 constexpr bool reads(int function) {
@@ -25,13 +32,16 @@ struct Naf {
   int station = 0;
   int subaddress = 0;
   int function = 0;
-  std::uint32_t data = 0;  // W; of functions that write
+  std::uint32_t data = 0;
+
+  static constexpr std::string_view kName = "camac cycle";
+  static constexpr std::string_view kMeaning = "A cycle of a CAMAC crate.";
   static void fields(auto& self, auto& visit) {
     constexpr bushd::fields::As<std::int8_t> kByte{};
-    visit("station", self.station, kByte);
-    visit("subaddress", self.subaddress, kByte);
-    visit("function", self.function, kByte);
-    visit("data", self.data);
+    visit({"station", "N", kStation}, self.station, kByte);
+    visit({"subaddress", "A", kSubaddress}, self.subaddress, kByte);
+    visit({"function", "F", kFunction}, self.function, kByte);
+    visit({"data", "W; of functions that write", kData}, self.data);
   }
   friend bool operator==(const Naf&, const Naf&) = default;
 };
@@ -39,40 +49,53 @@ struct Naf {
 struct Response {
   bool x = false;
   bool q = false;
-  std::uint32_t data = 0;  // R; 0 of functions that do not read
+  std::uint32_t data = 0;
+
+  static constexpr std::string_view kName = "camac response";
+  static constexpr std::string_view kMeaning =
+      "What a station of a CAMAC crate has answered to a cycle.";
   static void fields(auto& self, auto& visit) {
-    visit("x", self.x);
+    visit({"x", "the station has this command"}, self.x);
     visit("q", self.q);
-    visit("data", self.data);
+    visit({"data", "R; 0 of functions that do not read", kData}, self.data);
   }
   friend bool operator==(const Response&, const Response&) = default;
 };
 
 enum class BlockMode {
-  kSingle,  // each cycle of a list, whatever X and Q
-  kRepeat,  // one address; the same word again until Q, or kMostTries times
-  kQStop,   // one address, until a word without Q, which is none
-  kScan     // one subaddress after the other, after one without Q the next station
+  kSingle,
+  kRepeat,  // at most Block::kMostTries times
+  kQStop,
+  kScan
 };
 
 struct Block {
   static constexpr int kMostTries = 100;
+  static constexpr std::uint32_t kMostCycles = 4096;  // also of words
+  static constexpr bushd::fields::Range<std::int64_t> kWords{1, kMostCycles};
+  static constexpr bushd::fields::OneOf kMode{
+      {{"SINGLE", "each cycle of the list, whatever X and Q"},
+       {"REPEAT", "address of the first, each word tried again until Q"},
+       {"Q_STOP", "address of the first, until Q = 0"},
+       {"SCAN",
+        "from the first address on: next subaddress after Q = 1, next station after Q = 0"}}};
 
   BlockMode mode = BlockMode::kSingle;
-  // The first cycle of a block other than kSingle has the address, and each one a word, if it
-  // writes.
-  std::vector<Naf> cycles{};  // at least one
-  // Words; of kSingle and of blocks that write as many as there are cycles.
+  std::vector<Naf> cycles{};
   std::uint32_t count = 1;
-  // The last address of a kScan, inclusive.
   int last_station = kStations;
   int last_subaddress = kLastSubaddress;
   static void fields(auto& self, auto& visit) {
-    visit("mode", self.mode, bushd::fields::OneOf<4>{});
-    visit("count", self.count);
-    visit("last_station", self.last_station);
-    visit("last_subaddress", self.last_subaddress);
-    visit.list("cycle_count", "cycles", self.cycles);
+    visit("mode", self.mode, kMode);
+    visit({"count", "words; of SINGLE and of functions that write: cycle_count", kWords},
+          self.count);
+    visit({"last_station", "of SCAN, inclusive", kModules}, self.last_station);
+    visit({"last_subaddress", "of SCAN", kSubaddress}, self.last_subaddress);
+    visit.list({"cycle_count", "", kWords},
+               {"cycles",
+                "the first one of a block other than SINGLE has the address, and each a word, if "
+                "it writes"},
+               self.cycles);
   }
   friend bool operator==(const Block&, const Block&) = default;
 };
@@ -81,7 +104,7 @@ struct BlockResult {
   // Responses of the cycles that moved a word, and of all cycles of kSingle; a block at one address
   // has that too by which it ended.
   std::vector<Response> responses{};
-  std::uint32_t tally = 0;  // words moved; of kSingle cycles made
+  std::uint32_t tally = 0;
   friend bool operator==(const BlockResult&, const BlockResult&) = default;
 };
 

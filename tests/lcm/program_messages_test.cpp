@@ -1,5 +1,4 @@
-// Messages about programs of MCUs arrive as they were meant, each field under the name that the
-// .lcm file gives it.
+// Messages about programs of MCUs arrive as they were meant.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,25 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "lcm/all_messages.h"
 #include "lcm/codec.h"
-#include "lcm/oracle.h"
 
 namespace bushd::lcm {
 namespace {
 
 const RequestId kAsker{.session = 2, .client_id = "me", .number = 3};
-
-template <class Oracle>
-Oracle told(const api::Request& request) {
-  return test::as<Oracle>(encode(1, kAsker, request).value().payload);
-}
-
-program_t told(const api::ProgramEntry& entry) {
-  const api::Completed reply{.reason = "r", .detail = api::ProgramList{{entry}}};
-  const auto packets = encode(1, kAsker, reply).value();
-  return test::as<program_reply_t>(packets.front().payload).programs.at(0);
-}
 
 template <class Request>
 Request carried(const Request& request) {
@@ -56,67 +42,6 @@ TEST(ProgramMessages, TheGreatestProgramArrives) {
       carried(api::PutProgram{.program = "scan", .text = half, .points = {{"p.csv", half}}});
   EXPECT_EQ(put.text, half);
   EXPECT_EQ(put.points.at(0).text, half);
-}
-
-TEST(ProgramMessages, EachFieldHasItsName) {
-  const auto put = told<put_program_t>(
-      api::PutProgram{.program = "p", .text = "t", .points = {{"f", "x"}}, .dry_run = true});
-  EXPECT_EQ(put.program, "p");
-  EXPECT_EQ(put.text, "t");
-  EXPECT_EQ(put.points.at(0).file, "f");
-  EXPECT_EQ(put.points.at(0).text, "x");
-  EXPECT_EQ(put.dry_run, 1);
-  EXPECT_EQ(told<put_program_t>(api::PutProgram{}).dry_run, 0);
-  EXPECT_EQ(told<erase_program_t>(api::EraseProgram{"p"}).program, "p");
-  EXPECT_EQ(told<run_programs_t>(api::RunPrograms{{"p", "q"}}).programs,
-            (std::vector<std::string>{"p", "q"}));
-  const program_t program = told(api::ProgramEntry{
-      .mcu = "m",
-      .program = "p",
-      .checksum = "c",
-      .stage = "runs",
-      .reason = "r",
-      .bytes = 1,
-      .memory = 2,
-      .frame = 3,
-      .point = 4,
-      .repeats = 5,
-      .duration_us = 6,
-      .pulses = 7,
-      .motors = {{.motor = "a", .least_steps = 8, .most_steps = 9, .end_steps = 10, .edges = 11}}});
-  EXPECT_EQ(program.mcu, "m");
-  EXPECT_EQ(program.program, "p");
-  EXPECT_EQ(program.checksum, "c");
-  EXPECT_EQ(program.stage, "runs");
-  EXPECT_EQ(program.reason, "r");
-  EXPECT_EQ(program.bytes, 1);
-  EXPECT_EQ(program.memory, 2);
-  EXPECT_EQ(program.frame, 3);
-  EXPECT_EQ(program.point, 4);
-  EXPECT_EQ(program.repeats, 5);
-  EXPECT_EQ(program.duration_us, 6);
-  EXPECT_EQ(program.pulses, 7);
-  EXPECT_EQ(program.motors.at(0).motor, "a");
-  EXPECT_EQ(program.motors.at(0).least_steps, 8);
-  EXPECT_EQ(program.motors.at(0).most_steps, 9);
-  EXPECT_EQ(program.motors.at(0).end_steps, 10);
-  EXPECT_EQ(program.motors.at(0).edges, 11);
-  // Each that is true or false, alone.
-  using Entry = api::ProgramEntry;
-  const std::vector<std::pair<bool Entry::*, std::int8_t program_t::*>> flags{
-      {&Entry::without_host, &program_t::without_host},
-      {&Entry::at_power_on, &program_t::at_power_on},
-      {&Entry::kept, &program_t::kept},
-      {&Entry::stored, &program_t::stored},
-      {&Entry::endless, &program_t::endless},
-      {&Entry::waits_for_inputs, &program_t::waits_for_inputs},
-      {&Entry::cut, &program_t::cut}};
-  for (const auto& [sent, unused] : flags) {
-    Entry one;
-    one.*sent = true;
-    const program_t heard = told(one);
-    for (const auto& [member, name] : flags) EXPECT_EQ(heard.*name, member == sent ? 1 : 0);
-  }
 }
 
 // On LCM a client hears the channels of this list, and no other.

@@ -35,10 +35,12 @@ class RandomFields {
  public:
   explicit RandomFields(Random& random) : random_(random) {}
 
-  void operator()(const char* /*name*/, auto& value) { make(value); }
-  void operator()(const char* /*name*/, auto& value, const auto& form) { take(value, form); }
+  void operator()(const fields::Field& /*field*/, auto& value) { make(value); }
+  void operator()(const fields::Field& /*field*/, auto& value, const auto& form) {
+    take(value, form);
+  }
   template <class T, class Form = fields::Same>
-  void list(const char* /*count*/, const char* /*name*/, std::vector<T>& list,
+  void list(const fields::Field& /*count*/, const fields::Field& /*field*/, std::vector<T>& list,
             const Form& form = {}) {
     list.resize(below(random_, 4));
     for (T& element : list) take(element, form);
