@@ -197,6 +197,13 @@ def made(kind: Callable[..., T], message: Any, **others: Any) -> T:
     return value
 
 
+def told_by(kind: Any, message: Any) -> dict[str, Any]:
+    """What a message has by the names of one of `told`."""
+    of: Any = type(message)
+    names, read, _ = _taken(kind, of, ())
+    return dict(zip(names, read(message)))
+
+
 def table_ref(message: Any) -> model.TableRef:
     return made(model.TableRef, message, revision=max(message.revision, 0))
 

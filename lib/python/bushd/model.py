@@ -1,7 +1,8 @@
 """What the daemon says, as values: results of requests, states of motors and MCUs, health of buses, tables.
 
 All of them are immutable. A number that has a unit says it in its name (`_steps`, `_s`, `_us`), except positions and
-distances in the motor's own unit, which is in `unit`.
+distances in the motor's own unit, which is in `unit`. What a message tells as it is comes from the bases, in `told`, which is
+made of the .lcm files; here is what is told otherwise in Python.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ import dataclasses
 import datetime
 import enum
 from collections.abc import Iterator, Mapping
+
+from . import told
 
 
 class Outcome(enum.Enum):
@@ -100,20 +103,13 @@ class Result:
 
 
 @dataclasses.dataclass(frozen=True)
-class MotorResult:
+class MotorResult(told.MotorResult):
     """What became of one motor of a move."""
 
-    motor: str
     outcome: Outcome
     position: float  # where it stands at the end, in `unit`, on the user's scale
     dial: float  # the same on the dial
-    position_steps: int
-    unit: str  # "steps" of a motor without one
-    precision: int  # decimals of positions for people
     table: TableRef  # by which it has moved
-    asked_by: str
-    legs: int  # how many its motion had, as planned
-    most_steps_per_s: float  # not exceeded by any leg; 0 of what the MCU makes by itself
 
     def __str__(self) -> str:
         return f"{self.motor}: {self.outcome.value}, stands at {self.position:.{self.precision}f} {self.unit}"
@@ -136,13 +132,10 @@ class MoveResult(Result):
 
 
 @dataclasses.dataclass(frozen=True)
-class PlannedLeg:
+class PlannedLeg(told.PlannedLeg):
     """One motor of a planned move; a motor with several legs has one of these for each."""
 
-    motor: str
-    steps: int
     duration_s: float  # to its last step
-    peak_steps_per_s: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,39 +160,23 @@ class LineState:
 
 
 @dataclasses.dataclass(frozen=True)
-class Motor:
+class Motor(told.Motor, told.MotorDescription):
     """The state of one motor. Positions are None while `trust` is `Trust.UNKNOWN`."""
 
-    name: str
     position: float | None  # in `unit`, on the user's scale
     dial: float | None
     position_steps: int | None
     target: float | None  # where it will stand in the end; equal to the position at rest
     target_steps: int | None
-    unit: str  # "steps" of a motor without one
-    velocity_steps_per_s: float  # signed, of the running step
-    moving: bool
     activity: Activity
-    enabled: bool  # drivers powered
     switch: bool  # one of its switches is active
     inputs: frozenset[str]  # active ones of "positive", "negative", "home", "step"
     inhibited: Inhibited
     trust: Trust
-    uncertain_reason: str  # why the position is not known; "" while it is
     heard_at: datetime.datetime | None  # while `trust` is STALE: when the position was heard
-    paused: bool  # it ramps down, or stands, on the way to its target
-    held: bool  # no motion begins
-    armed_by: str  # while `activity` is ARMING or ARMED: whose request that is; else ""
     line: LineState | None  # while it moves on a line with others
     mcu: str  # "<bus>:<address>"
-    output: int
-    group: str
     table: TableRef  # in service, for the next move
-    description: str
-    steps_per_unit: str  # exact: "320" or "1/3"
-    negative: bool  # position = offset - dial; otherwise offset + dial
-    offset: float  # of the user's scale
-    precision: int  # decimals of positions for people
     soft_limits: tuple[float, float] | None  # on the user's scale, low before high
 
     def __str__(self) -> str:
@@ -208,21 +185,12 @@ class Motor:
 
 
 @dataclasses.dataclass(frozen=True)
-class Mcu:
+class Mcu(told.McuState, told.McuDescription):
     """The state of one microcontroller."""
 
     name: str  # "<bus>:<address>"
-    bus: str
-    address: int
     state: McuState
-    detail: str  # cause of OFFLINE or FAULT
     inputs: frozenset[str]  # active ones: of "emergency", "forward", "reverse", "trigger"
-    program: str  # that is under way, and where it is: "scan runs, frame 3, without host"; "": none
-    boot_number: int  # 0 until the MCU was heard
-    tick: int
-    tick_ns: int
-    emergency_stop: str  # how its motors stop then: "ramp", "immediate" or "disable"
-    port: str  # of its bus, that is open; "": none
 
 
 @dataclasses.dataclass(frozen=True)
@@ -241,68 +209,31 @@ class Status:
 
 
 @dataclasses.dataclass(frozen=True)
-class McuHealth:
+class McuHealth(told.McuHealth):
     """Counts of one microcontroller, since the daemon's start."""
 
-    mcu: str
-    address: int
-    unique_id: str  # 16 hexadecimal digits; "" until the MCU was heard
-    firmware_version: int
-    boot_number: int
-    reset_cause: str
-    current: int  # of the supply: 0 .. 1023 of what the MCU can measure
-    crc_errors: int
-    rejected_frames: int
-    ramp_downs: int
-    timeouts: int
-    repeats: int
-    missed_ticks: int
-    restarts: int
     low_water_ticks: int | None  # the fewest ticks that a moving motor had queued; None: none moved
-    rate_ppm: float
-    clock_offset_us: float
-    two_masters: bool
 
 
 @dataclasses.dataclass(frozen=True)
-class BusHealth:
+class BusHealth(told.BusHealth):
     """Counts of one bus and its MCUs, since the daemon's start."""
 
-    bus: str
-    port_state: str  # "open", or why it is not
-    two_masters: bool
-    crc_errors: int
-    stray_frames: int
-    recent_latency_us: int
-    start_margin_us: int
-    line_bytes: int  # sent and received
-    line_bytes_per_s: int  # that the line can carry
     latency: tuple[tuple[int | None, int], ...]  # (below so many us, answers); None: above all bounds
     mcus: tuple[McuHealth, ...]
 
 
 @dataclasses.dataclass(frozen=True)
-class PastMotion:
+class PastMotion(told.PastMotion):
     """What has moved a motor, or made its position known."""
 
     at: datetime.datetime  # when it ended
-    what: str  # "move", "home", "arm", "jog", "line", "travel", "set", "config" or "confirm"
-    who: str  # asked for it
-    from_steps: int
-    to_steps: int
-    outcome: str
-    reason: str
-    from_text: str  # both as they were shown to people then; "" of a motor without a unit
-    to_text: str
 
 
 @dataclasses.dataclass(frozen=True)
-class Setting:
+class Setting(told.Setting):
     """A key of a motor that may be changed in operation: its value now and that in `bushd.toml`."""
 
-    motor: str
-    key: str
-    value: str
     in_file: str
 
 
@@ -316,12 +247,8 @@ class Configuration:
 
 
 @dataclasses.dataclass(frozen=True)
-class CamacResponse:
+class CamacResponse(told.CamacResponse):
     """What a station of a CAMAC crate has answered to a cycle."""
-
-    x: bool  # it has this command
-    q: bool
-    data: int  # 24 bits; 0 of functions that do not read
 
 
 @dataclasses.dataclass(frozen=True)
@@ -334,39 +261,16 @@ class CamacResult:
 
 
 @dataclasses.dataclass(frozen=True)
-class ProgramMotor:
+class ProgramMotor(told.ProgramMotor):
     """What a program does to a motor, from where the motor stands; of a repeat without end one pass."""
-
-    motor: str
-    least_steps: int  # where it comes to, its beginning included
-    most_steps: int
-    end_steps: int
-    edges: int  # steps that it makes
 
 
 @dataclasses.dataclass(frozen=True)
-class Program:
+class Program(told.Program):
     """The program of an MCU: what it is, how far it has come, and what it does."""
 
-    mcu: str  # "<bus>:<address>"
-    program: str  # its name; "": none, or one that was put before the daemon started
-    checksum: str  # CRC-32 of its bytes, 8 hexadecimal digits; "": the MCU has none
     stage: ProgramStage
-    reason: str  # why its last run has ended; "": it has not
-    without_host: bool  # it goes on when no host is heard
-    at_power_on: bool  # it begins by itself when the power comes
-    kept: bool  # it is to outlive power cuts
-    stored: bool  # and would now
-    bytes: int  # of it, or of what has arrived of it
-    memory: int  # bytes that a program may have there
-    frame: int  # that is carried out, or was last, from 1; 0: none yet
-    point: int  # of this frame, if it is a line, from 1
-    repeats: int
-    duration_s: float  # without the time in which it waits for inputs; this and what follows: of one that this daemon has checked
-    pulses: int
-    endless: bool  # it repeats without end: what is told is of one pass
-    waits_for_inputs: bool
-    cut: bool  # there are more frames to carry out than were looked at
+    duration_s: float  # without the time in which it waits for inputs; of a program that this daemon has checked
     motors: tuple[ProgramMotor, ...]
 
     def __getitem__(self, motor: str) -> ProgramMotor:
@@ -377,15 +281,10 @@ class Program:
 
 
 @dataclasses.dataclass(frozen=True)
-class TableEntry:
+class TableEntry(told.TableEntry):
     """One of the tables that the daemon finds."""
 
-    name: str  # its file's name without ".toml"
     table: TableRef
-    fault: str  # why it cannot be used; "": it can
-    codes: int
-    start_steps_per_s: float
-    max_steps_per_s: float
 
 
 @dataclasses.dataclass(frozen=True)

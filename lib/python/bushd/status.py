@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from typing import Any
 
-from . import codec, model
+from . import codec, model, told
 from .codec import MAX_PARTS, Description, Health, Part, Unread
 
 MOST_PUT_OFF = 16  # states of an MCU
@@ -140,10 +140,7 @@ def _mcu(state: Any, description: Any) -> model.Mcu:
         name=state.mcu,
         state=model.McuState(state.state),
         inputs=frozenset(state.inputs.split()),
-        address=description.address,
-        tick_ns=description.tick_ns,
-        emergency_stop=description.emergency_stop,
-        port=description.port,
+        **codec.told_by(told.McuDescription, description),
     )
 
 
@@ -168,5 +165,5 @@ def _motor(state: Any, description: Any, mcu: str) -> model.Motor:
         mcu=mcu,
         table=codec.table_ref(description.table),
         soft_limits=(description.user_low, description.user_high) if description.soft_limits else None,
-        **{name: getattr(description, name) for name in ("unit", "output", "group", "description", "steps_per_unit", "negative", "offset", "precision")},
+        **codec.told_by(told.MotorDescription, description),
     )
