@@ -73,6 +73,7 @@ struct Field {
   Range<double> range{};  // of numbers far below 2^53
   bool has_range = false;
 
+  // NOLINTNEXTLINE(google-explicit-constructor): most fields are told by their names alone.
   constexpr Field(const char* its_name) : name(its_name) {}
   constexpr Field(const char* its_name, const char* its_meaning)
       : name(its_name), meaning(its_meaning) {}

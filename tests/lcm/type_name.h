@@ -13,7 +13,8 @@ struct FixedText {
   char text[kLongest + 1]{};
 
   constexpr FixedText() = default;
-  constexpr FixedText(std::string_view given) { std::ranges::copy(given, text); }
+  constexpr explicit FixedText(std::string_view given) { std::ranges::copy(given, text); }
+  // NOLINTNEXTLINE(google-explicit-constructor): the argument of a template is a literal.
   constexpr FixedText(const char* given) : FixedText(std::string_view(given)) {}
   constexpr std::string_view view() const { return text; }
 };
