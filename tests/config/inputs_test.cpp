@@ -1,11 +1,11 @@
 // Keys about switches, the emergency input, the supply current and EN.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
 
 #include "config/config.h"
 #include "config/config_file.h"
+#include "config/refused_keys.h"
 
 namespace bushd::config {
 namespace {
@@ -13,7 +13,6 @@ namespace {
 using test::ConfigFile;
 using test::kGood;
 using test::replaced;
-using testing::HasSubstr;
 
 std::string with_mcu(const std::string& keys) {
   return replaced(kGood, "address = 255\n", "address = 255\n" + keys);  // from line 22 on
@@ -99,14 +98,8 @@ TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
   }
 }
 
-struct BadInputKey {
-  std::string text;
-  int line;
-  const char* error;
-};
-
 TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
-  const BadInputKey bad[] = {
+  const test::RefusedKey bad[] = {
       {with_mcu("emergency_input = \"stop\"\n"), 22,
        "mcu[1].emergency_input: is \"stop\"; allowed: \"ignore\", \"ramp\", \"immediate\" or "
        "\"disable\""},
@@ -149,12 +142,7 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_motor("input_active = \"low\"\n"), 37,
        "motor[1].input_active: is \"low\"; allowed: \"closed\" or \"open\""},
   };
-  for (const BadInputKey& one : bad) {
-    const auto config = ConfigFile(one.text).load();
-    ASSERT_FALSE(config.has_value()) << one.error;
-    EXPECT_EQ(config.error().line, one.line) << config.error().text();
-    EXPECT_THAT(config.error().text(), HasSubstr(one.error));
-  }
+  test::expect_refused(bad);
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 // `inputs` of a motor: which inputs of its MCU are its switches, and what older keys say of them.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
 
 #include "config/config.h"
 #include "config/config_file.h"
+#include "config/refused_keys.h"
 
 namespace bushd::config {
 namespace {
@@ -13,7 +13,6 @@ namespace {
 using test::ConfigFile;
 using test::kGood;
 using test::replaced;
-using testing::HasSubstr;
 
 // Inputs of "slit", output 15 of "roof:255"; from line 37 on.
 std::string with_motor_inputs(const std::string& keys) {
@@ -105,14 +104,8 @@ TEST(MotorInputs, OneThatNobodyNeedsMayBeAnothersWithoutAWord) {
   ASSERT_TRUE(config.has_value()) << config.error().text();
 }
 
-struct BadMotorInputKey {
-  std::string text;
-  int line;
-  const char* error;
-};
-
 TEST(MotorInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
-  const BadMotorInputKey bad[] = {
+  const test::RefusedKey bad[] = {
       {with_motor_inputs("inputs = 3\n"), 37,
        "motor[1].inputs: is 3; allowed: a table such as { positive = 3,"},
       {with_motor_inputs("inputs = {}\n"), 37,
@@ -170,12 +163,7 @@ TEST(MotorInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_two("input_active = \"open\"\n", "inputs = { positive = 15 }\n"), 37,
        "motor[1].input_active: makes input 15 of MCU \"roof:255\" active when open"},
   };
-  for (const BadMotorInputKey& one : bad) {
-    const auto config = ConfigFile(one.text).load();
-    ASSERT_FALSE(config.has_value()) << one.error;
-    EXPECT_EQ(config.error().line, one.line) << config.error().text();
-    EXPECT_THAT(config.error().text(), HasSubstr(one.error));
-  }
+  test::expect_refused(bad);
 }
 
 }  // namespace
