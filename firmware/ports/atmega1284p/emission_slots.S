@@ -9,11 +9,10 @@
 
 #include <board.h>
 #include "firmware/ports/atmega2560/emission_slots.h"
+#include "firmware/ports/atmega2560/emission_ticks.inc"
 
 ; What the slots want on; windings that the chopper has cut are off meanwhile.
 #define WANTED DATA_HIGH
-#define TICK_FLAGS _SFR_IO_ADDR(GPIOR0)
-
     .section .vectors, "ax", @progbits
 
     .global TIMER1_COMPA_vect
@@ -28,26 +27,7 @@ outputs_are_set:
     ld DATA_LOW, Z+
     movw SLOT_LOW, r30
     movw r30, SAVED_LOW
-    cpse SLOT_LOW, SLOT_MARK
-    reti
-    sbis TICK_FLAGS, TICK_IS_NEXT
-    rjmp take_next_tick
-    ; The first slot: timer 1 has begun it with the length of the one before.
-    lds r30, emission_taken
-    ldi r31, hi8(emission_silent)
-    ldd DATA_LOW, Z+TICK_BEGUN
-    out TICK_FLAGS, DATA_LOW
-    ldd DATA_LOW, Z+TICK_TOP+1
-    sts OCR1AH, DATA_LOW
-    ldd DATA_LOW, Z+TICK_TOP
-    sts OCR1AL, DATA_LOW
-    ldd SLOT_MARK, Z+TICK_END
-    ldd DATA_LOW, Z+TICK_LAST_TOP
-    sts emission_last_top, DATA_LOW
-    ldd DATA_LOW, Z+TICK_LAST_TOP+1
-    sts emission_last_top+1, DATA_LOW
-    movw r30, SAVED_LOW
-    reti
+    end_slot last_slot
 other_outputs:
     sbic TICK_FLAGS, TICK_LEVELS
     rjmp other_windings
@@ -78,23 +58,9 @@ other_windings:
     out _SFR_IO_ADDR(SREG), r24
     pop r24
     rjmp outputs_are_set
-take_next_tick:
-    sbi TICK_FLAGS, TICK_IS_NEXT
-    sbi TICK_FLAGS, TICK_CHANGES
-    lds DATA_LOW, emission_last_top+1
-    sts OCR1AH, DATA_LOW
-    lds DATA_LOW, emission_last_top
-    sts OCR1AL, DATA_LOW
-    lds r30, emission_next
-    ldi r31, hi8(emission_silent)
-    sts emission_taken, r30
-    ld SLOT_LOW, Z
-    ldd SLOT_HIGH, Z+TICK_MASK+1
-    ldd SLOT_MARK, Z+TICK_MARK
-    ldi r30, lo8(emission_silent)
-    sts emission_next, r30
-    movw r30, SAVED_LOW
-    reti
+last_slot:
+    begin_last_slot
+    take_next_tick
 
     .global TIMER1_COMPB_vect
 TIMER1_COMPB_vect:
@@ -109,8 +75,7 @@ pulses_are_over:
     rjmp tell_main_loop
     ; The tick's last pulses are over: DIR may change. The SPI takes 16 cycles for a byte.
     movw SAVED_LOW, r30
-    lds r30, emission_taken
-    ldi r31, hi8(emission_silent)
+    point_to_taken
     ldd DATA_LOW, Z+TICK_DIRECTION
     out _SFR_IO_ADDR(SPDR), DATA_LOW
     movw r30, SAVED_LOW
@@ -126,28 +91,8 @@ tell_main_loop:
     push r24
     push r25
     movw SAVED_LOW, r30
-    lds r30, emission_taken
-    ldi r31, hi8(emission_silent)
-    cpi r30, lo8(emission_silent)
-    breq 1f
-    ; A silent tick that follows holds its directions.
-    ldd r24, Z+TICK_DIRECTION
-    sts emission_silent+TICK_DIRECTION, r24
-    .irp byte, 0, 1, 2, 3
-    lds r24, emission_next_start+\byte
-    sts emission_begun_at+\byte, r24
-    .endr
-    ldi r24, 1
-    sts emission_committed, r24
-1:
-    clc
-    .irp byte, 0, 1, 2, 3
-    lds r24, emission_next_start+\byte
-    ldd r25, Z+TICK_CYCLES+\byte
-    adc r24, r25
-    sts emission_next_start+\byte, r24
-    .endr
-    cbi TICK_FLAGS, TICK_CHANGES
+    point_to_taken
+    tell_tick 1
     movw r30, SAVED_LOW
     pop r25
     pop r24
@@ -159,10 +104,6 @@ tell_main_loop:
 
     .global emission_set_registers
 emission_set_registers:
-    movw r30, r24
-    ld SLOT_LOW, Z
-    ldd SLOT_HIGH, Z+TICK_MASK+1
-    ldd SLOT_MARK, Z+TICK_MARK
-    clr ZERO
+    set_slot_registers
     in WANTED, _SFR_IO_ADDR(REST_LOW)
     ret

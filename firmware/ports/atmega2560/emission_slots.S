@@ -9,8 +9,7 @@
 
 #include <board.h>
 #include "firmware/ports/atmega2560/emission_slots.h"
-
-#define TICK_FLAGS _SFR_IO_ADDR(GPIOR0)
+#include "firmware/ports/atmega2560/emission_ticks.inc"
 
     .section .vectors, "ax", @progbits
 
@@ -24,47 +23,14 @@ TIMER1_COMPA_vect:
     out _SFR_IO_ADDR(STEP_HIGH), DATA_HIGH
     movw SLOT_LOW, r30
     movw r30, SAVED_LOW
-    cpse SLOT_LOW, SLOT_MARK
-    reti
-    sbis TICK_FLAGS, TICK_IS_NEXT
-    rjmp take_next_tick
-    ; The first slot: timer 1 has begun it with the length of the one before.
-    lds r30, emission_taken
-    ldi r31, hi8(emission_silent)
-    ldd DATA_LOW, Z+TICK_BEGUN
-    out TICK_FLAGS, DATA_LOW
-    ldd DATA_LOW, Z+TICK_TOP+1
-    sts OCR1AH, DATA_LOW
-    ldd DATA_LOW, Z+TICK_TOP
-    sts OCR1AL, DATA_LOW
-    ldd SLOT_MARK, Z+TICK_END
-    ldd DATA_LOW, Z+TICK_LAST_TOP
-    sts emission_last_top, DATA_LOW
-    ldd DATA_LOW, Z+TICK_LAST_TOP+1
-    sts emission_last_top+1, DATA_LOW
-    movw r30, SAVED_LOW
-    reti
-take_next_tick:
-    sbi TICK_FLAGS, TICK_IS_NEXT
-    sbi TICK_FLAGS, TICK_CHANGES
-    lds DATA_LOW, emission_last_top+1
-    sts OCR1AH, DATA_LOW
-    lds DATA_LOW, emission_last_top
-    sts OCR1AL, DATA_LOW
+    end_slot last_slot
+last_slot:
+    begin_last_slot
     ldi r30, 1 << OCF1C
     out _SFR_IO_ADDR(TIFR1), r30
     ldi r30, 1 << OCIE1A | 1 << OCIE1B | 1 << OCIE1C
     sts TIMSK1, r30
-    lds r30, emission_next
-    ldi r31, hi8(emission_silent)
-    sts emission_taken, r30
-    ld SLOT_LOW, Z
-    ldd SLOT_HIGH, Z+TICK_MASK+1
-    ldd SLOT_MARK, Z+TICK_MARK
-    ldi r30, lo8(emission_silent)
-    sts emission_next, r30
-    movw r30, SAVED_LOW
-    reti
+    take_next_tick
 
     .global TIMER1_COMPB_vect
 TIMER1_COMPB_vect:
@@ -92,8 +58,7 @@ TIMER1_COMPC_vect:
     rjmp tell_main_loop
     ; The tick's last pulses are over: DIR may change.
     movw SAVED_LOW, r30
-    lds r30, emission_taken
-    ldi r31, hi8(emission_silent)
+    point_to_taken
     ldd DATA_LOW, Z+TICK_DIRECTION
     sts _SFR_MEM_ADDR(DIR_LOW), DATA_LOW
     ldd DATA_LOW, Z+TICK_DIRECTION+1
@@ -110,30 +75,8 @@ tell_main_loop:
     push r30
     push r31
     push r25
-    lds r30, emission_taken
-    ldi r31, hi8(emission_silent)
-    cpi r30, lo8(emission_silent)
-    breq 1f
-    ; A silent tick that follows holds its directions.
-    ldd r24, Z+TICK_DIRECTION
-    sts emission_silent+TICK_DIRECTION, r24
-    ldd r24, Z+TICK_DIRECTION+1
-    sts emission_silent+TICK_DIRECTION+1, r24
-    .irp byte, 0, 1, 2, 3
-    lds r24, emission_next_start+\byte
-    sts emission_begun_at+\byte, r24
-    .endr
-    ldi r24, 1
-    sts emission_committed, r24
-1:
-    clc
-    .irp byte, 0, 1, 2, 3
-    lds r24, emission_next_start+\byte
-    ldd r25, Z+TICK_CYCLES+\byte
-    adc r24, r25
-    sts emission_next_start+\byte, r24
-    .endr
-    cbi TICK_FLAGS, TICK_CHANGES
+    point_to_taken
+    tell_tick 2
     pop r25
     pop r31
     pop r30
@@ -146,9 +89,5 @@ tell_main_loop:
 
     .global emission_set_registers
 emission_set_registers:
-    movw r30, r24
-    ld SLOT_LOW, Z
-    ldd SLOT_HIGH, Z+TICK_MASK+1
-    ldd SLOT_MARK, Z+TICK_MARK
-    clr ZERO
+    set_slot_registers
     ret
