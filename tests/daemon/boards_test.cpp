@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lab.h"
-#include "tables/table_file.h"
+#include "daemon/board_claims.h"
 
 namespace bushd::test {
 namespace {
@@ -16,74 +15,31 @@ namespace {
 using testing::HasSubstr;
 
 constexpr std::int64_t kUnitNs = 40'000;  // of a code, F_start 100 Hz
-constexpr std::int64_t kBaud = 115'200;
+constexpr int kBaud = 115'200;
 
 std::string with_board(const std::string& motor_keys = "", const std::string& bus_keys = "") {
-  return "[[bus]]\nname = \"board\"\nkind = \"commutator\"\nport = \"/dev/null\"\nbaud = 115200\n"
-         "start_hz = 100\n" +
-         bus_keys +
-         "[[group]]\nname = \"axes\"\ntable = \"bushd2-constant\"\n"
-         "[[motor]]\nname = \"m0\"\nmcu = \"board\"\noutput = 0\ngroup = \"axes\"\n" +
-         motor_keys + "[[motor]]\nname = \"m5\"\nmcu = \"board\"\noutput = 5\ngroup = \"axes\"\n";
+  return with_motors_of_board(kBaud, "start_hz = 100", bus_keys, motor_keys);
 }
 
-class BoardLab : public Lab {
+class DelayLab : public BoardLab {
  public:
-  explicit BoardLab(const std::string& toml = with_board()) : Lab(toml) {
-    connect();
-    on_send = [this](std::size_t, std::vector<std::uint8_t>& bytes) {
-      for (const std::uint8_t byte : bytes) sent.push_back(byte);
-      return true;
-    };
-  }
-  Answer move(const std::string& motor, std::int64_t steps) {
-    return wait(send(Ask::kMoveBy, {motor}, {steps}), 120);
-  }
-  bool trusted(const std::string& name) const { return motor(name).trust == api::Trust::kKnown; }
-  void moves(std::int64_t steps) {
-    ASSERT_TRUE(run_until([&] { return std::abs(shaft_steps("m0")) >= steps; }));
-  }
-
-  std::vector<std::uint8_t> sent;
+  explicit DelayLab(const std::string& toml = with_board()) : BoardLab(toml) {}
 };
 
-// 250, 249, ..., 10 of the rule; D3 of the report's digest.
-int code_of_step(const std::vector<std::uint16_t>& accel, std::size_t k, std::size_t n) {
-  return accel[std::min({k, n - 1 - k, accel.size() - 1})];
-}
-
-std::vector<std::uint16_t> codes_of(const std::string& table) {
-  const auto loaded = tables::load(*tables::find(table, tables::shipped_directories()));
-  const bushd_ramp& accel = (*loaded)->view().accel;
-  return {accel.code, accel.code + accel.count};
-}
-
 TEST(Boards, MoveIsItsHeaderAndTheCodesOfItsTable) {
-  const auto accel = codes_of("bushd2-constant");
+  const auto accel = delay_codes();
   ASSERT_EQ(accel.size(), 238u);
   for (const std::int64_t steps : {1, 2, 7, 475, 476, 477, 2000}) {
     SCOPED_TRACE(steps);
-    BoardLab lab;
-    const Answer answer = lab.move("m5", -steps);
-    EXPECT_EQ(answer.result, "reached") << answer.reason;
-    EXPECT_EQ(answer.position_steps, std::vector<std::int64_t>{-steps});
-    EXPECT_EQ(lab.shaft_steps("m5"), -steps);
-    EXPECT_EQ(lab.shaft_steps("m0"), 0);
-    std::vector<std::uint8_t> expected{0, 0x8D};
-    for (std::int64_t k = 0; k < steps; ++k) {
-      expected.push_back(static_cast<std::uint8_t>(
-          code_of_step(accel, static_cast<std::size_t>(k), static_cast<std::size_t>(steps))));
-    }
-    EXPECT_EQ(lab.sent, expected);
-    EXPECT_TRUE(lab.trusted("m5"));
-    EXPECT_TRUE(lab.errors().empty());
+    DelayLab lab;
+    expect_header_and_codes(lab, steps, accel);
   }
 }
 
 TEST(Boards, NoStepIsEarlierThanItsTable) {
-  BoardLab lab;
+  DelayLab lab;
   EXPECT_EQ(lab.move("m0", 1000).result, "reached");
-  const auto accel = codes_of("bushd2-constant");
+  const auto accel = delay_codes();
   const auto& steps = lab.board(0).steps();
   ASSERT_EQ(steps.size(), 1000u);
   // The board's answer and the next code on the line, and the microsecond of the daemon's clock.
@@ -97,28 +53,12 @@ TEST(Boards, NoStepIsEarlierThanItsTable) {
 }
 
 TEST(Boards, StopSendsTheCodesOfTheRampDown) {
-  const auto accel = codes_of("bushd2-constant");
-  BoardLab lab;
-  const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
-  lab.moves(1000);
-  lab.wait(lab.send(Ask::kStop, {"m0"}));
-  const Answer answer = lab.wait(move);
-  EXPECT_EQ(answer.result, "stopped");
-  const std::int64_t made = lab.shaft_steps("m0");
-  EXPECT_EQ(answer.position_steps, std::vector<std::int64_t>{made});
-  // From full speed: the whole side, and what was under way.
-  EXPECT_GE(made, 1238);
-  EXPECT_LE(made, 1260);
-  ASSERT_GE(lab.sent.size(), 240u);
-  const std::vector<std::uint8_t> last(lab.sent.end() - 238, lab.sent.end());
-  for (std::size_t k = 0; k < 238; ++k) EXPECT_EQ(last[k], accel[237 - k]) << k;
-  EXPECT_TRUE(lab.trusted("m0"));
-  EXPECT_EQ(lab.move("m0", -made).result, "reached");
-  EXPECT_EQ(lab.shaft_steps("m0"), 0);
+  DelayLab lab;
+  expect_stop_by_ramp(lab, delay_codes());
 }
 
 TEST(Boards, AnotherTargetInMotionIsReached) {
-  BoardLab lab;
+  DelayLab lab;
   const auto first = lab.send(Ask::kMoveTo, {"m0"}, {5000});
   lab.moves(300);
   const auto second = lab.send(Ask::kMoveTo, {"m0"}, {-100});
@@ -129,7 +69,7 @@ TEST(Boards, AnotherTargetInMotionIsReached) {
 }
 
 TEST(Boards, OneMotorAtATime) {
-  BoardLab lab;
+  DelayLab lab;
   const Answer both = lab.wait(lab.send(Ask::kMoveBy, {"m0", "m5"}, {100, 100}));
   EXPECT_EQ(both.result, "refused");
   EXPECT_THAT(both.reason, HasSubstr("moves one motor at a time; move m5 after m0"));
@@ -143,7 +83,7 @@ TEST(Boards, OneMotorAtATime) {
 }
 
 TEST(Boards, LimitRampsDownAndForbids) {
-  BoardLab lab;
+  DelayLab lab;
   lab.board(0).motor(0).right_limit_at = 1000;
   const Answer answer = lab.move("m0", 20'000);
   EXPECT_EQ(answer.result, "limit") << answer.reason;
@@ -158,7 +98,7 @@ TEST(Boards, LimitRampsDownAndForbids) {
 }
 
 TEST(Boards, LimitThatStopsImmediatelyLeavesThePositionUncertain) {
-  BoardLab lab(with_board("limit_action = \"immediate\"\n"));
+  DelayLab lab(with_board("limit_action = \"immediate\"\n"));
   lab.board(0).motor(0).left_limit_at = -1000;
   const Answer answer = lab.move("m0", -20'000);
   EXPECT_EQ(answer.result, "limit") << answer.reason;
@@ -168,7 +108,7 @@ TEST(Boards, LimitThatStopsImmediatelyLeavesThePositionUncertain) {
 }
 
 TEST(Boards, LostAnswerIsAStepThatIsUncertainAndSaid) {
-  BoardLab lab;
+  DelayLab lab;
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
   lab.moves(500);
   lab.board(0).loses_answers = true;
@@ -188,8 +128,8 @@ TEST(Boards, LostAnswerIsAStepThatIsUncertainAndSaid) {
 
 // A motor at 2500 steps/s that gets no code for 30 ms stands, and cannot go on at 2500 steps/s.
 TEST(Boards, PauseAtSpeedIsSaidAndFollowedByTheRampUp) {
-  const auto accel = codes_of("bushd2-constant");
-  BoardLab lab;
+  const auto accel = delay_codes();
+  DelayLab lab;
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {3000});
   lab.moves(1000);
   lab.pause_daemon(0.03);
@@ -216,7 +156,7 @@ TEST(Boards, PauseAtSpeedIsSaidAndFollowedByTheRampUp) {
 }
 
 TEST(Boards, CableThatIsCutLosesOneStepAtMost) {
-  BoardLab lab;
+  DelayLab lab;
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
   lab.moves(500);
   lab.board(0).cut = true;
@@ -228,7 +168,7 @@ TEST(Boards, CableThatIsCutLosesOneStepAtMost) {
 }
 
 TEST(Boards, PortThatIsLostSaysWhatWasUnderWay) {
-  BoardLab lab;
+  DelayLab lab;
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
   lab.moves(500);
   lab.unplug(0);
@@ -246,7 +186,7 @@ TEST(Boards, PortThatIsLostSaysWhatWasUnderWay) {
 
 TEST(Boards, SupplyAndConnectionAreWatched) {
   for (const bool supply : {true, false}) {
-    BoardLab lab;
+    DelayLab lab;
     const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
     lab.moves(500);
     (supply ? lab.board(0).supply : lab.board(0).motor(0).connected) = false;
@@ -261,34 +201,20 @@ TEST(Boards, SupplyAndConnectionAreWatched) {
 
 TEST(Boards, EmergencyStopsAreThoseOfEveryMotor) {
   for (const bool immediate : {false, true}) {
-    BoardLab lab(with_board("", immediate ? "emergency_stop = \"immediate\"\n" : ""));
-    const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
-    lab.moves(1000);
-    const std::int64_t at = lab.shaft_steps("m0");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
-    const Answer answer = lab.wait(move);
-    EXPECT_NE(answer.result, "reached");
-    const std::int64_t made = lab.shaft_steps("m0") - at;
-    EXPECT_GE(made, immediate ? 0 : 238);
-    EXPECT_LE(made, immediate ? 2 : 241);
-    EXPECT_EQ(answer.position_steps, std::vector<std::int64_t>{lab.shaft_steps("m0")});
-    EXPECT_EQ(lab.move("m0", 10).result, "refused");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
-    EXPECT_EQ(lab.trusted("m0"), !immediate);
-    lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {0}));
-    EXPECT_EQ(lab.move("m0", 10).result, "reached");
+    DelayLab lab(with_board("", immediate ? "emergency_stop = \"immediate\"\n" : ""));
+    expect_emergency_stop(lab, immediate);
   }
 }
 
 TEST(Boards, DriversStayOnAndThereIsNoHome) {
-  BoardLab lab;
+  DelayLab lab;
   EXPECT_NE(lab.wait(lab.send(Ask::kDisable, {"m0"})).result, "done");
   EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {"m0"})).result, "done");
   EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m0"})).result, "refused");
 }
 
 TEST(Boards, PositionsAreKeptOverRestarts) {
-  BoardLab lab;
+  DelayLab lab;
   lab.keep_positions();
   lab.connect();
   lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {0}));
@@ -302,42 +228,34 @@ TEST(Boards, PositionsAreKeptOverRestarts) {
 }
 
 TEST(Boards, JogChangesSpeedAndDirectionAndEnds) {
-  BoardLab lab;
-  const auto jog = [&](double per_s) {
-    return lab.send(
-        api::Jog{.motor = "m0", .per_s = per_s, .in_steps = true, .keepalive_ms = 5000});
-  };
-  const auto first = jog(200);
+  DelayLab lab;
+  const auto first = lab.jog(200);
   lab.run_for(1);
   const std::int64_t slow = lab.shaft_steps("m0");
   EXPECT_NEAR(static_cast<double>(slow), 200, 20);
-  jog(1000);
+  lab.jog(1000);
   lab.run_for(1.5);
   EXPECT_GT(lab.shaft_steps("m0"), slow + 700);
-  jog(-300);
+  lab.jog(-300);
   lab.run_for(3);
   const std::int64_t at = lab.shaft_steps("m0");
   lab.run_for(1);
   // 84 codes of 40 us, and 20 bits of the line.
   EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m0") - at), -1e6 / (84 * 40 + 174), 2);
-  EXPECT_EQ(lab.wait(jog(0)).result, "done");
+  EXPECT_EQ(lab.wait(lab.jog(0)).result, "done");
   EXPECT_EQ(lab.wait(first).position_steps, std::vector<std::int64_t>{lab.shaft_steps("m0")});
   EXPECT_TRUE(lab.trusted("m0"));
 }
 
 // On its way to a lower speed a run is no state of a table; it goes on all the same.
 TEST(Boards, ALowerSpeedInMotionIsApproachedAlongTheTable) {
-  BoardLab lab;
-  const auto accel = codes_of("bushd2-constant");
-  const auto jog = [&](double per_s) {
-    return lab.send(
-        api::Jog{.motor = "m0", .per_s = per_s, .in_steps = true, .keepalive_ms = 5000});
-  };
-  jog(2000);
+  DelayLab lab;
+  const auto accel = delay_codes();
+  lab.jog(2000);
   lab.run_for(1.5);
-  jog(300);
+  lab.jog(300);
   lab.run_for(2);
-  lab.wait(jog(0));
+  lab.wait(lab.jog(0));
   EXPECT_TRUE(lab.trusted("m0")) << lab.motor("m0").uncertain_reason;
   EXPECT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0"));
   const auto& steps = lab.board(0).steps();
@@ -352,7 +270,7 @@ TEST(Boards, ALowerSpeedInMotionIsApproachedAlongTheTable) {
 
 // A board that was reset while it rested waits for a header, and some codes look like one.
 TEST(Boards, EachMotionBeginsWithItsHeader) {
-  BoardLab lab;
+  DelayLab lab;
   EXPECT_EQ(lab.move("m0", 2).result, "reached");
   const std::size_t before = lab.sent.size();
   EXPECT_EQ(lab.move("m0", 2).result, "reached");
@@ -361,16 +279,9 @@ TEST(Boards, EachMotionBeginsWithItsHeader) {
   EXPECT_EQ(second, (std::vector<std::uint8_t>{0, 0x80, 250, 250}));
 }
 
-// As the configuration is refused that names such a table.
 TEST(Boards, ATableFasterThanACodeIsNotPutInService) {
-  BoardLab lab;
-  lab.write_file("swift.toml", "name = \"swift\"\ntime_unit_ns = 1000\naccel = [9000, 39]\n");
-  lab.write_file("just.toml", "name = \"just\"\ntime_unit_ns = 1000\naccel = [9000, 40]\n");
-  const Answer swift = lab.wait(lab.use("axes", "swift"));
-  EXPECT_NE(swift.result, "done");
-  EXPECT_THAT(swift.reason, HasSubstr("one delay code, 40000 ns by its start_hz"));
-  const Answer just = lab.wait(lab.use("axes", "just"));
-  EXPECT_EQ(just.result, "done") << just.reason;
+  DelayLab lab;
+  expect_least_step_us(lab, 40, "one delay code, 40000 ns by its start_hz");
 }
 
 // Each trouble leaves one step unknown at the most, and only where the motor is uncertain then.
@@ -379,7 +290,7 @@ TEST(Boards, WhateverHappensCountsAreRightOrSaidToBeUncertain) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const auto upto = [&random](unsigned n) { return static_cast<std::int64_t>(random() % n); };
-    BoardLab lab;
+    DelayLab lab;
     lab.board(0).motor(0).right_limit_at = 3000;
     for (int trouble = 0; trouble < 30; ++trouble) {
       const auto move = lab.send(Ask::kMoveBy, {"m0"}, {upto(4000) - 2000});

@@ -8,8 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lab.h"
-#include "tables/table_file.h"
+#include "daemon/board_claims.h"
 
 namespace bushd::test::converter_boards {
 namespace {
@@ -18,55 +17,21 @@ using testing::HasSubstr;
 using Character = sim::FrequencyConverter::Character;
 
 constexpr double kHzPerCode = 10;
-constexpr std::int64_t kBaud = 115'200;
+constexpr int kBaud = 115'200;
 // The board's answer and the next code on the line, and the microsecond of the daemon's clock. A
 // pulse is on a whole nanosecond.
 constexpr std::int64_t kLineNs = 20'000'000'000 / kBaud + 2'000;
 constexpr std::int64_t kNs = 2;
 
-std::string with_converter(const std::string& converter = "{ max_hz = 2500, max_code = 250 }",
-                           const std::string& bus_keys = "") {
-  return "[[bus]]\nname = \"board\"\nkind = \"commutator\"\nport = \"/dev/null\"\nbaud = 115200\n"
-         "converter = " +
-         converter + "\n" + bus_keys +
-         "[[group]]\nname = \"axes\"\ntable = \"bushd2-constant\"\n"
-         "[[motor]]\nname = \"m0\"\nmcu = \"board\"\noutput = 0\ngroup = \"axes\"\n"
-         "[[motor]]\nname = \"m5\"\nmcu = \"board\"\noutput = 5\ngroup = \"axes\"\n";
+std::string with_converter(const std::string& bus_keys = "") {
+  return with_motors_of_board(kBaud, "converter = { max_hz = 2500, max_code = 250 }", bus_keys);
 }
 
-class ConverterLab : public Lab {
+class ConverterLab : public BoardLab {
  public:
-  explicit ConverterLab(const std::string& toml = with_converter()) : Lab(toml) {
-    connect();
-    on_send = [this](std::size_t, std::vector<std::uint8_t>& bytes) {
-      for (const std::uint8_t byte : bytes) sent.push_back(byte);
-      return true;
-    };
-  }
-  Answer move(const std::string& motor, std::int64_t steps) {
-    return wait(send(Ask::kMoveBy, {motor}, {steps}), 120);
-  }
-  bool trusted(const std::string& name) const { return motor(name).trust == api::Trust::kKnown; }
-  void moves(std::int64_t steps) {
-    ASSERT_TRUE(run_until([&] { return std::abs(shaft_steps("m0")) >= steps; }));
-  }
+  explicit ConverterLab(const std::string& toml = with_converter()) : BoardLab(toml) {}
   void has(const Character& character) { board(0).set_converter(now_us() * 1000, character); }
-
-  std::vector<std::uint8_t> sent;
 };
-
-// Delays of 250, 249, ..., 10 codes of 40 us: K is 2500 / 2500 Hz x 10^8 ns / delay, rounded down.
-std::vector<std::int64_t> converter_codes() {
-  const auto loaded = tables::load(*tables::find("bushd2-constant", tables::shipped_directories()));
-  const bushd_ramp& accel = (*loaded)->view().accel;
-  std::vector<std::int64_t> codes;
-  for (std::uint32_t i = 0; i < accel.count; ++i) codes.push_back(2500 / accel.code[i]);
-  return codes;
-}
-
-std::int64_t code_of_step(const std::vector<std::int64_t>& codes, std::size_t k, std::size_t n) {
-  return codes[std::min({k, n - 1 - k, codes.size() - 1})];
-}
 
 TEST(ConverterBoards, MoveIsItsHeaderAndTheCodesOfItsSpeeds) {
   const auto codes = converter_codes();
@@ -75,19 +40,7 @@ TEST(ConverterBoards, MoveIsItsHeaderAndTheCodesOfItsSpeeds) {
   for (const std::int64_t steps : {1, 2, 7, 475, 477, 2000}) {
     SCOPED_TRACE(steps);
     ConverterLab lab;
-    const Answer answer = lab.move("m5", -steps);
-    EXPECT_EQ(answer.result, "reached") << answer.reason;
-    EXPECT_EQ(answer.position_steps, std::vector<std::int64_t>{-steps});
-    EXPECT_EQ(lab.shaft_steps("m5"), -steps);
-    EXPECT_EQ(lab.shaft_steps("m0"), 0);
-    std::vector<std::uint8_t> expected{0, 0x8D};
-    for (std::int64_t k = 0; k < steps; ++k) {
-      expected.push_back(static_cast<std::uint8_t>(
-          code_of_step(codes, static_cast<std::size_t>(k), static_cast<std::size_t>(steps))));
-    }
-    EXPECT_EQ(lab.sent, expected);
-    EXPECT_TRUE(lab.trusted("m5"));
-    EXPECT_TRUE(lab.errors().empty());
+    expect_header_and_codes(lab, steps, codes);
   }
 }
 
@@ -188,53 +141,24 @@ TEST(ConverterBoards, PulsesForWhichNothingWaitsMoveNothing) {
 }
 
 TEST(ConverterBoards, StopSendsTheCodesOfTheRampDown) {
-  const auto codes = converter_codes();
   ConverterLab lab;
-  const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
-  lab.moves(1000);
-  lab.wait(lab.send(Ask::kStop, {"m0"}));
-  const Answer answer = lab.wait(move);
-  EXPECT_EQ(answer.result, "stopped");
-  const std::int64_t made = lab.shaft_steps("m0");
-  EXPECT_EQ(answer.position_steps, std::vector<std::int64_t>{made});
-  EXPECT_GE(made, 1238);
-  EXPECT_LE(made, 1260);
-  ASSERT_GE(lab.sent.size(), 240u);
-  const std::vector<std::uint8_t> last(lab.sent.end() - 238, lab.sent.end());
-  for (std::size_t k = 0; k < 238; ++k) EXPECT_EQ(last[k], codes[237 - k]) << k;
-  EXPECT_TRUE(lab.trusted("m0"));
-  EXPECT_EQ(lab.move("m0", -made).result, "reached");
-  EXPECT_EQ(lab.shaft_steps("m0"), 0);
+  expect_stop_by_ramp(lab, converter_codes());
 }
 
 TEST(ConverterBoards, EmergencyStopsAreThoseOfEveryMotor) {
   for (const bool immediate : {false, true}) {
-    ConverterLab lab(with_converter("{ max_hz = 2500, max_code = 250 }",
-                                    immediate ? "emergency_stop = \"immediate\"\n" : ""));
-    const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
-    lab.moves(1000);
-    const std::int64_t at = lab.shaft_steps("m0");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
-    const Answer answer = lab.wait(move);
-    const std::int64_t made = lab.shaft_steps("m0") - at;
-    EXPECT_GE(made, immediate ? 0 : 238);
-    EXPECT_LE(made, immediate ? 2 : 241);
-    EXPECT_EQ(answer.position_steps, std::vector<std::int64_t>{lab.shaft_steps("m0")});
-    EXPECT_EQ(lab.trusted("m0"), !immediate);
+    ConverterLab lab(with_converter(immediate ? "emergency_stop = \"immediate\"\n" : ""));
+    expect_emergency_stop(lab, immediate);
   }
 }
 
 // 5 steps/s, below K = 1: the daemon waits for the rest.
 TEST(ConverterBoards, SlowerThanTheLowestCodeIsWaitedBeforeIt) {
   ConverterLab lab;
-  const auto jog = [&](double per_s) {
-    return lab.send(
-        api::Jog{.motor = "m0", .per_s = per_s, .in_steps = true, .keepalive_ms = 10'000});
-  };
-  jog(5);
+  lab.jog(5);
   lab.run_for(8);
   EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m0")), 40, 2);
-  lab.wait(jog(0));
+  lab.wait(lab.jog(0));
   EXPECT_EQ(lab.sent.back(), 1);
   EXPECT_TRUE(lab.trusted("m0"));
   EXPECT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0"));
@@ -242,13 +166,7 @@ TEST(ConverterBoards, SlowerThanTheLowestCodeIsWaitedBeforeIt) {
 
 TEST(ConverterBoards, ATableFasterThanTheConverterIsNotPutInService) {
   ConverterLab lab;
-  lab.write_file("swift.toml", "name = \"swift\"\ntime_unit_ns = 1000\naccel = [9000, 399]\n");
-  lab.write_file("just.toml", "name = \"just\"\ntime_unit_ns = 1000\naccel = [9000, 400]\n");
-  const Answer swift = lab.wait(lab.use("axes", "swift"));
-  EXPECT_NE(swift.result, "done");
-  EXPECT_THAT(swift.reason, HasSubstr("one period of its converter, 400000 ns by its max_hz"));
-  const Answer just = lab.wait(lab.use("axes", "just"));
-  EXPECT_EQ(just.result, "done") << just.reason;
+  expect_least_step_us(lab, 400, "one period of its converter, 400000 ns by its max_hz");
 }
 
 // Each trouble leaves one step unknown at the most, and only where the motor is uncertain then.
