@@ -7,15 +7,12 @@ watches and that change; how many values it hears is printed as well. To compare
 """
 
 import argparse
-import contextlib
 import pathlib
-import subprocess
-import sys
-import tempfile
 import time
 
 from bridge import PYTHON_PATH, bridge
-from many_motors import BIN, FAR_STEPS, GIVE_UP_S, configuration, go_first, used
+from many_motors import used
+from running_bushd import Listener, RunningBushd
 
 FIELDS = ("VAL", "RBV", "DMOV", "MOVN", "HLS", "LLS", "TDIR")
 CLIENT = """
@@ -31,78 +28,27 @@ for line in sys.stdin:
 """
 
 
-class Lab:
-    """A daemon with simulated buses, a bridge, and a client that watches."""
+class Lab(RunningBushd):
+    """With a bridge, and a client that watches."""
 
     def __init__(self, options, buses, profile=None):
-        self._stack = contextlib.ExitStack()
-        self._options = argparse.Namespace(buses=buses, mcus=options.mcus)
+        super().__init__(options.mcus, buses)
         self._python_path, self._seconds, self._profile = options.python_path, options.seconds, profile
 
-    def __enter__(self):
-        try:
-            self._begin()
-        except BaseException:
-            self._stack.close()
-            raise
-        return self
-
-    def __exit__(self, *_):
-        self._stack.close()
-
-    def _begin(self):
-        self._folder = pathlib.Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="bushd-records-")))
-        text, self.motors = configuration(self._options, self._folder)
-        config = self._folder / "bushd.toml"
-        config.write_text(text, encoding="utf-8")
-        ports = [self._folder / f"port{bus}" for bus in range(self._options.buses)]
-        for bus, port in enumerate(ports):
-            self._start(BIN / "bushsim", "--config", config, "--bus", f"b{bus}", "--link", port)
-        give_up_s = time.monotonic() + GIVE_UP_S
-        while not all(port.is_symlink() for port in ports):
-            if time.monotonic() > give_up_s:
-                sys.exit("bushsim offers no port")
-            time.sleep(0.05)
-        self._start(BIN / "bushd", "--config", config)
-        self.bushctl("status", "--wait-s", str(GIVE_UP_S))
-        log = self._folder / "bushd-epics.log"
-        self._bridge = self._stack.enter_context(bridge(self._folder / "control", log, self._python_path, self._profile))
-        command = [sys.executable, "-B", "-c", CLIENT, str(self.motors), *FIELDS]
-        self._client = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self._stack.callback(self._end, self._client)
-        if self._client.stdout.readline() != "watches\n":
-            sys.exit("the client does not hear of all motors")
-
-    def _start(self, *command):
-        with open(self._folder / "programs.log", "ab") as log:
-            process = subprocess.Popen(list(map(str, command)), stdout=log, stderr=subprocess.STDOUT)
-        self._stack.callback(self._end, process)
-        go_first(process.pid)
-
-    @staticmethod
-    def _end(process):
-        process.kill()
-        process.wait()
-
-    def bushctl(self, *arguments):
-        subprocess.run([BIN / "bushctl", *arguments, "--socket", self._folder / "control"], check=True, stdout=subprocess.DEVNULL)
-
-    def _heard(self):
-        self._client.stdin.write("\n")
-        self._client.stdin.flush()
-        return int(self._client.stdout.readline())
+    def begin(self):
+        super().begin()
+        log = self.folder / "bushd-epics.log"
+        self._bridge = self.stack.enter_context(bridge(self.folder / "control", log, self._python_path, self._profile))
+        self._client = Listener(CLIENT, "watches", self.motors, *FIELDS)
+        self.stack.callback(self._client.end)
 
     def measure(self, what):
-        heard, (before_s, _), began_s = self._heard(), used(self._bridge.pid), time.monotonic()
+        heard, (before_s, _), began_s = self._client.heard(), used(self._bridge.pid), time.monotonic()
         time.sleep(self._seconds)
         passed_s = time.monotonic() - began_s
         share = (used(self._bridge.pid)[0] - before_s) / passed_s
-        rate = (self._heard() - heard - 1) / passed_s
+        rate = (self._client.heard() - heard - 1) / passed_s
         print(f"{what}: bushd-epics {100 * share:.2f} % of a core, {rate:.0f} values a second heard", flush=True)
-
-    def move_all(self):
-        moves = [word for motor in range(self.motors) for word in (f"m{motor}", str(FAR_STEPS if motor % 2 else -FAR_STEPS))]
-        self.bushctl("move", "--steps", *moves)
 
 
 def main():

@@ -6,15 +6,11 @@ The daemon and its buses are those of many_motors.py. Pages are connections that
 """
 
 import argparse
-import contextlib
-import pathlib
 import socket
-import subprocess
-import sys
-import tempfile
 import time
 
-from many_motors import BIN, FAR_STEPS, GIVE_UP_S, TOP, configuration, go_first, used
+from many_motors import BIN, TOP, used
+from running_bushd import Listener, RunningBushd
 
 PAGES = """
 import selectors, sys
@@ -44,89 +40,32 @@ def free_port():
         return probe.getsockname()[1]
 
 
-class Lab:
-    """A daemon with simulated buses, and bushd-web."""
+class Lab(RunningBushd):
+    """With bushd-web."""
 
     def __init__(self, options, buses):
-        self._stack = contextlib.ExitStack()
-        self._options = argparse.Namespace(buses=buses, mcus=options.mcus)
+        super().__init__(options.mcus, buses)
         self._seconds = options.seconds
 
-    def __enter__(self):
-        try:
-            self._begin()
-        except BaseException:
-            self._stack.close()
-            raise
-        return self
-
-    def __exit__(self, *_):
-        self._stack.close()
-
-    def _begin(self):
-        self._folder = pathlib.Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="bushd-web-")))
-        text, self.motors = configuration(self._options, self._folder)
-        config = self._folder / "bushd.toml"
-        config.write_text(text, encoding="utf-8")
-        ports = [self._folder / f"port{bus}" for bus in range(self._options.buses)]
-        for bus, port in enumerate(ports):
-            self._start(BIN / "bushsim", "--config", config, "--bus", f"b{bus}", "--link", port)
-        self._await("bushsim offers no port", lambda: all(port.is_symlink() for port in ports))
-        self._start(BIN / "bushd", "--config", config)
-        self.bushctl("status", "--wait-s", str(GIVE_UP_S))
+    def begin(self):
+        super().begin()
         self.port = free_port()
-        self.web = self._start(BIN / "bushd-web", "--listen", f"127.0.0.1:{self.port}", "--daemon", f"bushd={self._folder / 'control'}",
-                               "--tokens", self._folder / "tokens", "--page", TOP / "build" / "web")
-        self._await("bushd-web does not listen", lambda: "the page is at" in (self._folder / "programs.log").read_text())
-
-    @staticmethod
-    def _await(what, holds):
-        give_up_s = time.monotonic() + GIVE_UP_S
-        while not holds():
-            if time.monotonic() > give_up_s:
-                sys.exit(what)
-            time.sleep(0.05)
-
-    def _start(self, *command):
-        with open(self._folder / "programs.log", "ab") as log:
-            process = subprocess.Popen(list(map(str, command)), stdout=log, stderr=subprocess.STDOUT)
-        self._stack.callback(self._end, process)
-        go_first(process.pid)
-        return process
-
-    @staticmethod
-    def _end(process):
-        process.kill()
-        process.wait()
-
-    def bushctl(self, *arguments):
-        subprocess.run([BIN / "bushctl", *arguments, "--socket", self._folder / "control"], check=True, stdout=subprocess.DEVNULL)
-
-    def move_all(self):
-        moves = [word for motor in range(self.motors) for word in (f"m{motor}", str(FAR_STEPS if motor % 2 else -FAR_STEPS))]
-        self.bushctl("move", "--steps", *moves)
+        self.web = self.start(BIN / "bushd-web", "--listen", f"127.0.0.1:{self.port}", "--daemon", f"bushd={self.folder / 'control'}",
+                              "--tokens", self.folder / "tokens", "--page", TOP / "build" / "web")
+        self.wait_for("bushd-web does not listen", lambda: "the page is at" in (self.folder / "programs.log").read_text())
 
     def measure(self, what, pages):
-        command = [sys.executable, "-B", "-c", PAGES, str(TOP / "tests" / "web"), str(self.port), str(pages)]
-        readers = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        readers = Listener(PAGES, "open", TOP / "tests" / "web", self.port, pages)
         try:
-            if readers.stdout.readline() != "open\n":
-                sys.exit("the pages are not open")
-            before, (before_s, _), began_s = self._heard(readers), used(self.web.pid), time.monotonic()
+            before, (before_s, _), began_s = readers.heard(), used(self.web.pid), time.monotonic()
             time.sleep(self._seconds)
             passed_s = time.monotonic() - began_s
             share = (used(self.web.pid)[0] - before_s) / passed_s
-            rate = (self._heard(readers) - before) / passed_s / pages
+            rate = (readers.heard() - before) / passed_s / pages
             print(f"{what}, {pages} page{'s' if pages > 1 else ''}: bushd-web {100 * share:.2f} % of a core, "
                   f"{rate / 1000:.0f} kB/s a page", flush=True)
         finally:
-            self._end(readers)
-
-    @staticmethod
-    def _heard(readers):
-        readers.stdin.write("\n")
-        readers.stdin.flush()
-        return int(readers.stdout.readline())
+            readers.end()
 
 
 def main():

@@ -42,12 +42,12 @@ def chromium(playwright):
 class PageLab(Lab):
     """With a log of moves."""
 
-    def _start(self, *command):
+    def start(self, *command):
         more = ("--move-log", self.file("moves.jsonl")) if command[0] == BIN / "bushd" else ()
-        return super()._start(*command, *more)
+        return super().start(*command, *more)
 
     def file(self, name):
-        return self._folder / name
+        return self.folder / name
 
     def address(self, view=""):
         return f"http://127.0.0.1:{self.port}/#/{view}"
