@@ -36,15 +36,16 @@ Kinds program_kinds();
 
 bushd_run_state any_run_state();
 
-template <class Message>
-auto codec(bushd_status (*decode)(const uint8_t*, size_t, Message*),
-           size_t (*encode)(const Message*, uint8_t*)) {
+// `encode` writes the message to a payload of the largest size, and returns its own.
+template <class Message, class Encode>
+auto codec(bushd_status (*decode)(const uint8_t*, size_t, Message*), Encode encode,
+           Message message = {}) {
   return [=](const Bytes& payload, Bytes* again) {
-    Message message{};
-    const bushd_status status = decode(payload.data(), payload.size(), &message);
+    Message decoded = message;
+    const bushd_status status = decode(payload.data(), payload.size(), &decoded);
     if (status == BUSHD_OK) {
       again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-      again->resize(encode(&message, again->data()));
+      again->resize(encode(&decoded, again->data()));
     }
     return status;
   };

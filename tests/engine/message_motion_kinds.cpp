@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <bit>
 
@@ -29,20 +30,16 @@ size_t bits_set(uint16_t mask) {
   return bits;
 }
 
-bushd_status ticks_again(const Bytes& payload, Bytes* again) {
-  bushd_ticks m{};
-  const bushd_status status = bushd_decode_ticks(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
-  RC_ASSERT(m.motors == bits_set(m.mask));
+size_t encode_ticks(const bushd_ticks* m, uint8_t* payload) {
+  RC_ASSERT(m->motors == bits_set(m->mask));
   std::vector<uint16_t> delays;
-  for (size_t i = 0; i < m.motors; ++i) delays.push_back(bushd_get_u16(m.delays + 2 * i));
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  const size_t head = bushd_encode_ticks_head(m.epoch, m.flags, m.first_tick, m.count, m.mask,
-                                              delays.data(), again->data());
-  again->resize(head);
-  const size_t width = m.flags & BUSHD_TICKS_FINE ? 2 : 1;
-  again->insert(again->end(), m.displacements, m.displacements + width * m.motors * m.count);
-  return status;
+  for (size_t i = 0; i < m->motors; ++i) delays.push_back(bushd_get_u16(m->delays + 2 * i));
+  const size_t head = bushd_encode_ticks_head(m->epoch, m->flags, m->first_tick, m->count, m->mask,
+                                              delays.data(), payload);
+  const size_t width = m->flags & BUSHD_TICKS_FINE ? 2 : 1;
+  const size_t size = width * m->motors * m->count;
+  std::copy_n(m->displacements, size, payload + head);
+  return head + size;
 }
 
 Bytes any_ticks() {
@@ -64,15 +61,11 @@ Bytes any_ticks() {
   return payload;
 }
 
-// With motors 0 .. 15, as reports before have told.
-bushd_status report_again(const Bytes& payload, Bytes* again) {
-  bushd_report m{};
-  m.motor_count = BUSHD_MOTORS_PER_MCU;
-  const bushd_status status = bushd_decode_report(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(bushd_encode_report(&m, again->data()));
-  return status;
+// As a report before has told.
+bushd_report of_all_motors() {
+  bushd_report report{};
+  report.motor_count = BUSHD_MOTORS_PER_MCU;
+  return report;
 }
 
 // With a section at least, so that a number of 0 is wrong. Sizes as in docs/protocol.md.
@@ -99,18 +92,13 @@ Bytes any_report() {
   return payload;
 }
 
-bushd_status poll_again(const Bytes& payload, Bytes* again) {
-  bushd_poll m{};
-  const bushd_status status = bushd_decode_poll(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
+size_t encode_poll(const bushd_poll* m, uint8_t* payload) {
   std::vector<bushd_poll_entry> entries;
-  for (size_t i = 0; i < m.count; ++i) {
-    const uint8_t* const at = m.entries + BUSHD_POLL_ENTRY * i;
+  for (size_t i = 0; i < m->count; ++i) {
+    const uint8_t* const at = m->entries + BUSHD_POLL_ENTRY * i;
     entries.push_back({at[0], bushd_get_u16(at + 1), at[3], at[4]});
   }
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(bushd_encode_poll(entries.data(), m.count, again->data()));
-  return status;
+  return bushd_encode_poll(entries.data(), m->count, payload);
 }
 
 Bytes any_poll() {
@@ -120,33 +108,36 @@ Bytes any_poll() {
   return payload;
 }
 
-bushd_status table_ticks_again(const Bytes& payload, Bytes* again) {
-  bushd_table_ticks m{};
-  const bushd_status status = bushd_decode_table_ticks(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
+size_t encode_table_ticks(const bushd_table_ticks* m, uint8_t* payload) {
   std::vector<bushd_table_ticks_entry> entries;
   uint16_t at = 0;
   uint16_t mask = 0;
-  for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(&m, &at, &entry);) {
+  for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(m, &at, &entry);) {
     mask = static_cast<uint16_t>(mask | 1 << entry.motor);
     entries.push_back(entry);
   }
-  RC_ASSERT(mask == m.mask);
-  RC_ASSERT(entries.size() == bits_set(m.mask));
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(bushd_encode_table_ticks(m.epoch, m.flags, m.first_tick, m.count, entries.data(),
-                                         static_cast<uint8_t>(entries.size()), again->data()));
-  return status;
+  RC_ASSERT(mask == m->mask);
+  RC_ASSERT(entries.size() == bits_set(m->mask));
+  return bushd_encode_table_ticks(m->epoch, m->flags, m->first_tick, m->count, entries.data(),
+                                  static_cast<uint8_t>(entries.size()), payload);
+}
+
+std::vector<uint8_t> some_motors() {
+  const auto mask = between<uint16_t>(1, 0xFFFF);
+  std::vector<uint8_t> motors;
+  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
+    if ((mask >> m & 1) != 0) motors.push_back(m);
+  }
+  return motors;
 }
 
 // As many of the motors as fit, from the lowest on.
 Bytes any_table_ticks() {
-  const auto mask = between<uint16_t>(1, 0xFFFF);
   const size_t most =
       (BUSHD_FRAME_MAX_PAYLOAD - BUSHD_TABLE_TICKS_HEADER) / BUSHD_TABLE_TICKS_MAX_ENTRY;
   std::vector<bushd_table_ticks_entry> entries;
-  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU && entries.size() < most; ++m) {
-    if ((mask >> m & 1) != 0) entries.push_back({m, any_run_state()});
+  for (const uint8_t m : some_motors()) {
+    if (entries.size() < most) entries.push_back({m, any_run_state()});
   }
   Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   payload.resize(bushd_encode_table_ticks(
@@ -156,24 +147,21 @@ Bytes any_table_ticks() {
   return payload;
 }
 
-bushd_status table_run_again(const Bytes& payload, Bytes* again) {
-  bushd_table_run m{};
-  const bushd_status status = bushd_decode_table_run(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
-  std::vector<bushd_table_run_entry> entries;
-  const uint8_t* at = m.entries;
-  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_next_table_run_entry(&at));
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(
-      bushd_encode_table_run(m.epoch, m.first_tick, entries.data(), m.count, again->data()));
-  return status;
+template <class Entry>
+std::vector<Entry> entries_of(const uint8_t* at, uint8_t count, Entry (*next)(const uint8_t**)) {
+  std::vector<Entry> entries;
+  for (uint8_t i = 0; i < count; ++i) entries.push_back(next(&at));
+  return entries;
+}
+
+size_t encode_table_run(const bushd_table_run* m, uint8_t* payload) {
+  const auto entries = entries_of(m->entries, m->count, bushd_next_table_run_entry);
+  return bushd_encode_table_run(m->epoch, m->first_tick, entries.data(), m->count, payload);
 }
 
 Bytes any_table_run() {
-  const auto mask = between<uint16_t>(1, 0xFFFF);
   Bytes payload = random_bytes(BUSHD_TABLE_RUN_HEADER);
-  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((mask >> m & 1) == 0) continue;
+  for (const uint8_t m : some_motors()) {
     const bool has_shortest_delay = between(0, 2) != 0;
     const bool is_long = has_shortest_delay && between(0, 1) != 0;
     Bytes entry(is_long ? 13 : has_shortest_delay ? 7 : 5);
@@ -188,31 +176,26 @@ Bytes any_table_run() {
   return payload;
 }
 
-bushd_status line_run_again(const Bytes& payload, Bytes* again) {
-  bushd_line_run m{};
-  const bushd_status status = bushd_decode_line_run(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
-  std::vector<bushd_line_entry> entries;
-  const uint8_t* at = m.line.entries;
-  for (uint8_t i = 0; i < m.line.count; ++i) entries.push_back(bushd_next_line_entry(&at));
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(bushd_encode_line_run(&m, entries.data(), m.line.count, again->data()));
-  return status;
+size_t encode_line_run(const bushd_line_run* m, uint8_t* payload) {
+  const auto entries = entries_of(m->line.entries, m->line.count, bushd_next_line_entry);
+  return bushd_encode_line_run(m, entries.data(), m->line.count, payload);
+}
+
+void add_line_entry(Bytes* payload, uint8_t motor, uint32_t increment) {
+  Bytes entry(BUSHD_LINE_RUN_ENTRY);
+  entry[0] = static_cast<uint8_t>(motor | between<uint8_t>(0, 1) << 7);
+  bushd_put_u32(&entry[1], increment);
+  payload->insert(payload->end(), entry.begin(), entry.end());
 }
 
 // By the elementary law the increments are all of the line.
 Bytes any_elementary_line_run() {
-  const auto mask = between<uint16_t>(1, 0xFFFF);
   Bytes payload = random_bytes(BUSHD_LINE_RUN_HEADER);
   uint32_t sum = 0;
-  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((mask >> m & 1) == 0) continue;
+  for (const uint8_t m : some_motors()) {
     const auto increment = between<uint32_t>(1, INT32_MAX / BUSHD_MOTORS_PER_MCU);
     sum += increment;
-    Bytes entry(BUSHD_LINE_RUN_ENTRY);
-    entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 1) << 7);
-    bushd_put_u32(&entry[1], increment);
-    payload.insert(payload.end(), entry.begin(), entry.end());
+    add_line_entry(&payload, m, increment);
   }
   payload[5] = static_cast<uint8_t>(0x80 | between<uint8_t>(0, 8));
   bushd_put_u32(&payload[8], sum);
@@ -223,7 +206,6 @@ Bytes any_elementary_line_run() {
 
 Bytes any_line_run() {
   if (between(0, 2) == 0) return any_elementary_line_run();
-  const auto mask = between<uint16_t>(1, 0xFFFF);
   const auto longest = between<uint32_t>(1, INT32_MAX);
   const auto from = between<uint32_t>(0, longest - 1);
   Bytes payload = random_bytes(BUSHD_LINE_RUN_HEADER);
@@ -231,59 +213,38 @@ Bytes any_line_run() {
   bushd_put_u32(&payload[8], longest);
   bushd_put_u32(&payload[12], from);
   bushd_put_u32(&payload[16], between<uint32_t>(1, longest - from));
-  for (uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if ((mask >> m & 1) == 0) continue;
-    Bytes entry(BUSHD_LINE_RUN_ENTRY);
-    entry[0] = static_cast<uint8_t>(m | between<uint8_t>(0, 1) << 7);
-    bushd_put_u32(&entry[1], between<uint32_t>(1, longest));
-    payload.insert(payload.end(), entry.begin(), entry.end());
+  for (const uint8_t m : some_motors()) {
+    add_line_entry(&payload, m, between<uint32_t>(1, longest));
   }
   return payload;
 }
 
-bushd_status line_trigger_again(const Bytes& payload, Bytes* again) {
-  bushd_line_trigger m{};
-  const bushd_status status = bushd_decode_line_trigger(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
-  std::vector<bushd_line_entry> entries;
-  const uint8_t* at = m.line.entries;
-  for (uint8_t i = 0; i < m.line.count; ++i) entries.push_back(bushd_next_line_entry(&at));
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(bushd_encode_line_trigger(&m, entries.data(), m.line.count, again->data()));
-  return status;
+size_t encode_line_trigger(const bushd_line_trigger* m, uint8_t* payload) {
+  const auto entries = entries_of(m->line.entries, m->line.count, bushd_next_line_entry);
+  return bushd_encode_line_trigger(m, entries.data(), m->line.count, payload);
+}
+
+// A number, an edge and a delay, and of this run what is behind its first bytes.
+Bytes triggered(const Bytes& run, std::ptrdiff_t first) {
+  Bytes payload(6);
+  payload[0] = between<uint8_t>(1, 255);
+  payload[1] = between<uint8_t>(1, 2);
+  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'650'000));
+  payload.insert(payload.end(), run.begin() + first, run.end());
+  return payload;
 }
 
 Bytes any_line_trigger() {
-  const Bytes run = any_line_run();
-  Bytes payload(6);
-  payload[0] = between<uint8_t>(1, 255);
-  payload[1] = between<uint8_t>(1, 2);
-  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'650'000));
-  payload.insert(payload.end(), run.begin() + 5, run.end());
-  return payload;
+  return triggered(any_line_run(), 5);
 }
 
-bushd_status trigger_again(const Bytes& payload, Bytes* again) {
-  bushd_trigger m{};
-  const bushd_status status = bushd_decode_trigger(payload.data(), payload.size(), &m);
-  if (status != BUSHD_OK) return status;
-  std::vector<bushd_table_run_entry> entries;
-  const uint8_t* at = m.entries;
-  for (uint8_t i = 0; i < m.count; ++i) entries.push_back(bushd_next_table_run_entry(&at));
-  again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-  again->resize(
-      bushd_encode_trigger(m.number, m.edge, m.delay_us, entries.data(), m.count, again->data()));
-  return status;
+size_t encode_trigger(const bushd_trigger* m, uint8_t* payload) {
+  const auto entries = entries_of(m->entries, m->count, bushd_next_table_run_entry);
+  return bushd_encode_trigger(m->number, m->edge, m->delay_us, entries.data(), m->count, payload);
 }
 
 Bytes any_trigger() {
-  const Bytes run = any_table_run();
-  Bytes payload(6);
-  payload[0] = between<uint8_t>(1, 255);
-  payload[1] = between<uint8_t>(1, 2);
-  bushd_put_u32(&payload[2], between<uint32_t>(50, 1'650'000));
-  payload.insert(payload.end(), run.begin() + BUSHD_TABLE_RUN_HEADER, run.end());
-  return payload;
+  return triggered(any_table_run(), BUSHD_TABLE_RUN_HEADER);
 }
 
 Bytes any_travel() {
@@ -352,7 +313,7 @@ Kinds motion_kinds() {
          {"too long a wait", set32(14, 1'650'001)}}}},
       {"local",
        {[] { return random_bytes(6); }, codec(bushd_decode_local, bushd_encode_local), {}}},
-      {"poll", {any_poll, poll_again, {}}},
+      {"poll", {any_poll, codec(bushd_decode_poll, encode_poll), {}}},
       {"sync",
        {bytes_with(19,
                    [](Bytes* p) {
@@ -363,12 +324,12 @@ Kinds motion_kinds() {
         {{"follows 2", set8(6, 2)}, {"mark beyond any tick", set32(15, BUSHD_MAX_TICK_NS)}}}},
       {"ticks",
        {any_ticks,
-        ticks_again,
+        codec(bushd_decode_ticks, encode_ticks),
         {{"unknown flag", [](Bytes* p) { (*p)[1] |= 8; }},
          {"start and replacement at once", [](Bytes* p) { (*p)[1] |= 6; }}}}},
       {"table_ticks",
        {any_table_ticks,
-        table_ticks_again,
+        codec(bushd_decode_table_ticks, encode_table_ticks),
         {{"fine", [](Bytes* p) { (*p)[1] |= 1; }},
          {"unknown flag", [](Bytes* p) { (*p)[1] |= 16; }},
          {"start and replacement at once", [](Bytes* p) { (*p)[1] |= 6; }},
@@ -377,7 +338,7 @@ Kinds motion_kinds() {
         true}},
       {"table_run",
        {any_table_run,
-        table_run_again,
+        codec(bushd_decode_table_run, encode_table_run),
         {{"no step", entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0})},
          {"no step, with a shortest delay",
           entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 0, 0, 0, 0x80, 9, 0})},
@@ -393,7 +354,7 @@ Kinds motion_kinds() {
         true}},
       {"line_run",
        {any_line_run,
-        line_run_again,
+        codec(bushd_decode_line_run, encode_line_run),
         {{"no such bank", set8(5, 9)},
          {"no such bank of the elementary law", set8(5, 0x89)},
          {"an elementary line with another motor elsewhere",
@@ -440,7 +401,7 @@ Kinds motion_kinds() {
         true}},
       {"line_trigger",
        {any_line_trigger,
-        line_trigger_again,
+        codec(bushd_decode_line_trigger, encode_line_trigger),
         {{"no number", set8(0, 0)},
          {"no edge", set8(1, 0)},
          {"no such edge", set8(1, 3)},
@@ -454,7 +415,7 @@ Kinds motion_kinds() {
         true}},
       {"trigger",
        {any_trigger,
-        trigger_again,
+        codec(bushd_decode_trigger, encode_trigger),
         {{"no number", set8(0, 0)},
          {"no such edge", set8(1, 3)},
          {"entries to disarm", set8(1, 0)},
@@ -483,7 +444,7 @@ Kinds motion_kinds() {
         {{"no such way", set8(0, 3)}}}},
       {"report",
        {any_report,
-        report_again,
+        codec(bushd_decode_report, bushd_encode_report, of_all_motors()),
         {{"state 4", set8(0, 4)},
          {"a section that is none", set8(7, 0x40)},
          {"no number, but sections", set8(6, 0)}}}},
