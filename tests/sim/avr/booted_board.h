@@ -9,6 +9,11 @@
 
 namespace bushd::sim {
 
+constexpr std::uint32_t kFastBaud = 500'000;
+constexpr TimeNs kMs = 1'000'000;
+constexpr TimeNs kWatchdogNs = 130 * kMs;  // 120 ms, and the boot
+constexpr std::uint8_t kDone = 0x10;       // an answer: the step is made
+
 class BootedBoard {
  public:
   template <class... Arguments>

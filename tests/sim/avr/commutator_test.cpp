@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "heritage/commutator/exchange.h"
-#include "sim/avr/avr_board.h"
 #include "sim/avr/booted_board.h"
+#include "sim/avr/twin_boards.h"
 #include "sim/board_line.h"
 #include "sim/random.h"
 #include "sim/random_streams.h"
@@ -21,11 +21,6 @@ namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
-
-constexpr std::uint32_t kFastBaud = 500'000;
-constexpr TimeNs kMs = 1'000'000;
-constexpr TimeNs kWatchdogNs = 130 * kMs;  // 120 ms, and the boot
-constexpr std::uint8_t kDone = 0x10;
 
 std::string image_of(std::uint32_t baud) {
   return COMMUTATOR_IMAGES "-" + std::to_string(baud) + ".elf";
@@ -179,70 +174,46 @@ TEST_F(CommutatorRandomStreams, AreTakenAsTheModelTakesThem) {
   const std::uint64_t streams = from_environment("BUSHD_STREAMS", 400);
   std::printf("%s\n", again(streams).c_str());
   SCOPED_TRACE(again(streams));
-  TimeNs latest_ns = 0;
-  TimeNs earliest_ns = kLateNs;
-  std::size_t steps = 0;
+  Lateness lateness;
   for (std::uint64_t done = 0; done < streams && !HasFailure();) {
     const std::uint32_t baud = random_.pick(kBauds);
     const auto start_hz = static_cast<std::uint32_t>(random_.between(1, 100));
     const TimeNs code_ns = 4'000'000 / start_hz;
     SCOPED_TRACE("F_start " + std::to_string(start_hz) + " Hz, " + std::to_string(baud) + " baud");
-    AvrBoard board(image_of(baud), baud, start_hz);
-    BoardLine model(baud, start_hz);
-    board.advance(AvrBoard::kBootNs);
-    model.advance(AvrBoard::kBootNs);
-    TimeNs now_ns = AvrBoard::kBootNs;
-    std::vector<std::uint8_t> answers;
-    std::vector<std::uint8_t> foretold;
+    TwinBoards twins(image_of(baud), baud, start_hz);
     const auto go_on = [&](TimeNs until_ns) {
       // The same byte or change before a step here, and after it there, would be no difference that
       // anybody could call one.
-      const TimeNs due_ns = model.board.next_event_ns();
+      const TimeNs due_ns = twins.model.board.next_event_ns();
       if (until_ns + 1'000 >= due_ns && until_ns <= due_ns + kLateNs) until_ns += 2 * kLateNs;
-      now_ns = until_ns;
-      for (const std::uint8_t byte : board.advance(now_ns)) answers.push_back(byte);
-      for (const std::uint8_t byte : model.advance(now_ns)) foretold.push_back(byte);
+      twins.now_ns = until_ns;
+      twins.advance();
     };
     const TimeNs byte_ns = 10'000'000'000 / baud;
     for (int left = 40; left > 0; --left, ++done) {
       for (const std::uint8_t byte : some_bytes()) {
         // One at a time: when it ends is what must not be close to a step.
-        const TimeNs due_ns = model.board.next_event_ns();
-        const TimeNs end_ns = now_ns + byte_ns;
-        if (end_ns + 1'000 >= due_ns && end_ns <= due_ns + kLateNs) go_on(now_ns + 2 * kLateNs);
-        board.send(now_ns, {&byte, 1});
-        model.send(now_ns, {&byte, 1});
-        now_ns += byte_ns;
-        for (const std::uint8_t got : board.advance(now_ns)) answers.push_back(got);
-        for (const std::uint8_t got : model.advance(now_ns)) foretold.push_back(got);
+        const TimeNs due_ns = twins.model.board.next_event_ns();
+        const TimeNs end_ns = twins.now_ns + byte_ns;
+        if (end_ns + 1'000 >= due_ns && end_ns <= due_ns + kLateNs) {
+          go_on(twins.now_ns + 2 * kLateNs);
+        }
+        twins.send({&byte, 1}, byte_ns);
       }
       if (random_.one_in(6)) {
-        go_on(now_ns);
-        change_surroundings(board.motors(), model.motors());
+        go_on(twins.now_ns);
+        change_surroundings(twins.board.motors(), twins.model.motors());
       }
-      go_on(now_ns + random_.between(0, 20 * code_ns));
+      go_on(twins.now_ns + random_.between(0, 20 * code_ns));
     }
-    go_on(now_ns + 300 * code_ns + 4 * byte_ns);
-    EXPECT_EQ(answers, foretold);
-    const auto& made = board.motors().steps();
-    const auto& expected = model.motors().steps();
-    ASSERT_EQ(made.size(), expected.size());
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      ASSERT_EQ(made[i].motor, expected[i].motor) << i;
-      ASSERT_EQ(made[i].left, expected[i].left) << i;
-      const TimeNs late_ns = made[i].time_ns - expected[i].time_ns;
+    go_on(twins.now_ns + 300 * code_ns + 4 * byte_ns);
+    twins.expect_same([&](std::size_t i, TimeNs late_ns) {
       ASSERT_GE(late_ns, 0) << i;
       ASSERT_LE(late_ns, kLateNs) << i;
-      latest_ns = std::max(latest_ns, late_ns);
-      earliest_ns = std::min(earliest_ns, late_ns);
-    }
-    for (unsigned motor = 0; motor < BoardMotors::kMotors; ++motor) {
-      EXPECT_EQ(board.motors().position(motor), model.motors().position(motor)) << motor;
-    }
-    steps += made.size();
+      lateness.note(late_ns);
+    });
   }
-  std::printf("%zu steps, %lld to %lld ns late\n", steps, static_cast<long long>(earliest_ns),
-              static_cast<long long>(latest_ns));
+  lateness.print();
 }
 
 // The daemon's own exchange drives it: each step that is asked for is made once, and counted.

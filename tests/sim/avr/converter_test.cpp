@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "sim/avr/avr_board.h"
 #include "sim/avr/booted_board.h"
+#include "sim/avr/twin_boards.h"
 #include "sim/board_line.h"
 #include "sim/random.h"
 #include "sim/random_streams.h"
@@ -22,10 +22,6 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using Character = FrequencyConverter::Character;
 
-constexpr std::uint32_t kFastBaud = 500'000;
-constexpr TimeNs kMs = 1'000'000;
-constexpr TimeNs kWatchdogNs = 130 * kMs;  // 120 ms, and the boot
-constexpr std::uint8_t kDone = 0x10;
 constexpr std::uint8_t kNoPulse = 0x20;
 constexpr Character kPlain{.hz_per_code = 10};
 
@@ -172,27 +168,15 @@ TEST(ConverterRandomStreams, AreTakenAsTheModelTakesThem) {
   std::printf("%s\n", again.c_str());
   SCOPED_TRACE(again);
   Random random(seed, 0);
-  TimeNs latest_ns = 0;
-  TimeNs earliest_ns = 0;
-  std::size_t steps = 0;
+  Lateness lateness;
   for (std::uint64_t done = 0; done < streams && !testing::Test::HasFailure();) {
     const std::uint32_t baud = random.pick(kBauds);
     // No offset: what goes on while the image is late to set K is a period that is shorter there.
     const Character character{.hz_per_code = static_cast<double>(random.between(2, 40)),
                               .drift_per_s = static_cast<double>(random.between(-20, 20)) / 1000};
-    AvrBoard board(image_of(baud), baud, FrequencyConverter(character));
-    BoardLine model(baud, FrequencyConverter(character));
-    board.advance(AvrBoard::kBootNs);
-    model.advance(AvrBoard::kBootNs);
-    TimeNs now_ns = AvrBoard::kBootNs;
-    std::vector<std::uint8_t> answers;
-    std::vector<std::uint8_t> foretold;
+    TwinBoards twins(image_of(baud), baud, FrequencyConverter(character));
     std::vector<double> ratios;  // of the steps: the code of the pulse before, to theirs
     double before = 0;
-    const auto advance = [&] {
-      for (const std::uint8_t byte : board.advance(now_ns)) answers.push_back(byte);
-      for (const std::uint8_t byte : model.advance(now_ns)) foretold.push_back(byte);
-    };
     const TimeNs byte_ns = 10'000'000'000 / baud;
     for (int left = 20; left > 0; --left, ++done) {
       // What comes while a pulse is awaited is another test's.
@@ -202,40 +186,29 @@ TEST(ConverterRandomStreams, AreTakenAsTheModelTakesThem) {
       std::vector<std::uint8_t> bytes;
       if (begins) bytes = {0, header};
       bytes.push_back(code);
-      if (random.one_in(4)) board.motors().supply = model.motors().supply = !random.one_in(2);
-      board.send(now_ns, bytes);
-      model.send(now_ns, bytes);
-      now_ns += static_cast<TimeNs>(bytes.size()) * byte_ns;
-      advance();
-      const TimeNs due_ns = model.board.next_event_ns();
+      if (random.one_in(4)) {
+        twins.board.motors().supply = twins.model.motors().supply = !random.one_in(2);
+      }
+      twins.send(bytes, byte_ns);
+      const TimeNs due_ns = twins.model.board.next_event_ns();
       if (due_ns == CommutatorBoard::kNever) continue;
       // The watch of the image has a coarse clock.
-      now_ns = due_ns + (due_ns - now_ns > 990 * kMs ? 40 * kMs : 0) + kLateNs + 2 * byte_ns +
-               random.between(0, 5) * kMs;
-      advance();
-      ratios.resize(model.board.steps().size(), before / code);
+      twins.now_ns = due_ns + (due_ns - twins.now_ns > 990 * kMs ? 40 * kMs : 0) + kLateNs +
+                     2 * byte_ns + random.between(0, 5) * kMs;
+      twins.advance();
+      ratios.resize(twins.model.board.steps().size(), before / code);
       before = code;
     }
-    EXPECT_EQ(answers, foretold);
-    const auto& made = board.motors().steps();
-    const auto& expected = model.motors().steps();
-    ASSERT_EQ(made.size(), expected.size());
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      ASSERT_EQ(made[i].motor, expected[i].motor) << i;
-      ASSERT_EQ(made[i].left, expected[i].left) << i;
-      const TimeNs late_ns = made[i].time_ns - expected[i].time_ns;
+    twins.expect_same([&](std::size_t i, TimeNs late_ns) {
       ASSERT_LE(late_ns, kLateNs) << i;
       // What the converter has gained before K = 0, at the speed of the pulse before, is a part of
       // a period of this one. Its drift between both is less than a tenth.
       ASSERT_GE(late_ns, -static_cast<TimeNs>(1.1 * ratios[i] * kToRestNs)) << i;
-      latest_ns = std::max(latest_ns, late_ns);
-      earliest_ns = std::min(earliest_ns, late_ns);
-    }
-    EXPECT_EQ(board.converter().code(), model.board.converter().code());
-    steps += made.size();
+      lateness.note(late_ns);
+    });
+    EXPECT_EQ(twins.board.converter().code(), twins.model.board.converter().code());
   }
-  std::printf("%zu steps, %lld to %lld ns late\n", steps, static_cast<long long>(earliest_ns),
-              static_cast<long long>(latest_ns));
+  lateness.print();
 }
 
 }  // namespace
