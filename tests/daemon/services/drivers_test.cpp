@@ -8,7 +8,6 @@
 namespace bushd::daemon {
 namespace {
 
-using test::Bench;
 using test::LiveBench;
 using testing::HasSubstr;
 
@@ -131,22 +130,12 @@ TEST(Drivers, OfAllAreRefusedWhereNoMcuIsOnline) {
 }
 
 TEST(Drivers, OfAnMcuThatIsOfflineAreRefused) {
-  Bench bench;
-  Interlocks interlocks(bench.installation);
-  OpenMoves open_moves(bench.installation);
-  Journal journal(bench.installation, bench);
-  Positions positions(bench.installation, interlocks, journal, bench);
-  KeptPositions kept(bench.installation, positions, journal, bench);
-  DryRuns dry_runs(bench.installation);
-  Moves moves(bench.installation, interlocks, journal, open_moves, dry_runs, bench);
-  IdleDrivers idle_drivers(bench.installation, bench, [](MotorId) { return false; });
-  HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, idle_drivers, bench);
-  EmergencyStop emergency_stop(bench.installation, interlocks, homing, open_moves, kept, bench);
-  Drivers drivers(bench.installation, interlocks, emergency_stop);
-  drivers.request(0, bench.asker(), api::Enable{{"m03"}});
-  EXPECT_THAT(bench.refusal(), HasSubstr("MCU hall:2 is offline"));
-  drivers.request(0, bench.asker(), api::ClearFaults{{"m09"}});
-  EXPECT_THAT(bench.refusal(), HasSubstr("there is no motor"));
+  LiveBench bench;  // not connected
+  Drivers drivers(bench.installation, bench.interlocks, bench.emergency_stop);
+  drivers.request(0, bench.asker(1), api::Enable{{"m03"}});
+  EXPECT_THAT(bench.refusal(1), HasSubstr("MCU hall:2 is offline"));
+  drivers.request(0, bench.asker(2), api::ClearFaults{{"m09"}});
+  EXPECT_THAT(bench.refusal(2), HasSubstr("there is no motor"));
 }
 
 }  // namespace

@@ -9,22 +9,12 @@
 namespace bushd::daemon {
 namespace {
 
-using test::Bench;
 using test::LiveBench;
 using testing::HasSubstr;
 
 TEST(EmergencyStop, AFloodIsCarriedOutAndItsMemoryIsBounded) {
-  Bench bench;
-  Interlocks interlocks(bench.installation);
-  OpenMoves open_moves(bench.installation);
-  Journal journal(bench.installation, bench);
-  Positions positions(bench.installation, interlocks, journal, bench);
-  KeptPositions kept(bench.installation, positions, journal, bench);
-  DryRuns dry_runs(bench.installation);
-  Moves moves(bench.installation, interlocks, journal, open_moves, dry_runs, bench);
-  IdleDrivers idle_drivers(bench.installation, bench, [](MotorId) { return false; });
-  HomingQueue homing(bench.installation, interlocks, open_moves, moves, kept, idle_drivers, bench);
-  EmergencyStop emergency_stop(bench.installation, interlocks, homing, open_moves, kept, bench);
+  LiveBench bench;  // not connected
+  EmergencyStop& emergency_stop = bench.emergency_stop;
   constexpr std::size_t kMore = 10;
   for (std::size_t i = 0; i < EmergencyStop::kMaxOpen + kMore; ++i) {
     emergency_stop.request(0, bench.asker(static_cast<std::int64_t>(i)), {});
