@@ -68,7 +68,7 @@ inline std::vector<std::int64_t> converter_codes() {
   return codes;
 }
 
-// Of a move of n steps from rest to rest; D3 of the report's digest.
+// Step k of a move of n steps from rest to rest; D3 of the report's digest.
 inline std::int64_t code_of_step(const std::vector<std::int64_t>& codes, std::size_t k,
                                  std::size_t n) {
   return codes[std::min({k, n - 1 - k, codes.size() - 1})];
