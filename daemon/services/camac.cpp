@@ -129,6 +129,8 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
              TablesInService& tables, Lines& lines, Travels& travels, const Programs& programs,
              KeptPositions& kept, Outputs& outputs, const AskCore& ask)
     : installation_(installation), kept_(kept), outputs_(outputs) {
+  const CamacParts parts{installation, interlocks, open_moves.precedence(), turn_, tables, programs,
+                         outputs,      ask};
   for (const config::Crate& configured : installation.config().crates) {
     Crate crate{.number = configured.number};
     for (const config::CamacModule& module : configured.modules) {
@@ -137,13 +139,10 @@ Camac::Camac(Installation& installation, const Interlocks& interlocks, const Ope
           "camac/" + std::to_string(configured.number) + "/" + std::to_string(module.station);
       std::unique_ptr<Station> station;
       if (module.type == config::CamacModule::Type::kBushd1) {
-        station = std::make_unique<Bushd1Station>(kept_as, adjusts(module), name, module,
-                                                  installation, interlocks, open_moves.precedence(),
-                                                  turn_, tables, travels, programs, outputs, ask);
+        station =
+            std::make_unique<Bushd1Station>(kept_as, adjusts(module), name, module, travels, parts);
       } else {
-        station = std::make_unique<Bushd2Station>(kept_as, name, module, installation, interlocks,
-                                                  open_moves.precedence(), turn_, tables, lines,
-                                                  programs, outputs, ask);
+        station = std::make_unique<Bushd2Station>(kept_as, name, module, lines, parts);
       }
       crate.crate.insert(module.station, station->module());
       crate.stations.push_back(std::move(station));

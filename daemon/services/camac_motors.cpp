@@ -37,15 +37,6 @@ MotorStatus limits_of(const Installation& installation, MotorId motor) {
           .left_limit = (mcu.report().forbidden_negative & output) != 0};
 }
 
-void CamacMotors::warn(MotorId motor, const std::string& why) {
-  outputs_.log(LogLevel::kWarning, motor, name_ + ": " + why);
-}
-
-void CamacMotors::note(std::int64_t of_fastest_ns) {
-  note_ = as_written_note(installation_, motion_->motor, of_fastest_ns);
-  warn(motion_->motor, note_);
-}
-
 std::int64_t CamacMotors::fastest_ns(const Program& program) const {
   const auto used = static_cast<std::ptrdiff_t>(camac::codes_used(program));
   const auto code = *std::min_element(program.codes.begin(), program.codes.begin() + used);
@@ -98,7 +89,7 @@ bool CamacMotors::move(const Program& program) {
                    .table = std::move(by),
                    .alone = alone,
                    .after_stops = turn_.after_stops};
-  if (as_written) note(fastest_ns(program));
+  if (as_written) note(motion_->motor, fastest_ns(program));
   return true;
 }
 
@@ -129,14 +120,9 @@ void CamacMotors::begin(std::int64_t now_us, Bushd2& module) {
     if (installation_.rests(installation_.mcu_of(motion_->motor))) move(now_us, module, {});
     return;
   }
-  const GroupId group = installation_.config()[motion_->motor].group;
   if (streams()) return move(now_us, module, motion_->table);
   motion_->stage = Motion::Stage::kGetsTable;
-  const api::Asker by = asker();
-  if (installation_.tables()[group]->content_hash() == motion_->table->content_hash()) {
-    return by.answer(api::Completed{.outcome = api::Outcome::kDone, .reason = "", .detail = {}});
-  }
-  tables_.use(now_us, by, group, motion_->table);
+  use_table(now_us, motion_->motor, motion_->table, motion_->after_stops);
 }
 
 // The MCU has another table and cannot take this one, because it moves other motors. It ramps the
@@ -185,7 +171,7 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   }
   const std::vector<api::MotorAmount> motors{
       {motor.name(), motion_->program.left ? -steps : steps}};
-  const api::Asker who = asker();
+  const api::Asker who = asker(motion_->after_stops);
   if (!by) return ask_(now_us, who, api::Move{.motors = motors});
   lines_.lend(who, by);
   ask_(now_us, who, api::MoveLine{.motors = motors});
@@ -239,8 +225,7 @@ void CamacMotors::follow_move(std::int64_t now_us, Bushd2& module) {
   const bool heard = !program_.is_found() || installation_[motion_->motor].is<motion::InProgram>();
   if (motion_->to_stop && !motion_->stopping && (!motion_->alone || heard)) {
     motion_->stopping = true;
-    ask_(now_us, {.session = stops_, .number = stops_->next_number()},
-         api::Stop{{installation_[motion_->motor].name()}});
+    ask_to_stop(now_us, motion_->motor);
   }
   tell_steps(module);
   const std::optional<api::Reply> reply =

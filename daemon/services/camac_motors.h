@@ -5,18 +5,13 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "daemon/model/interlocks.h"
-#include "daemon/model/outputs.h"
-#include "daemon/model/precedence.h"
-#include "daemon/services/camac_asker.h"
-#include "daemon/services/camac_program.h"
+#include "daemon/services/camac_client.h"
 #include "daemon/services/lines.h"
-#include "daemon/services/tables_in_service.h"
 #include "heritage/camac/bushd2.h"
 
 namespace bushd::daemon {
@@ -28,25 +23,11 @@ Result<tables::TablePtr> table_of_program(const camac::Program& program, int f_s
 // What the limit switches of a motor say: right is in positive direction.
 camac::MotorStatus limits_of(const Installation& installation, MotorId motor);
 
-class CamacMotors final : public camac::Motors {
+class CamacMotors final : public camac::Motors, public CamacClient {
  public:
-  // `name` is that of the module: "camac-1-5".
-  CamacMotors(std::string name, const config::CamacModule& module, Installation& installation,
-              const Interlocks& interlocks, const Precedence& precedence, const CamacTurn& turn,
-              TablesInService& tables, Lines& lines, const Programs& programs, Outputs& outputs,
-              AskCore ask)
-      : name_(std::move(name)),
-        config_(module),
-        installation_(installation),
-        interlocks_(interlocks),
-        precedence_(precedence),
-        turn_(turn),
-        tables_(tables),
-        lines_(lines),
-        outputs_(outputs),
-        ask_(std::move(ask)),
-        session_(std::make_shared<CamacSession>(name_)),
-        program_(name_, programs, session_, ask_) {}
+  CamacMotors(std::string name, const config::CamacModule& module, Lines& lines,
+              const CamacParts& parts)
+      : CamacClient(std::move(name), parts), config_(module), lines_(lines) {}
 
   camac::MotorStatus status(int motor) override;
   bool move(const camac::Program& program) override;
@@ -55,9 +36,6 @@ class CamacMotors final : public camac::Motors {
   // A motion that has been begun before a stop of its motor, and is not yet asked of it, does not
   // begin.
   void end_overtaken();
-
-  // What people are told of the motion that was permitted last; empty: nothing.
-  std::string take_note() { return std::exchange(note_, {}); }
 
   // Does what is due, and tells the module what has become of its motion.
   void step(std::int64_t now_us, camac::Bushd2& module);
@@ -82,12 +60,6 @@ class CamacMotors final : public camac::Motors {
     std::uint64_t after_stops = 0;  // as Asker::after_stops
   };
 
-  // Precondition: there is a motion.
-  api::Asker asker() {
-    return {.session = session_,
-            .number = session_->next_number(),
-            .after_stops = motion_->after_stops};
-  }
   void begin(std::int64_t now_us, camac::Bushd2& module);
   bool streams() const;
   void follow_table(std::int64_t now_us, camac::Bushd2& module);
@@ -96,24 +68,10 @@ class CamacMotors final : public camac::Motors {
   std::int64_t moved(const Motion& motion) const;
   void tell_steps(camac::Bushd2& module);
   void end(camac::Bushd2& module, const api::Reply& reply);
-  void warn(MotorId motor, const std::string& why);
-  void note(std::int64_t of_fastest_ns);
   std::int64_t fastest_ns(const camac::Program& program) const;
 
-  const std::string name_;
   const config::CamacModule& config_;
-  Installation& installation_;
-  const Interlocks& interlocks_;
-  const Precedence& precedence_;
-  const CamacTurn& turn_;
-  TablesInService& tables_;
   Lines& lines_;
-  Outputs& outputs_;
-  AskCore ask_;
-  std::shared_ptr<CamacSession> session_;
-  CamacProgram program_;
-  std::string note_;
-  std::shared_ptr<CamacSession> stops_ = std::make_shared<CamacSession>(name_);
   std::optional<Motion> motion_;
 };
 

@@ -51,12 +51,8 @@ Result<tables::TablePtr> table_of_travel(const camac::Travel& travel, const std:
   return tables::make(std::move(content));
 }
 
-void CamacShutter::warn(const std::string& what) {
-  outputs_.log(LogLevel::kWarning, motor_, name_ + ": " + what);
-}
-
 bool CamacShutter::refuse(const std::string& why) {
-  warn(installation_[motor_].name() + ": " + why);
+  warn(motor_, installation_[motor_].name() + ": " + why);
   return false;
 }
 
@@ -120,8 +116,7 @@ bool CamacShutter::travel(const camac::Travel& travel) {
       may_begin(travel.left ? -steps : steps));
   if (!taken || !as_written) return taken;
   const std::int64_t fastest_ns = std::ranges::min(travel.codes) * std::int64_t{kTravelUnitNs};
-  note_ = as_written_note(installation_, motor_, fastest_ns);
-  warn(note_);
+  note(motor_, fastest_ns);
   return true;
 }
 
@@ -156,7 +151,7 @@ void CamacShutter::begin(std::int64_t now_us) {
   if (motion_->kind != Motion::Kind::kTravel) {
     motion_->stage = Motion::Stage::kGoes;
     if (motion_->kind == Motion::Kind::kSensedStep) return ask_mcu(now_us);
-    return ask_(now_us, asker(),
+    return ask_(now_us, asker(motion_->after_stops),
                 api::Move{.kind = api::Move::Kind::kRelative,
                           .motors = {{installation_[motor_].name(), motion_->left() ? -1 : 1}}});
   }
@@ -167,12 +162,7 @@ void CamacShutter::begin(std::int64_t now_us) {
     return ask_mcu(now_us);
   }
   motion_->stage = Motion::Stage::kGetsTable;
-  const GroupId group = installation_.config()[motor_].group;
-  const api::Asker by = asker();
-  if (installation_.tables()[group]->content_hash() == motion_->table->content_hash()) {
-    return by.answer(api::Completed{.outcome = api::Outcome::kDone, .reason = "", .detail = {}});
-  }
-  tables_.use(now_us, by, group, motion_->table);
+  use_table(now_us, motor_, motion_->table, motion_->after_stops);
 }
 
 void CamacShutter::follow_table(std::int64_t now_us, camac::Bushd1& module) {
@@ -211,7 +201,7 @@ void CamacShutter::ask_mcu(std::int64_t now_us) {
         travel.synchronous ? static_cast<std::uint32_t>(travel.first_run_delay_us()) : 0;
     message.wait_us = static_cast<std::uint32_t>(travel.return_delay_us());
   }
-  travels_.request(asker(), motor_, message);
+  travels_.request(asker(motion_->after_stops), motor_, message);
 }
 
 void CamacShutter::follow_going(std::int64_t now_us, camac::Bushd1& module) {
@@ -219,8 +209,7 @@ void CamacShutter::follow_going(std::int64_t now_us, camac::Bushd1& module) {
       !motion_->alone || !program_.is_found() || installation_[motor_].is<motion::InProgram>();
   if (motion_->to_stop && !motion_->stopping && heard && motion_->kind != Motion::Kind::kStep) {
     motion_->stopping = true;
-    ask_(now_us, {.session = stops_, .number = stops_->next_number()},
-         api::Stop{{installation_[motor_].name()}});
+    ask_to_stop(now_us, motor_);
   }
   const std::optional<api::Reply> reply =
       motion_->alone ? program_.follow(now_us) : session_->last_answer();
@@ -320,7 +309,7 @@ void CamacShutter::end(camac::Bushd1& module, const api::Reply& reply) {
   motion_.reset();
   const bool done = is_done(reply, api::Outcome::kReached);
   const bool told = motion.kind != Motion::Kind::kStep && !std::get_if<api::Refused>(&reply);
-  if (!done && !told) warn(api::reason_of(reply));
+  if (!done && !told) warn(motor_, api::reason_of(reply));
   if (motion.kind == Motion::Kind::kTravel) return end_travel(module, motion, done);
   done ? module.step_done() : module.step_not_done();
 }

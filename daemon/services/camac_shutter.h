@@ -5,17 +5,11 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "daemon/model/interlocks.h"
-#include "daemon/model/outputs.h"
-#include "daemon/model/precedence.h"
-#include "daemon/services/camac_asker.h"
-#include "daemon/services/camac_program.h"
-#include "daemon/services/tables_in_service.h"
+#include "daemon/services/camac_client.h"
 #include "daemon/services/travels.h"
 #include "heritage/camac/bushd1.h"
 
@@ -24,25 +18,14 @@ namespace bushd::daemon {
 // The table by which a run makes these codes. Precondition: they fall and rise once.
 Result<tables::TablePtr> table_of_travel(const camac::Travel& travel, const std::string& module);
 
-class CamacShutter final : public camac::Shutter {
+class CamacShutter final : public camac::Shutter, public CamacClient {
  public:
-  CamacShutter(const std::string& name, const config::CamacModule& module,
-               Installation& installation, const Interlocks& interlocks,
-               const Precedence& precedence, const CamacTurn& turn, TablesInService& tables,
-               Travels& travels, const Programs& programs, Outputs& outputs, AskCore ask)
-      : name_(name),
+  CamacShutter(std::string name, const config::CamacModule& module, Travels& travels,
+               const CamacParts& parts)
+      : CamacClient(std::move(name), parts),
         motor_(module.motors.front()),
         without_computer_(module.without_computer),
-        installation_(installation),
-        interlocks_(interlocks),
-        precedence_(precedence),
-        turn_(turn),
-        tables_(tables),
-        travels_(travels),
-        outputs_(outputs),
-        ask_(std::move(ask)),
-        session_(std::make_shared<CamacSession>(name)),
-        program_(name, programs, session_, ask_) {}
+        travels_(travels) {}
 
   void refuses(std::string_view why) override { refuse(std::string(why)); }
   bool step(const camac::SingleStep& step) override;
@@ -52,9 +35,6 @@ class CamacShutter final : public camac::Shutter {
   // A motion that has been begun before a stop of the motor, and is not yet asked of it, does not
   // begin.
   void end_overtaken();
-
-  // What people are told of the motion that was permitted last; empty: nothing.
-  std::string take_note() { return std::exchange(note_, {}); }
 
   // Does what is due, and tells the module what has become of it.
   void follow(std::int64_t now_us, camac::Bushd1& module);
@@ -93,16 +73,9 @@ class CamacShutter final : public camac::Shutter {
     bool left() const { return kind == Kind::kTravel ? travel.left != returns : step.left; }
   };
 
-  void warn(const std::string& what);
   bool refuse(const std::string& why);
   Result<void> may_begin(std::int64_t steps) const;
   bool takes(Motion motion, const Result<void>& may);
-  // Precondition: there is a motion.
-  api::Asker asker() {
-    return {.session = session_,
-            .number = session_->next_number(),
-            .after_stops = motion_->after_stops};
-  }
   void begin(std::int64_t now_us);
   void follow_table(std::int64_t now_us, camac::Bushd1& module);
   void ask_mcu(std::int64_t now_us);
@@ -116,21 +89,9 @@ class CamacShutter final : public camac::Shutter {
   void end(camac::Bushd1& module, const api::Reply& reply);
   void end_travel(camac::Bushd1& module, Motion& motion, bool done);
 
-  const std::string name_;
   const MotorId motor_;
   const bool without_computer_;
-  Installation& installation_;
-  const Interlocks& interlocks_;
-  const Precedence& precedence_;
-  const CamacTurn& turn_;
-  TablesInService& tables_;
   Travels& travels_;
-  Outputs& outputs_;
-  AskCore ask_;
-  std::shared_ptr<CamacSession> session_;
-  CamacProgram program_;
-  std::string note_;
-  std::shared_ptr<CamacSession> stops_ = std::make_shared<CamacSession>(name_);
   std::optional<Motion> motion_;
 };
 
