@@ -9,9 +9,9 @@ import dataclasses
 import math
 from typing import Any
 
-from . import events
 from .fields import Field, Kind
 from .record import Putter
+from .variables import Variables
 
 _ENABLE = ("Disable", "Enable")
 
@@ -42,18 +42,10 @@ class Set:
     width_us: int
 
 
-Event = events.Post | events.Done | Set
-
-
-class Compare:
+class Compare(Variables[Set]):
     def __init__(self, name: str) -> None:
         self.name = name
-        self.values: dict[str, Any] = {field: spec.initial for field, spec in FIELDS.items()}
-        self._out: list[Event] = []
-
-    def take(self) -> list[Event]:
-        out, self._out = self._out, []
-        return out
+        super().__init__(FIELDS)
 
     @property
     def is_on(self) -> bool:
@@ -62,15 +54,15 @@ class Compare:
     def put(self, field: str, value: Any, by: Putter) -> None:
         error = FIELDS[field].why_not if not FIELDS[field].settable else self._unfit(field, value)
         if error:
-            return self._done(by, f"{field}: {error}")
+            return self._done(by.token, f"{field}: {error}")
         if field != "PCOEnable":
             self._post(field, value)
             self._post(f"{field}_RBV", value)
-            return self._done(by)
+            return self._done(by.token)
         why_not = self._cannot_enable() if value else ""
         if why_not or (not value and not self.is_on):
             self._show_enabled()
-            return self._done(by, why_not)
+            return self._done(by.token, why_not)
         self._post("PCOEnable", value)
         self._out.append(Set(by, bool(value), self.values["PCOStartPosition"], int(self.values["PCOPulseWidth"])))
 
@@ -78,7 +70,7 @@ class Compare:
         if not error:
             self._post("PCOEnable_RBV", int(asked.on))
         self._show_enabled()
-        self._done(asked.by, error)
+        self._done(asked.by.token, error)
 
     def replaced(self) -> None:
         """Its MCU compares with something else now."""
@@ -101,12 +93,3 @@ class Compare:
         if self.values["PCOIncrement"] and end != start:
             return "an MCU compares with one position: put PCOIncrement to 0, then it is PCOStartPosition"
         return ""
-
-    def _post(self, field: str, value: Any) -> None:
-        if self.values[field] != value:
-            self.values[field] = value
-            self._out.append(events.Post(field, value))
-
-    def _done(self, by: Putter, error: str = "") -> None:
-        if by.token is not None:
-            self._out.append(events.Done(by.token, error))

@@ -16,11 +16,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from . import events
 from .events import End, Seen
 from .fields import Field, Kind
 from .record import Putter
 from .scale import Scale
+from .variables import Variables
 
 MOST_POINTS = 2000
 RAMP_ROWS = 8  # of a run before the first point, and after the last one
@@ -140,9 +140,6 @@ class Abort:
     by: Putter
 
 
-Event = events.Post | events.Done | Check | Fly | Abort
-
-
 def trajectory(points: Points) -> Trajectory:
     """With the runs before and behind it."""
     rows = points.rows
@@ -179,26 +176,21 @@ def _speed(row: Row, following: Row, time_s: float) -> Row:
     return tuple((b - a) / time_s for a, b in zip(row, following))
 
 
-class Profile:
+class Profile(Variables[Check | Fly | Abort]):
     def __init__(self, name: str, motors: Sequence[str]) -> None:
         self.name = name  # what its variables begin with
         self.motors = tuple(motors)  # M1, M2 and so on
         self.fields: dict[str, Field] = dict(FIELDS)
         for axis in range(1, len(motors) + 1):
             self.fields |= {f"M{axis}{field}": spec for field, spec in AXIS_FIELDS.items()}
-        self.values: dict[str, Any] = {field: spec.initial for field, spec in self.fields.items()}
+        super().__init__(self.fields)
         self.values["NumAxes"] = len(motors)
-        self._out: list[Event] = []
         self._built: Points | None = None
         self._checking: Points | None = None
         self._flown: tuple[Points, list[Scale]] | None = None  # under way, or flown to its end
         self._points_s: Row = ()
         self._building: list[Any] = []  # tokens of puts
         self._executing: list[Any] = []
-
-    def take(self) -> list[Event]:
-        out, self._out = self._out, []
-        return out
 
     @property
     def executes(self) -> bool:
@@ -374,15 +366,6 @@ class Profile:
             self._post(f"M{axis}FollowingErrors", ())
         self._post("NumReadbacks", 0)
         self._post("ReadbackStatus", UNDEFINED)
-
-    def _post(self, field: str, value: Any) -> None:
-        if self.values[field] != value:
-            self.values[field] = value
-            self._out.append(events.Post(field, value))
-
-    def _done(self, token: Any, error: str = "") -> None:
-        if token is not None:
-            self._out.append(events.Done(token, error))
 
 
 def _position(seen: Seen) -> float:

@@ -9,10 +9,10 @@ import dataclasses
 import math
 from typing import Any
 
-from . import events
 from .events import End, Seen
 from .fields import Field, Kind
 from .record import Putter
+from .variables import Variables
 
 RISING = 0  # trgEdge
 IDLE, ARMING, ARMED, MOVING = range(4)  # trgState
@@ -47,19 +47,11 @@ class Disarm:
     by: Putter
 
 
-Event = events.Post | events.Done | Arm | Disarm
-
-
-class Trigger:
+class Trigger(Variables[Arm | Disarm]):
     def __init__(self, name: str) -> None:
         self.name = name
-        self.values: dict[str, Any] = {field: spec.initial for field, spec in FIELDS.items()}
+        super().__init__(FIELDS)
         self._waiting: list[Any] = []  # the token of the put that has armed it
-        self._out: list[Event] = []
-
-    def take(self) -> list[Event]:
-        out, self._out = self._out, []
-        return out
 
     @property
     def is_on(self) -> bool:
@@ -118,12 +110,3 @@ class Trigger:
         if field == "_trgDelay" and (value != int(value) or not LEAST_DELAY_US <= value <= MOST_DELAY_US):
             return f"{value:g} us; allowed: whole numbers from {LEAST_DELAY_US} to {MOST_DELAY_US}"
         return ""
-
-    def _post(self, field: str, value: Any) -> None:
-        if self.values[field] != value:
-            self.values[field] = value
-            self._out.append(events.Post(field, value))
-
-    def _done(self, token: Any, error: str = "") -> None:
-        if token is not None:
-            self._out.append(events.Done(token, error))
