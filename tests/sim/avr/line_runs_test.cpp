@@ -4,6 +4,7 @@
 #include <array>
 
 #include "sim/avr/avr_fixture.h"
+#include "sim/avr/ramps.h"
 
 namespace bushd::sim::line_runs_test {
 namespace {
@@ -24,13 +25,7 @@ struct LineLoad {
 
 class AvrLineRuns : public AvrAlone, public testing::WithParamInterface<LineLoad> {
  protected:
-  static std::vector<std::uint16_t> line_codes() {
-    std::vector<std::uint16_t> codes;
-    for (int i = 0; i < 238; ++i) {
-      codes.push_back(static_cast<std::uint16_t>(GetParam().cruise * (1000 - 3 * i) / 280));
-    }
-    return codes;
-  }
+  static std::vector<std::uint16_t> line_codes() { return ramp_to(GetParam().cruise); }
 
   static std::uint32_t increment(std::uint8_t motor) { return kLongest - GetParam().apart * motor; }
   static bool is_forward(std::uint8_t motor) { return motor % 3 != 1; }
@@ -41,16 +36,11 @@ class AvrLineRuns : public AvrAlone, public testing::WithParamInterface<LineLoad
   };
 
   // Where each step of a motor falls: step j at ceil(128 (2j - 1) L / N) + 128 parts of 1/256 step
-  // of the run, whose step k comes after the delays max(A(k-1), D(L-k), c). One at a tick's end
+  // of the run, whose step k comes after the delays of ramps.h. One at a tick's end
   // falls into its last slot.
   static std::vector<Place> places_of_steps(std::uint32_t increment) {
-    const std::vector<std::uint16_t> ramp = line_codes();
-    const auto code = [&ramp](std::size_t i) {
-      return i < ramp.size() ? ramp[i] : GetParam().cruise;
-    };
     std::vector<std::int64_t> begins{0};
-    for (std::size_t k = 1; k <= kLongest; ++k) {
-      const int units = std::max({code(k - 1), code(kLongest - k), GetParam().cruise});
+    for (const std::uint16_t units : delays_of_run(GetParam().cruise, kLongest)) {
       begins.push_back(begins.back() + std::int64_t{units} * GetParam().unit_ns);
     }
     const std::int64_t slot_time = 256 * std::int64_t{GetParam().tick_ns};

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "sim/avr/avr_fixture.h"
+#include "sim/avr/ramps.h"
 
 namespace bushd::sim::table_runs_test {
 namespace {
@@ -22,26 +23,15 @@ struct Load {
 
 class AvrTableRuns : public AvrAlone, public testing::WithParamInterface<Load> {
  protected:
-  static std::vector<std::uint16_t> codes() {
-    std::vector<std::uint16_t> codes;
-    for (int i = 0; i < 238; ++i) {
-      codes.push_back(static_cast<std::uint16_t>(GetParam().cruise * (1000 - 3 * i) / 280));
-    }
-    return codes;
-  }
+  static std::vector<std::uint16_t> codes() { return ramp_to(GetParam().cruise); }
 
-  // Where each step of the run falls, in slots from its start: the time is the sum of the delays
-  // max(A(j-1), D(N-j), c); a step exactly at a tick's end falls into its last slot.
+  // Where each step of the run falls, in slots from its start: the time is the sum of the delays; a
+  // step exactly at a tick's end falls into its last slot.
   static std::vector<std::size_t> slots_of_steps() {
-    const std::vector<std::uint16_t> ramp = codes();
-    const auto code = [&ramp](std::size_t i) {
-      return i < ramp.size() ? ramp[i] : GetParam().cruise;
-    };
     std::vector<std::size_t> slots;
     std::uint64_t time_ns = 0;
-    for (std::size_t j = 1; j <= kSteps; ++j) {
-      time_ns += std::uint64_t{std::max({code(j - 1), code(kSteps - j), GetParam().cruise})} *
-                 GetParam().unit_ns;
+    for (const std::uint16_t units : delays_of_run(GetParam().cruise, kSteps)) {
+      time_ns += std::uint64_t{units} * GetParam().unit_ns;
       const std::uint64_t tick = (time_ns - 1) / GetParam().tick_ns;
       const std::uint64_t slot =
           (time_ns - tick * GetParam().tick_ns) * kSlots / GetParam().tick_ns;
