@@ -170,13 +170,13 @@ struct Lead {
 class StartLead : public testing::TestWithParam<Lead> {};
 
 // What a start of these takes at most, as docs/decisions/0080-starts.md has it. A poll may have
-// begun just before the request, at rest one whose answers take 2 ms; then go the first frames. 2
+// begun just before the request, at rest one whose answers take 5 ms; then go the first frames. 2
 // ms are the program's, a tick is what its clock may lag by, and two are what an MCU needs. What
 // takes several frames is confirmed by one poll, after which there is time for a frame of rest, of
 // one tick, to each MCU, and for a tick in which that is decided.
 std::int64_t longest_lead_us(const Lead& lead) {
   const auto motors = static_cast<std::size_t>(lead.motors);
-  const std::int64_t most_asked = (2'000 + 530) / (hall_line_us(kAnswerAtRest) + 530);
+  const std::int64_t most_asked = (5'000 + 530) / (hall_line_us(kAnswerAtRest) + 530);
   const std::int64_t poll_us =
       hall_poll_us(std::min(lead.mcus, static_cast<int>(most_asked)), kAnswerAtRest);
   const std::int64_t frames_us =

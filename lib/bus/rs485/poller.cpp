@@ -14,8 +14,9 @@ using fieldbus::kPollPeriodUs;
 
 // Nothing else is sent meanwhile; queues that have run low must not wait for longer.
 constexpr std::int64_t kMaxCycleUs = 60'000;
-// While nothing moves, answers to a routine poll take no more than so many times what each poll
-// takes besides: a start does not wait for all MCUs.
+// While nothing moves, answers to a routine poll take no more than this, or so many times what each
+// poll takes besides: a start does not wait for all MCUs.
+constexpr std::int64_t kAnswersAtRestUs = 5'000;
 constexpr std::int64_t kAnswersAtRest = 2;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
@@ -185,8 +186,8 @@ std::int64_t Poller::most_cycle_us(std::int64_t now_us) const {
     const bool known = mcu.view.phase == McuPhase::kOnline && mcu.known != 0;
     if (!rests || !known || mcu.poll_wanted || polled.missed_replies != 0) return kMaxCycleUs;
   }
-  return kFirstWindowUs +
-         kAnswersAtRest * (kFirstWindowUs + transactions_.health().latency.recent_us);
+  const std::int64_t besides_us = kFirstWindowUs + transactions_.health().latency.recent_us;
+  return kFirstWindowUs + std::max(kAnswersAtRestUs, kAnswersAtRest * besides_us);
 }
 
 bool Poller::send_wanted(std::int64_t now_us) {

@@ -373,13 +373,13 @@ std::map<int, int> polls_by_address(const FakeBus& bus) {
   return polls;
 }
 
-TEST(Connect, EachIsAskedTwentyTimesASecond) {
+TEST(Connect, OnePollTwentyTimesASecondAsksAll) {
   FakeBus bus(3);
   bus.connect();
   bus.run_for(500'000);
   bus.heard.clear();
   bus.run_for(2'000'000);
-  EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_POLL).size()), 2 * 40, 6) << "two and one";
+  EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_POLL).size()), 40, 3);
   for (int address = 1; address <= 3; ++address) EXPECT_NEAR(polls_by_address(bus)[address], 40, 3);
   EXPECT_NEAR(static_cast<double>(bus.heard_of(BUSHD_MSG_SYNC).size()), 4, 1);
   EXPECT_EQ(bus.master->health(McuIndex{0}).timeouts, 0u) << "answers do not collide";
