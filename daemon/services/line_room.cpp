@@ -21,7 +21,8 @@ bool LineRoom::concerns_any() const {
 
 // How the motor's motion is told. None: its MCU makes it when the trigger comes, or nothing moves.
 // A motor that moves by a run of its MCU is streamed from its new target on.
-std::optional<StartMessages> LineRoom::messages_of(const api::Request& request, MotorId id) const {
+std::optional<StartMessages> LineRoom::messages_of(const api::Request& request, MotorId id,
+                                                   bool by_mcus) const {
   const Mcu& mcu = installation_.mcu_of(id);
   const auto whole = [&]() -> std::optional<StartMessages> {
     constexpr bushd_delay kNoLimit = 0;
@@ -33,7 +34,7 @@ std::optional<StartMessages> LineRoom::messages_of(const api::Request& request, 
       Overloaded{[&](const api::Move&) { return whole(); },
                  [&](const api::Jog&) { return std::optional(StartMessages::kStates); },
                  [&](const api::MoveLine&) {
-                   return mcu.makes_lines() ? std::optional(StartMessages::kLineRun) : as_ticks();
+                   return by_mcus ? std::optional(StartMessages::kLineRun) : as_ticks();
                  },
                  [&](const api::MovePath&) { return as_ticks(); },
                  [&](const api::Follow&) { return as_ticks(); },
@@ -41,11 +42,24 @@ std::optional<StartMessages> LineRoom::messages_of(const api::Request& request, 
       request);
 }
 
+// From rest, and where no MCU makes another line. One whose table does not come in time is streamed
+// all the same.
+bool LineRoom::may_be_by_mcus(const std::vector<MotorId>& motors) const {
+  return std::ranges::all_of(motors, [this](MotorId id) {
+    const Mcu& mcu = installation_.mcu_of(id);
+    return installation_[id].stands() && mcu.makes_lines() &&
+           std::ranges::none_of(mcu.motors(), [this](MotorId other) {
+             return installation_[other].is<motion::OnLine>();
+           });
+  });
+}
+
 Result<bool> LineRoom::has_room(const api::Request& request,
                                 const std::vector<MotorId>& motors) const {
+  const bool by_mcus = may_be_by_mcus(motors);
   std::map<BusId, std::map<std::pair<McuId, StartMessages>, std::uint16_t>> of_buses;
   for (const MotorId id : motors) {
-    const auto messages = messages_of(request, id);
+    const auto messages = messages_of(request, id, by_mcus);
     if (!messages) continue;
     const Mcu& mcu = installation_.mcu_of(id);
     of_buses[mcu.config.bus][{mcu.id, *messages}] |=
@@ -59,26 +73,31 @@ Result<bool> LineRoom::has_room(const api::Request& request,
     for (const auto& [key, mask] : masks) {
       together.push_back({installation_[key.first].on_bus(), mask, key.second});
     }
-    const auto fits = has_room_on(bus, std::move(together));
+    const auto fits = has_room_on(bus, together, request);
     if (!fits) return fits;
     room = room && *fits;
   }
   return room;
 }
 
-Result<bool> LineRoom::has_room_on(const Bus& bus, std::vector<link::ToBegin> together) const {
+// A jog does not wait: its key may be released long before its turn comes.
+Result<bool> LineRoom::has_room_on(const Bus& bus, const std::vector<link::ToBegin>& together,
+                                   const api::Request& request) const {
   const link::LineLoad load = bus.master.line_load(together);
   if (load.more <= 0 || load.all() <= fieldbus::kMaxBusLoad) return true;
   const bool alone = load.polls + load.more <= fieldbus::kMaxBusLoad;
-  if (alone && bus.config.streams == config::Streams::kQueue) return false;
-  return fail(fmt::format(
-      "the line of bus {} has no room for it: polls take {:.0f} %, motions under way {:.0f} %, "
-      "this "
-      "one {:.0f} %; allowed: {:.0f} %. {}",
-      bus.config.name, load.polls * 100, load.streams * 100, load.more * 100,
-      fieldbus::kMaxBusLoad * 100,
-      alone ? "Wait until others have ended, or set streams = \"queue\" of the bus"
-            : "Move fewer motors at once, or from rest with moves = \"table\" of the bus"));
+  const bool may_wait = !std::holds_alternative<api::Jog>(request);
+  if (alone && may_wait && bus.config.streams == config::Streams::kQueue) return false;
+  const bool whole = std::holds_alternative<api::Move>(request);
+  std::string remedy = "Wait until others have ended";
+  if (alone && may_wait) remedy += ", or set streams = \"queue\" of the bus";
+  if (!alone) remedy = "Move fewer motors at once";
+  if (!alone && whole) remedy += ", or from rest with moves = \"table\" of the bus";
+  return fail(
+      fmt::format("bus {} has no room for it: polls take {:.0f} %, motions under way {:.0f} %, "
+                  "these {:.0f} %; allowed: {:.0f} %. {}",
+                  bus.config.name, load.polls * 100, load.streams * 100, load.more * 100,
+                  fieldbus::kMaxBusLoad * 100, remedy));
 }
 
 }  // namespace bushd::daemon

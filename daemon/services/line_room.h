@@ -26,8 +26,12 @@ class LineRoom {
   Result<bool> has_room(const api::Request& request, const std::vector<MotorId>& motors) const;
 
  private:
-  std::optional<link::StartMessages> messages_of(const api::Request& request, MotorId motor) const;
-  Result<bool> has_room_on(const Bus& bus, std::vector<link::ToBegin> together) const;
+  // `by_mcus`: a line is made by the MCUs of its motors.
+  std::optional<link::StartMessages> messages_of(const api::Request& request, MotorId motor,
+                                                 bool by_mcus) const;
+  bool may_be_by_mcus(const std::vector<MotorId>& motors) const;
+  Result<bool> has_room_on(const Bus& bus, const std::vector<link::ToBegin>& together,
+                           const api::Request& request) const;
 
   const Installation& installation_;
 };

@@ -185,6 +185,11 @@ void EventLoop::tell_systemd(std::int64_t now) {
 }
 
 void EventLoop::keep_up(std::int64_t now) {
+  // Answers that were left unread come before the core looks whether they are late.
+  for (const BusId bus : ports_.ids()) {
+    const bool due = ports_[bus].listen_us > 0 && ports_[bus].listen_us <= now;
+    if (due) handle_port(now, bus, EPOLLIN);
+  }
   core_.keep_up(now);
   for (const BusId bus : ports_.ids()) {
     if (const auto status = std::exchange(ports_[bus].status, std::nullopt)) {

@@ -43,17 +43,21 @@ double stream_load(std::uint32_t baud, std::uint32_t tick_ns, bushd_format forma
                    std::span<const Streamed> mcus) {
   const bool fine = format == BUSHD_FORMAT_FINE;
   double bytes_per_s = 0;
+  const auto of_ticks = [&](unsigned motors) {
+    if (motors == 0) return 0.0;
+    const double ticks = ticks_per_frame(motors, format, tick_ns);
+    const double frame =
+        kFrameCost + BUSHD_TICKS_HEADER + 2.0 * motors + ticks * motors * (fine ? 2.0 : 1.0);
+    return frame / (ticks * tick_ns * 1e-9);
+  };
   for (const auto& [by_ticks, by_states] : mcus) {
-    if (by_ticks != 0) {
-      const double ticks = ticks_per_frame(by_ticks, format, tick_ns);
-      const double frame =
-          kFrameCost + BUSHD_TICKS_HEADER + 2.0 * by_ticks + ticks * by_ticks * (fine ? 2.0 : 1.0);
-      bytes_per_s += frame / (ticks * tick_ns * 1e-9);
-    }
     const int frames = (by_states + kMotorsPerStates - 1) / kMotorsPerStates;
-    bytes_per_s += (frames * (kFrameCost + BUSHD_TABLE_TICKS_HEADER) +
-                    by_states * double{BUSHD_TABLE_TICKS_MAX_ENTRY}) /
-                   kStatesPeriodS;
+    const double of_states = (frames * (kFrameCost + BUSHD_TABLE_TICKS_HEADER) +
+                              by_states * double{BUSHD_TABLE_TICKS_MAX_ENTRY}) /
+                             kStatesPeriodS;
+    // Where ticks are shorter, they are sent.
+    const double all_by_ticks = of_ticks(unsigned{by_ticks} + unsigned{by_states});
+    bytes_per_s += std::min(of_ticks(by_ticks) + of_states, all_by_ticks);
   }
   return bytes_per_s * 10.0 / baud;
 }

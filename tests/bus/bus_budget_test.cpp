@@ -36,7 +36,7 @@ TEST(BusBudget, ByHand) {
 
 // Sixteen motors by states: two frames of a delimiter, 9 + 8 bytes and 21 for each motor, ten times
 // a second.
-TEST(BusBudget, OfPollsAndOfStreams) {
+TEST(BusBudget, PollsAndStreamsAddUp) {
   const std::array<std::uint8_t, 1> one = {16};
   const std::array<Streamed, 1> states = {{{.by_states = 16}}};
   EXPECT_NEAR(stream_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, states),
@@ -44,6 +44,10 @@ TEST(BusBudget, OfPollsAndOfStreams) {
   const std::array<Streamed, 1> ticks = {{{.by_ticks = 16}}};
   EXPECT_NEAR(poll_load(500'000, one) + stream_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, ticks),
               bus_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, one), 1e-12);
+  // States are no more than ticks, since these are sent where they are shorter.
+  const std::array<Streamed, 1> few = {{{.by_ticks = 2, .by_states = 14}}};
+  EXPECT_LE(stream_load(230'400, 10'000'000, BUSHD_FORMAT_COARSE, few),
+            stream_load(230'400, 10'000'000, BUSHD_FORMAT_COARSE, ticks));
   const std::array<Streamed, 1> none = {};
   EXPECT_EQ(stream_load(500'000, 2'560'000, BUSHD_FORMAT_FINE, none), 0);
 }

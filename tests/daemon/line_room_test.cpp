@@ -54,7 +54,7 @@ TEST(LineRoom, WhatDoesNotFitIsRefusedWithWhatTakesHowMuch) {
   const auto second = lab.send(Ask::kMoveBy, motors(17, 32), each(16, 400));
   const Answer refused = lab.wait(second);
   EXPECT_EQ(refused.phase, Answer::kRefused);
-  EXPECT_THAT(refused.reason, HasSubstr("the line of bus hall has no room for it: polls take "));
+  EXPECT_THAT(refused.reason, HasSubstr("bus hall has no room for it: polls take "));
   EXPECT_THAT(refused.reason, HasSubstr("Wait until others have ended, or set streams = "));
   EXPECT_EQ(lab.shaft_steps("m17"), 0);
   const Answer never = lab.wait(lab.send(Ask::kMoveBy, motors(33, 128), each(96, 400)));
@@ -83,6 +83,21 @@ TEST(LineRoom, WhatDoesNotFitWaitsWhereItMay) {
   EXPECT_EQ(lab.shaft_steps("m33"), 0);
   const Answer never = lab.wait(lab.send(Ask::kMoveBy, motors(33, 128), each(96, 400)));
   EXPECT_EQ(never.phase, Answer::kRefused) << "it never fits";
+}
+
+TEST(LineRoom, ALineIsStreamedWhereSomeOfItMove) {
+  Lab lab(crowd("fine", "queue"));
+  lab.connect();
+  const auto line = lab.send(api::MoveLine{.motors = motor_steps(motors(1, 16), each(16, 20'000))});
+  lab.run_for(0.5);
+  const Answer refused = lab.wait(lab.send(api::MoveLine{
+      .motors = motor_steps(motors(1, 60), each(60, 20'000)), .speed = api::Speed{.per_s = 500}}));
+  EXPECT_EQ(refused.phase, Answer::kRefused);
+  EXPECT_FALSE(lab.has_result(line));
+  const auto other =
+      lab.send(api::MoveLine{.motors = motor_steps(motors(129, 144), each(16, 400))});
+  EXPECT_EQ(lab.wait(other).result, "reached") << "made by an MCU that makes no other line";
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
 }
 
 // A motor that its MCU moves is streamed from its new target on.

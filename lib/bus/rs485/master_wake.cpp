@@ -22,7 +22,10 @@ std::int64_t Rs485Master::wake_us() const {
 // Reports that somebody may wait for are read as they come. All others can wait for the last of
 // their poll: until it is there nothing else can be sent.
 std::int64_t Rs485Master::decided_from_us() const {
-  if (emergency_.active() || !clock().valid()) return INT64_MIN;
+  // More than half of a terminal's buffer of 4 kB is not left to the driver.
+  constexpr std::size_t kMostUnread = 2'000;
+  const bool much = transactions_.longest_answers() > kMostUnread;
+  if (emergency_.active() || !clock().valid() || much) return INT64_MIN;
   for (const McuIndex i : mcus_.indices()) {
     if (awaits_news(i, transactions_.quiet_us())) return INT64_MIN;
   }

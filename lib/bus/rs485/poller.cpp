@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <tuple>
 #include <utility>
 
 #include "bus/bus_times.h"
@@ -17,7 +18,7 @@ constexpr std::int64_t kMaxCycleUs = 60'000;
 // While nothing moves, answers to a routine poll take no more than this, or so many times what each
 // poll takes besides: a start does not wait for all MCUs.
 constexpr std::int64_t kAnswersAtRestUs = 5'000;
-constexpr std::int64_t kAnswersAtRest = 2;
+constexpr std::int64_t kShareAtRest = 2;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
@@ -55,7 +56,7 @@ std::vector<McuIndex> Poller::choose(std::int64_t now_us) const {
   }
   std::stable_sort(asked.begin(), asked.end(), [this](McuIndex a, McuIndex b) {
     const auto rank = [this](McuIndex i) {
-      return std::pair{polled_[i].missed_replies == 0, !asked_for(i)};
+      return std::tuple{polled_[i].missed_replies == 0, !asked_for(i), polled_[i].routine_us};
     };
     return rank(a) < rank(b);
   });
@@ -187,7 +188,7 @@ std::int64_t Poller::most_cycle_us(std::int64_t now_us) const {
     if (!rests || !known || mcu.poll_wanted || polled.missed_replies != 0) return kMaxCycleUs;
   }
   const std::int64_t besides_us = kFirstWindowUs + transactions_.health().latency.recent_us;
-  return kFirstWindowUs + std::max(kAnswersAtRestUs, kAnswersAtRest * besides_us);
+  return kFirstWindowUs + std::max(kAnswersAtRestUs, kShareAtRest * besides_us);
 }
 
 bool Poller::send_wanted(std::int64_t now_us) {

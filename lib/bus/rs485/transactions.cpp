@@ -54,6 +54,14 @@ void Transactions::ask_all(std::int64_t now_us, std::uint8_t type,
   }
 }
 
+std::size_t Transactions::longest_answers() const {
+  std::size_t bytes = 0;
+  for (const Awaited& awaited : open_->awaited) {
+    bytes += awaited.longest + BUSHD_FRAME_OVERHEAD + 1;
+  }
+  return bytes;
+}
+
 void Transactions::receive(std::int64_t now_us, std::span<const std::uint8_t> bytes) {
   for (const std::uint8_t byte : bytes) {
     bushd_frame frame;

@@ -90,6 +90,8 @@ class Transactions {
   // When the shortest answer of the last who is asked will have passed: with the others nothing
   // ends. INT64_MIN: one is asked. Precondition: open().
   std::int64_t last_answer_us() const { return open_->last_answer_us; }
+  // The bytes of the longest answers to it.
+  std::size_t longest_answers() const;
 
   // How long beyond that an answer is waited for at present.
   std::int64_t patience_us() const { return patience_us_; }

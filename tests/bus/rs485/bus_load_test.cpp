@@ -96,7 +96,8 @@ TEST(BusLoad, AllAnswersOfAPollThatNobodyWaitsForAreReadAtOnce) {
   EXPECT_LE(reads_of_a_poll(bus), 2.0) << "in motion too";
   bus.slaves[3].answers = false;
   bus.run_for(100'000);
-  EXPECT_LE(reads_of_a_poll(bus), 2.1) << "the last one owes its answer, and is looked for";
+  EXPECT_LE(reads_of_a_poll(bus), 2.1) << "the last one owes its answer: of ten polls one is read "
+                                          "a third time, when that is overdue";
 }
 
 TEST(BusLoad, AnswersAreReadAsTheyComeWhereOneTellsOfAnEnd) {

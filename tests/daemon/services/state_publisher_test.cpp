@@ -40,9 +40,9 @@ TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   EXPECT_EQ(bench.states.back().program, "scan runs");
 }
 
-class OfResting : public testing::Test {
+class RestingMcu : public testing::Test {
  protected:
-  OfResting() {
+  RestingMcu() {
     bench.connect(service);
     publisher.publish_all(bench.now_us());
     bench.states.clear();
@@ -67,7 +67,7 @@ class OfResting : public testing::Test {
                            bench};
 };
 
-TEST_F(OfResting, McusIsPublishedTwiceASecond) {
+TEST_F(RestingMcu, IsPublishedTwiceASecond) {
   const std::size_t mcus = bench.installation.mcus().size();
   publish_for(1'000'000);
   const std::size_t states = publish_for(10'000'000);
@@ -75,7 +75,7 @@ TEST_F(OfResting, McusIsPublishedTwiceASecond) {
   EXPECT_LE(states, 20 * mcus) << "a state takes many times as long as a look at its report";
 }
 
-TEST_F(OfResting, McusIsPublishedAtOnceWhenItsReportIsAnotherOne) {
+TEST_F(RestingMcu, IsPublishedAtOnceWhenItsReportIsAnotherOne) {
   publish_for(1'000'000);
   bench.installation[McuId{0}].bus().control(bench.installation[McuId{0}].on_bus(),
                                              BUSHD_CONTROL_DISABLE);
@@ -94,7 +94,7 @@ TEST_F(OfResting, McusIsPublishedAtOnceWhenItsReportIsAnotherOne) {
   EXPECT_LE(bench.now_us() - before_us, 150'000);
 }
 
-TEST_F(OfResting, McusIsPublishedWhenAnythingElseMayHaveChanged) {
+TEST_F(RestingMcu, IsPublishedWhenAnythingElseMayHaveChanged) {
   publish_for(1'000'000);
   publisher.look_anew();
   EXPECT_EQ(publish_for(StatePublisher::kPeriodUs + 5'000), bench.installation.mcus().size());
