@@ -145,7 +145,7 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
 }
 
 void Rs485Master::withdraw_late_starts(std::int64_t now_us) {
-  if (!clock().valid() || (transactions_.open() && now_us < transactions_.quiet_us())) return;
+  if (!clock().valid() || (transactions_.open() && now_us < answered_by_us())) return;
   streams_.withdraw_late_starts(std::max(line_free_us(now_us), writer_.free_us()),
                                 withdrawal_margin_us());
 }

@@ -239,6 +239,7 @@ class Rs485Master final : public BusMaster,
   void ask_again_for_start(std::int64_t now_us, McuIndex mcu);
   std::int64_t withdrawal_due_us() const;
   std::int64_t wake_us(McuIndex mcu) const;
+  std::int64_t answered_by_us() const;
   std::int64_t decided_from_us() const;
   bool awaits_news(McuIndex mcu, std::int64_t until_us) const;
   const BusClock& clock() const { return synchroniser_.clock(); }

@@ -8,7 +8,7 @@ namespace bushd::link {
 std::int64_t Rs485Master::wake_us() const {
   if (!port_open_) return INT64_MAX;
   if (transactions_.open()) {
-    std::int64_t urgent_us = withdrawal_due_us();
+    std::int64_t urgent_us = std::max(withdrawal_due_us(), answered_by_us());
     if (emergency_.active()) urgent_us = std::min(urgent_us, emergency_.due_us());
     if (streams_.withdraws()) urgent_us = stepped_us_;
     return std::min(transactions_.timeout_us(), std::max(urgent_us, transactions_.quiet_us()));
@@ -17,6 +17,11 @@ std::int64_t Rs485Master::wake_us() const {
   if (emergency_.active()) wake = std::min(wake, emergency_.due_us());
   for (const McuIndex i : mcus_.indices()) wake = std::min(wake, wake_us(i));
   return std::max(wake, writer_.room_from_us());
+}
+
+// The last answer may have ended when the line is quiet, and be with the adapter still.
+std::int64_t Rs485Master::answered_by_us() const {
+  return transactions_.quiet_us() + horizon_.held_back_us();
 }
 
 // Reports that somebody may wait for are read as they come. All others can wait for the last of
