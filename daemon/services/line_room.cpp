@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/overloaded.h"
-#include "bus/bus_budget.h"
 
 namespace bushd::daemon {
 
@@ -84,8 +83,8 @@ Result<bool> LineRoom::has_room(const api::Request& request,
 Result<bool> LineRoom::has_room_on(const Bus& bus, const std::vector<link::ToBegin>& together,
                                    const api::Request& request) const {
   const link::LineLoad load = bus.master.line_load(together);
-  if (load.more <= 0 || load.all() <= fieldbus::kMaxBusLoad) return true;
-  const bool alone = load.polls + load.more <= fieldbus::kMaxBusLoad;
+  if (load.more <= 0 || load.all() <= load.most) return true;
+  const bool alone = load.polls + load.more <= load.most;
   const bool may_wait = !std::holds_alternative<api::Jog>(request);
   if (alone && may_wait && bus.config.streams == config::Streams::kQueue) return false;
   const bool whole = std::holds_alternative<api::Move>(request);
@@ -97,7 +96,7 @@ Result<bool> LineRoom::has_room_on(const Bus& bus, const std::vector<link::ToBeg
       fmt::format("bus {} has no room for it: polls take {:.0f} %, motions under way {:.0f} %, "
                   "these {:.0f} %; allowed: {:.0f} %. {}",
                   bus.config.name, load.polls * 100, load.streams * 100, load.more * 100,
-                  fieldbus::kMaxBusLoad * 100, remedy));
+                  load.most * 100, remedy));
 }
 
 }  // namespace bushd::daemon

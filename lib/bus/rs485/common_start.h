@@ -28,6 +28,7 @@ struct LineLoad {
   double polls = 0;    // and their answers, while all motors move
   double streams = 0;  // under way
   double more = 0;     // what is to begin besides
+  double most = 0;     // that may be planned
   double all() const { return polls + streams + more; }
 };
 

@@ -232,7 +232,8 @@ LineLoad Rs485Master::line_load(std::span<const ToBegin> more) const {
   const double streams = streams_.load_with({});
   return {.polls = fieldbus::poll_load(setup_.baud, motors),
           .streams = streams,
-          .more = streams_.load_with(more) - streams};
+          .more = streams_.load_with(more) - streams,
+          .most = fieldbus::kMaxBusLoad};
 }
 
 bool Rs485Master::in_one_frame(std::span<const ToBegin> together) const {
