@@ -146,8 +146,9 @@ std::span<const std::uint8_t> Rs485Master::step(std::int64_t now_us) {
 
 void Rs485Master::withdraw_late_starts(std::int64_t now_us) {
   if (!clock().valid() || (transactions_.open() && now_us < answered_by_us())) return;
-  streams_.withdraw_late_starts(std::max(line_free_us(now_us), writer_.free_us()),
-                                withdrawal_margin_us());
+  const std::int64_t free_us = std::max(line_free_us(now_us), writer_.free_us());
+  const bool late = streams_.withdraw_late_starts(free_us, withdrawal_margin_us());
+  if (late) repair_time_.missed(now_us);
 }
 
 // How long nothing may be sent, and then all others have their turn first: a poll whose last answer

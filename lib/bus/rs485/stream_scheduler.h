@@ -86,8 +86,8 @@ class StreamScheduler {
   bool start_is_open(McuIndex mcu) const;
   // Called once in a step, before anything is sent: StartUnconfirmed for those that are not
   // confirmed, if there is no time for `margin_us` before frames that keep them from beginning, on
-  // a line that is free from `free_us` on.
-  void withdraw_late_starts(std::int64_t free_us, std::int64_t margin_us);
+  // a line that is free from `free_us` on. Returns whether one was not confirmed in time.
+  bool withdraw_late_starts(std::int64_t free_us, std::int64_t margin_us);
   // When that will be; INT64_MAX: no start is to be confirmed.
   std::int64_t withdrawal_due_us(std::int64_t free_us, std::int64_t margin_us) const;
   // A replacement waits that keeps a motor from beginning: what StartUnconfirmed has asked for, if

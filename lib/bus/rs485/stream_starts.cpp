@@ -116,7 +116,8 @@ std::int64_t StreamScheduler::withdrawal_us(Tick at) const {
   return us;
 }
 
-void StreamScheduler::withdraw_late_starts(std::int64_t free_us, std::int64_t margin_us) {
+bool StreamScheduler::withdraw_late_starts(std::int64_t free_us, std::int64_t margin_us) {
+  bool late = false;
   for (Mcu& mcu : mcus_) mcu.withdraws = mcu.withdraws && mcu.replacing != 0;
   std::erase_if(to_confirm_, [&](Tick at) {
     bool open = false;
@@ -125,12 +126,15 @@ void StreamScheduler::withdraw_late_starts(std::int64_t free_us, std::int64_t ma
     const std::int64_t arrival_us = free_us + withdrawal_us(at);
     if (clock_.tick_at(arrival_us + margin_us) < last_to_withdraw(at)) return false;
     // Where that cannot be told them in time they begin, some perhaps without others.
-    if (too_late(at, clock_.tick_at(arrival_us))) return true;
-    if (waits_for_replacement(at)) return false;
+    const bool too_late_for_rest = too_late(at, clock_.tick_at(arrival_us));
+    if (!too_late_for_rest && waits_for_replacement(at)) return false;
+    late = true;
+    if (too_late_for_rest) return true;
     for (const McuIndex i : mcus_.indices()) mcus_[i].withdraws = to_begin_at(i, at) != 0;
     events_.push_back(StartUnconfirmed{at});
     return true;
   });
+  return late;
 }
 
 // An MCU gets no other replacement before it has said whether it has taken the one before.
