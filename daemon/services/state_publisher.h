@@ -18,7 +18,9 @@ namespace bushd::daemon {
 class StatePublisher {
  public:
   static constexpr std::int64_t kPeriodUs = 50'000;
-  static constexpr std::int64_t kRestingPeriodUs = 500'000;
+  // Clients are told half a second after the state before at the latest: that must be there by
+  // then.
+  static constexpr std::int64_t kRestingPeriodUs = 200'000;
   // While all rest, what has come is told this much later at most: reports come as often, and with
   // them the time to tell of them, so nothing is woken for that alone.
   static constexpr std::int64_t kRestingSlackUs = 5'000;

@@ -93,7 +93,7 @@ class Scales(unittest.TestCase):
 
 class Speeds(unittest.TestCase):
     TABLE = model.Table(name="t", time_unit_ns=1000, accel=(4000, 2000, 1000, 500))
-    ENTRY = model.TableEntry("t", model.TableRef("t", 1, ""), "", 4, 250.0, 2000.0)
+    ENTRY = model.TableEntry(name="t", table=model.TableRef("t", 1, ""), fault="", codes=4, start_steps_per_s=250.0, max_steps_per_s=2000.0)
 
     def of(self, max_speed=None, share=1.0):
         found = motor.speeds(self.TABLE, self.ENTRY, 0.01, max_speed, share)
