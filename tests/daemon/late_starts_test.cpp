@@ -115,9 +115,11 @@ TEST_P(LateStarts, AMoveOfOneStepBeginsAnew) {
   expect_each_edge_is_explained();
 }
 
+// What is told tick by tick does not begin at once.
+class StartsAtOnce : public LateStarts {};
+
 // A frame that is lost now and then puts no start off; what is lost again and again does.
-TEST_P(LateStarts, ALostFrameLeavesTheNextStartsAsSoonAsThisOne) {
-  if (std::string(GetParam()) == "fine_ticks") GTEST_SKIP() << "its starts are not at once";
+TEST_P(StartsAtOnce, ALostFrameLeavesTheNextAsSoonAsThisOne) {
   const auto margin_us = [this] { return lab.health_of("hall").start_margin_us; };
   const std::int64_t before_us = margin_us();
   loses(0.005);
@@ -290,6 +292,8 @@ TEST_P(LateStarts, AnEmergencyStopEndsIt) {
   });
 }
 
+INSTANTIATE_TEST_SUITE_P(Manners, StartsAtOnce, testing::Values("fine", "coarse", "fine_table"),
+                         [](const auto& tested) { return std::string(tested.param); });
 INSTANTIATE_TEST_SUITE_P(Manners, LateStarts,
                          testing::Values("fine", "coarse", "fine_table", "fine_ticks"),
                          [](const auto& tested) { return std::string(tested.param); });

@@ -508,21 +508,26 @@ TEST(Connect, AdapterLatencyIsMeasured) {
       << "changes are planned further ahead";
 }
 
+// This report comes as the answer to a POLL, under each sequence number.
+void receive_under_each_number(FakeBus& bus, const bushd_report& report) {
+  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
+  payload.resize(bushd_encode_report(&report, payload.data()));
+  for (unsigned sequence = 0; sequence < 256; ++sequence) {
+    Bytes wire(BUSHD_FRAME_MAX_WIRE);
+    wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
+                                   static_cast<std::uint8_t>(sequence), payload.data(),
+                                   payload.size(), wire.data()));
+    bus.master->receive(bus.now_us, wire);
+  }
+}
+
 TEST(Connect, StrangeAnswersAreNotTaken) {
   FakeBus bus;
   bus.connect();
   const std::int32_t before = bus.master->view(McuIndex{0}).report.motor[0].position_steps;
   bushd_report forged = bus.master->view(McuIndex{0}).report;
   forged.motor[0].position_steps = 99;
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_report(&forged, payload.data()));
-  for (int sequence = 0; sequence < 256; ++sequence) {
-    Bytes wire(BUSHD_FRAME_MAX_WIRE);
-    wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
-                                   static_cast<std::uint8_t>(sequence), payload.data(),
-                                   payload.size(), wire.data()));
-    bus.master->receive(bus.now_us, wire);  // nothing was asked
-  }
+  receive_under_each_number(bus, forged);  // nothing was asked
   EXPECT_EQ(bus.master->view(McuIndex{0}).report.motor[0].position_steps, before);
   bus.master->receive(bus.now_us, Bytes{1, 2, 3, 0, 9, 9, 9, 9, 9, 9, 9, 9, 0});
   EXPECT_EQ(bus.master->bus_health().crc_errors, 2u);
@@ -542,15 +547,7 @@ TEST(Connect, NewsForAnotherMasterAreNotTaken) {
     news.sections = 0;
     news.motors = 1;
     news.motor[0].position_steps = 99;
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_report(&news, payload.data()));
-    for (unsigned sequence = 0; sequence < 256; ++sequence) {
-      Bytes wire(BUSHD_FRAME_MAX_WIRE);
-      wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
-                                     static_cast<std::uint8_t>(sequence), payload.data(),
-                                     payload.size(), wire.data()));
-      bus.master->receive(bus.now_us, wire);
-    }
+    receive_under_each_number(bus, news);
   };
   bus.slaves[0].loses = [](const Heard& h) { return h.type == BUSHD_MSG_POLL; };
   const auto asked = [&] {
