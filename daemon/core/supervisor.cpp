@@ -126,17 +126,17 @@ void Supervisor::goes_offline(std::int64_t now_us, Mcu& mcu) {
 
 void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
   heard_[mcu.id].report_us = now_us;
+  const bool other_master = installation_.bus_of(mcu).hears_two_masters(now_us);
   for (const MotorId id : mcu.motors()) {
     motion::Motor& motor = installation_[id];
     if (!is_reported(mcu, motor)) continue;
     journal_.before_report(id, positions_.counter_being_set(id) || kept_.being_restored(id));
-    moves_.take(
-        now_us, id,
-        motor.report({.of_mcu = mcu.report(),
-                      .tick = mcu.view().tick,
-                      .requests_open = mcu.busy(),
-                      .emergency_stop_open = emergency_stop_.under_way(),
-                      .other_master = installation_.bus_of(mcu).hears_two_masters(now_us)}));
+    moves_.take(now_us, id,
+                motor.report({.of_mcu = mcu.report(),
+                              .tick = mcu.view().tick,
+                              .requests_open = mcu.busy(),
+                              .emergency_stop_open = emergency_stop_.under_way(),
+                              .other_master = other_master}));
   }
   journal_.after_report(mcu);
   for (Service* service : services_) service->reports(now_us, mcu);

@@ -98,11 +98,13 @@ void LcmFront::on_message(std::string_view channel, lcm::Payload payload, std::i
   }
 }
 
-// Its own come back to it, as to all.
+// Its own come back to it, as to all; of many motors they are long.
 void LcmFront::on_description(lcm::Payload payload) {
+  const auto part = lcm::part_of_description(payload);
+  if (!part || part->run == setup_.run) return;
   const auto message = lcm::decode_daemon_message("DESCRIPTION", payload);
   const auto* of = message ? std::get_if<lcm::DescriptionMessage>(&*message) : nullptr;
-  if (of == nullptr || of->part.run == setup_.run) return;
+  if (of == nullptr) return;
   ++others_heard_;
   other_bus_ = printable(of->snapshot.bus);
 }

@@ -130,17 +130,32 @@ void StatePublisher::publish_all(std::int64_t now_us) {
 
 void StatePublisher::publish_due(std::int64_t now_us) {
   anew_ |= installation_.changed;
-  all_rest_ = true;
+  moving_.clear();
   for (const McuId id : installation_.mcus()) {
     const Mcu& mcu = installation_[id];
-    const bool rests = installation_.rests(mcu);
-    all_rest_ &= rests;
-    if (anew_ || !rests || !is_as_told(now_us, mcu)) publish(now_us, id);
+    if (!installation_.rests(mcu)) {
+      moving_.push_back(id);
+    } else if (anew_ || !is_as_told(now_us, mcu)) {
+      publish(now_us, id);
+    }
   }
+  all_rest_ = moving_.empty();
+  publish_moving(now_us);
   publish_axes(now_us);
   installation_.changed = anew_ = false;
   sent_us_ = now_us;
   due_us_ = now_us + kPeriodUs;
+}
+
+void StatePublisher::publish_moving(std::int64_t now_us) {
+  if (anew_ || moving_.size() <= kMostInMotion) {
+    for (const McuId id : moving_) publish(now_us, id);
+    return;
+  }
+  const auto from = std::ranges::lower_bound(moving_, first_moving_);
+  std::ranges::rotate(moving_, from == moving_.end() ? moving_.begin() : from);
+  for (std::size_t i = 0; i < kMostInMotion; ++i) publish(now_us, moving_[i]);
+  first_moving_ = moving_[kMostInMotion];
 }
 
 // A snapshot is long, and most MCUs rest. Precondition: this one does.

@@ -211,5 +211,7 @@ std::span<const std::string_view> daemon_channels();
 // Nothing for what is no message of the daemon's, nor for one with an unknown word in an
 // enumeration.
 std::optional<DaemonMessage> decode_daemon_message(std::string_view channel, Payload payload);
+// What may be a description begins with it; the rest is not looked at.
+std::optional<Part> part_of_description(Payload payload);
 
 }  // namespace bushd::lcm

@@ -56,4 +56,8 @@ std::optional<DaemonMessage> decode_daemon_message(std::string_view channel, Pay
   return out ? out : decode_reply(channel, payload);
 }
 
+std::optional<Part> part_of_description(Payload payload) {
+  return decode_first<DescriptionMessage, Part>(payload);
+}
+
 }  // namespace bushd::lcm

@@ -5,7 +5,6 @@
 // before anything is allocated for it.
 #pragma once
 
-#include <array>
 #include <bit>
 #include <concepts>
 #include <cstddef>
@@ -16,6 +15,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "base/fields.h"
@@ -77,7 +77,10 @@ using Told = std::decay_t<decltype(std::declval<const Form&>().told(std::declval
 class Writer {
  public:
   static constexpr bool kReads = false;
-  explicit Writer(std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
+  explicit Writer(std::vector<std::uint8_t>& bytes) : bytes_(bytes), size_(bytes.size()) {}
+  ~Writer() { bytes_.resize(size_); }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
 
   void operator()(const fields::Field& /*field*/, const auto& value) { put(value); }
   void operator()(const fields::Field& /*field*/, const auto& value, const auto& form) {
@@ -99,26 +102,32 @@ class Writer {
   template <class T>
   void put(const T& value) {
     if constexpr (std::same_as<T, bool>) {
-      bytes_.push_back(value ? 1 : 0);
+      *more(1) = value ? 1 : 0;
     } else if constexpr (std::same_as<T, double>) {
       put(std::bit_cast<std::uint64_t>(value));
     } else if constexpr (std::integral<T>) {
-      std::array<std::uint8_t, sizeof(T)> told;
+      std::uint8_t* const told = more(sizeof(T));
       std::uint64_t bits = std::make_unsigned_t<T>(value);
       for (std::size_t i = sizeof(T); i-- > 0; bits >>= 8)
         told[i] = static_cast<std::uint8_t>(bits);
-      bytes_.insert(bytes_.end(), told.begin(), told.end());
     } else if constexpr (std::same_as<T, std::string>) {
       put(static_cast<std::int32_t>(value.size() + 1));
-      bytes_.insert(bytes_.end(), value.begin(), value.end());
-      bytes_.push_back(0);
+      std::memcpy(more(value.size() + 1), value.c_str(), value.size() + 1);
       good_ = good_ && value.find('\0') == std::string::npos;
     } else {
       T::fields(value, *this);
     }
   }
 
-  std::vector<std::uint8_t>& bytes_;
+  // Where the next ones go.
+  std::uint8_t* more(std::size_t count) {
+    if (bytes_.size() - size_ < count) bytes_.resize(kFirstBytes + 2 * bytes_.size() + count);
+    return bytes_.data() + std::exchange(size_, size_ + count);
+  }
+
+  static constexpr std::size_t kFirstBytes = 512;
+  std::vector<std::uint8_t>& bytes_;  // longer than what has been written, until this ends
+  std::size_t size_;
   bool good_ = true;
 };
 
@@ -289,10 +298,12 @@ Result<std::vector<std::uint8_t>> checked(std::string_view channel, std::vector<
 template <class T>
 std::vector<std::uint8_t> bytes_of(const T& message, bool& good) {
   std::vector<std::uint8_t> bytes;
-  wire::Writer writer(bytes);
-  writer("fingerprint", fingerprint<T>());
-  T::fields(message, writer);
-  good = writer.good();
+  {
+    wire::Writer writer(bytes);
+    writer("fingerprint", fingerprint<T>());
+    T::fields(message, writer);
+    good = writer.good();
+  }
   return bytes;
 }
 template <class T>
@@ -317,6 +328,18 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
   T::fields(message, reader);
   if (!reader.good() || !reader.at_end()) return std::nullopt;
   return message;
+}
+
+// What a message of type T begins with, of which it is not known whether the rest is good.
+template <class T, class First>
+std::optional<First> decode_first(std::span<const std::uint8_t> payload) {
+  wire::Reader reader(payload);
+  std::uint64_t told = 0;
+  reader("fingerprint", told);
+  if (!reader.good() || told != fingerprint<T>()) return std::nullopt;
+  First first{};
+  First::fields(first, reader);
+  return reader.good() ? std::optional(first) : std::nullopt;
 }
 
 }  // namespace bushd::lcm

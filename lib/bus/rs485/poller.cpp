@@ -21,6 +21,9 @@ constexpr std::int64_t kAnswersAtRestUs = 5'000;
 constexpr std::int64_t kShareAtRest = 2;
 constexpr std::int64_t kUnitUs = BUSHD_REPLY_UNIT_NS / 1000;
 constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
+// Turns begin at multiples of this, so that many buses have theirs at once, and one wake of the
+// program serves them all.
+constexpr std::int64_t kTurnUs = 5'000;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
 // A poll of one MCU takes about as long. Who has news by then is waited for: asked apart it would
 // have to wait until that poll is over, and for as long again.
@@ -225,7 +228,7 @@ bool Poller::send(std::int64_t now_us) {
     mcus_[window.mcu].poll_wanted = false;
     Polled& polled = polled_[window.mcu];
     polled.due = false;
-    polled.routine_us = now_us + kPollPeriodUs;
+    polled.routine_us = (now_us + kPollPeriodUs) / kTurnUs * kTurnUs;
     if (polled.news_us > arrives_us) continue;
     expect_news(window.mcu, INT64_MAX);
     extra = true;

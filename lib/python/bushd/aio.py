@@ -134,7 +134,7 @@ class Client(Moving):
     async def watch(self, every_s: float = 0.1) -> AsyncIterator[model.Status]:
         """States as they come, at most one in so many seconds: `for status in client.watch(): ...`.
 
-        20 times a second while a motor moves, else twice. Raises NoDaemon when they cease.
+        20 times a second while a motor moves (of more than 128 such MCUs, in turns), else twice. Raises NoDaemon when they cease.
         """
         collector = StatusCollector()
         self._driver.subscribe(collector)

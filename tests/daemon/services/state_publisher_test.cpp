@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <string>
 
 #include "daemon/bench.h"
 #include "daemon/live_bench.h"
@@ -38,6 +40,50 @@ TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   EXPECT_EQ(bench.states.back().state, api::McuState::kOffline);
   EXPECT_EQ(bench.states.back().motors.at(0).name, "m03");
   EXPECT_EQ(bench.states.back().program, "scan runs");
+}
+
+// So many MCUs of one motor, 26 on a bus.
+std::string very_many(int mcus) {
+  std::string toml = "[[group]]\nname = \"g\"\ntable = \"bushd2-constant\"\n";
+  for (int i = 0; i < mcus; ++i) {
+    const std::string bus = "b" + std::to_string(i / 26);
+    const std::string address = std::to_string(i % 26 + 1);
+    if (i % 26 == 0) {
+      toml += "[[bus]]\nname = \"" + bus + "\"\nport = \"/dev/" + bus +
+              "\"\nbaud = 4000000\ntick_us = 2560\nformat = \"fine\"\nmoves = \"table\"\n";
+    }
+    toml += "[[mcu]]\nbus = \"" + bus + "\"\naddress = " + address + "\n[[motor]]\nname = \"m" +
+            std::to_string(i) + "\"\nmcu = \"" + bus + ":" + address +
+            "\"\noutput = 0\ngroup = \"g\"\n";
+  }
+  return toml;
+}
+
+// 130 MCUs that move: 128 each time, those that were left out first.
+TEST(StatePublisher, TellsOfVeryManyThatMoveInTurns) {
+  constexpr int kMcus = 130;
+  Bench bench(very_many(kMcus));
+  const PseudoAxes none(bench.installation);
+  const OpenMoves nobody(bench.installation);
+  StatePublisher publisher(bench.installation, none, nobody, [](McuId) { return ""; }, bench);
+  publisher.step(0);
+  ASSERT_EQ(bench.states.size(), std::size_t{kMcus});
+  for (int i = 0; i < kMcus; ++i) {
+    bench.installation[MotorId{static_cast<std::size_t>(i)}].enter_program();
+  }
+  std::map<std::string, int> told;
+  for (int turn = 1; turn <= 65; ++turn) {
+    bench.states.clear();
+    publisher.step(turn * StatePublisher::kPeriodUs);
+    EXPECT_EQ(bench.states.size(), 128u);
+    for (const api::StateSnapshot& state : bench.states) ++told[state.mcu];
+  }
+  ASSERT_EQ(told.size(), std::size_t{kMcus});
+  for (const auto& [mcu, times] : told) EXPECT_EQ(times, 64) << mcu << ", of 65 * 128 / 130";
+  bench.installation.changed = true;
+  bench.states.clear();
+  publisher.step(66 * StatePublisher::kPeriodUs);
+  EXPECT_EQ(bench.states.size(), std::size_t{kMcus}) << "a change is told of all at once";
 }
 
 class RestingMcu : public testing::Test {
