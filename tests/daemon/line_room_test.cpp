@@ -115,5 +115,78 @@ TEST(LineRoom, NewTargetsAreStreamed) {
   EXPECT_EQ(lab.shaft_steps("m01"), 30'100);
 }
 
+// Paths and trajectories are told tick by tick, of which the line carries those of some 24 motors.
+TEST(LineRoom, PathsAndTrajectoriesAreAskedWhenTheyBegin) {
+  Lab lab(crowd("fine_table", "refuse"));
+  lab.connect();
+  const auto many = motors(1, 40);
+  const std::vector<double> there(many.size(), 100);
+  const Answer path =
+      lab.wait(lab.send(api::MovePath{.motors = many, .rows = 1, .positions = there}));
+  EXPECT_EQ(path.phase, Answer::kRefused);
+  EXPECT_THAT(path.reason, HasSubstr("bus hall has no room for it: polls take "));
+  std::vector<double> rows(many.size(), 0);
+  rows.insert(rows.end(), there.begin(), there.end());
+  rows.insert(rows.end(), there.begin(), there.end());
+  api::Follow trajectory{.part = api::Follow::Part::kLastRows,
+                         .array = 1,
+                         .motors = many,
+                         .time_s = {0, 2, 3},
+                         .positions = rows};
+  EXPECT_EQ(lab.wait(lab.send(trajectory)).result, "done") << "rows alone move nothing";
+  const Answer run =
+      lab.wait(lab.send(api::Follow{.part = api::Follow::Part::kRun, .array = 1, .motors = many}));
+  EXPECT_EQ(run.phase, Answer::kRefused);
+  EXPECT_THAT(run.reason, HasSubstr("has no room for it"));
+  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  const auto few = lab.send(
+      api::MovePath{.motors = motors(1, 16), .rows = 1, .positions = std::vector<double>(16, 100)});
+  EXPECT_EQ(lab.wait(few).result, "reached");
+}
+
+// It would begin when its key may have been let go long ago.
+TEST(LineRoom, AJogThatDoesNotFitIsRefusedAlsoWhereOthersWait) {
+  Lab lab(crowd("fine_table", "queue"));
+  lab.connect();
+  const auto path = lab.send(api::MovePath{
+      .motors = motors(1, 20), .rows = 1, .positions = std::vector<double>(20, 20'000)});
+  lab.run_for(0.5);
+  Answer last;
+  std::string motor;
+  for (int m = 21; m <= 256 && last.phase != Answer::kRefused; ++m) {
+    motor = motors(m, m).front();
+    last = lab.last_reply(
+        lab.send(api::Jog{.motor = motor, .per_s = 50, .in_steps = true, .keepalive_ms = 5'000}));
+    lab.run_for(0.01);
+  }
+  ASSERT_EQ(last.phase, Answer::kRefused);
+  EXPECT_THAT(last.reason, HasSubstr("has no room for it"));
+  EXPECT_THAT(last.reason, testing::Not(HasSubstr("queue")));
+  EXPECT_FALSE(lab.has_result(path));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
+  EXPECT_EQ(lab.shaft_steps(motor), 0);
+  EXPECT_EQ(lab.mcu_health("hall:1").ramp_downs, 0u);
+}
+
+// Where one bus has no room, nothing moves on the other.
+TEST(LineRoom, AMoveOfTwoBusesNeedsRoomOnBoth) {
+  Lab lab(crowd("fine_ticks", "refuse") +
+          "[[bus]]\nname = \"annex\"\nport = \"/dev/null1\"\nbaud = 500000\ntick_us = 2560\n"
+          "format = \"fine\"\n[[mcu]]\nbus = \"annex\"\naddress = 1\n[[motor]]\nname = \"a\"\n"
+          "mcu = \"annex:1\"\noutput = 0\ngroup = \"axes\"\n");
+  lab.connect();
+  const auto first = lab.send(Ask::kMoveBy, motors(1, 16), each(16, 2'000));
+  lab.run_for(0.3);
+  std::vector<std::string> both = motors(17, 32);
+  both.emplace_back("a");
+  const Answer refused = lab.wait(lab.send(Ask::kMoveBy, both, each(17, 400)));
+  EXPECT_EQ(refused.phase, Answer::kRefused);
+  EXPECT_THAT(refused.reason, HasSubstr("bus hall has no room for it"));
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"a"}, {100})).result, "reached");
+  EXPECT_EQ(lab.shaft_steps("a"), 100) << "of the second move alone";
+  EXPECT_EQ(lab.wait(first).result, "reached");
+  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, both, each(17, 400))).result, "reached");
+}
+
 }  // namespace
 }  // namespace bushd::test
