@@ -19,8 +19,8 @@ std::vector<PortTarget> targets_that_tell_empty() {
   return those;
 }
 
-// Whose driver tells what it still has. Of what others hold untold it is taken for granted that it
-// leaves within 20 ms, so none of them is stalled.
+// Whose driver tells what it still has. Others are taken to be late by no more than 20 ms, so what
+// they hold untold is not stalled in motion.
 class PortThatTellsEmpty : public Port {};
 INSTANTIATE_TEST_SUITE_P(Of, PortThatTellsEmpty, testing::ValuesIn(targets_that_tell_empty()),
                          [](auto& target) { return target.param.name; });
@@ -285,6 +285,44 @@ TEST_P(PortThatTellsEmpty, AStalledDriverIsNotCountedOn) {
   bench.finish();
   EXPECT_EQ(bench.drive().position_steps(), 3000);
   bench.expect_run(0);
+}
+
+// A driver that has passed nothing on goes on while the daemon stands still: bytes have just begun
+// to leave, however long ago they were written.
+void pass_on_late(PulseBench& bench, int steps, std::uint16_t shortest_delay) {
+  bench.stall(true);
+  bench.begin(steps, shortest_delay);
+  bench.run_for(0.2);
+  ASSERT_EQ(bench.report().moving, 1);
+  bench.pause(0.3);
+  ASSERT_EQ(bench.drive().steps(), 0u);
+  bench.stall(false);
+  bench.pause(0.001);
+}
+
+// Until all have left the motor is not told to rest, nor is the rate or the direction changed.
+TEST_P(Port, BytesThatLeaveLateAreWaitedFor) {
+  for (const std::uint16_t shortest_delay : {std::uint16_t{0}, std::uint16_t{1'500}}) {
+    for (int steps = 1; steps <= 12; ++steps) {
+      PulseBench bench(GetParam());
+      ASSERT_NO_FATAL_FAILURE(pass_on_late(bench, steps, shortest_delay));
+      for (int i = 0; i < 10'000 && bench.report().moving != 0; ++i) bench.run_for(0.0002);
+      EXPECT_EQ(bench.drive().position_steps(), steps);
+      EXPECT_EQ(bench.drive().queued(), 0u) << "after " << steps << " steps";
+      bench.finish();
+      bench.move(-steps);
+      EXPECT_EQ(bench.drive().position_steps(), 0);
+    }
+  }
+}
+
+TEST_P(Port, BytesThatLeaveLateMayBeMissingWhereThePortIsLost) {
+  PulseBench bench(GetParam());
+  ASSERT_NO_FATAL_FAILURE(pass_on_late(bench, 2, 0));
+  bench.run_for(0.004);
+  bench.lose_port();
+  bench.run_for(0.1);
+  EXPECT_EQ(bench.count_of<link::PositionUncertain>(), 1u);
 }
 
 // A port has no communication timeout that ramps down: it makes what was under way, and stands.

@@ -10,7 +10,8 @@ using bushd::sim::TimeNs;
 
 constexpr std::size_t kFifoBytes = 16;
 constexpr TimeNs kAdapterHoldsNs = 15'000'000;
-// With what it holds at most 17 ms, of the 20 that are allowed; so not two pauses within them.
+// With what lay before it there a byte is late by at most 17 ms, of the 20 that are allowed; so not
+// two pauses within them.
 constexpr TimeNs kLongestPauseNs = 2'000'000;
 constexpr TimeNs kPauseEveryNs = 20'000'000;
 constexpr TimeNs kKeyEveryNs = 100'000'000;
@@ -36,6 +37,8 @@ std::uint32_t PulsePort::made_of(std::uint32_t ask) const {
 
 bushd::link::PulseStatus PulsePort::carry_out(TimeNs now_ns, const bushd::link::PulseOrder& order) {
   advance_to(now_ns);
+  const bool turns = order.positive && *order.positive != drive.positive();
+  if (!idle() && (order.baud || turns)) ++changed_amid_bytes_;
   if (order.positive) drive.set_direction(now_ns, *order.positive);
   if (order.baud) drive.set_baud(now_ns, made_of(*order.baud));
   driver_.insert(driver_.end(), order.bytes.begin(), order.bytes.end());
@@ -54,19 +57,27 @@ bushd::link::PulseStatus PulsePort::carry_out(TimeNs now_ns, const bushd::link::
 std::size_t PulsePort::room() const {
   if (hardware_ == Hardware::kUart) return kFifoBytes;
   const TimeNs byte_ns = 10'000'000'000 / drive.baud() + 1;
-  return static_cast<std::size_t>(std::max<TimeNs>(kAdapterHoldsNs / byte_ns, 1));
+  return static_cast<std::size_t>(kAdapterHoldsNs / byte_ns);
+}
+
+// The next byte from the driver: where one takes longer than the adapter may be late, none waits
+// there for the one on the line.
+PulsePort::TimeNs PulsePort::passes_from_ns() const {
+  if (room() > 0) return stalled_until_ns_;
+  return std::max({stalled_until_ns_, drive.line_free_ns(), pause_until_ns_});
 }
 
 void PulsePort::advance_to(TimeNs now_ns) {
   TimeNs t_ns = at_ns_;
   while (true) {
-    while (t_ns >= stalled_until_ns_ && !driver_.empty() && unseen_.size() < room()) {
+    while (!driver_.empty() && unseen_.size() < std::max<std::size_t>(room(), 1) &&
+           t_ns >= passes_from_ns()) {
       unseen_.push_back(driver_.front());
       driver_.pop_front();
     }
     if (unseen_.empty()) {
-      if (driver_.empty() || stalled_until_ns_ > now_ns) break;
-      t_ns = stalled_until_ns_;
+      if (driver_.empty() || passes_from_ns() > now_ns) break;
+      t_ns = passes_from_ns();
       continue;
     }
     const TimeNs start_ns = std::max({t_ns, drive.line_free_ns(), pause_until_ns_});

@@ -20,10 +20,10 @@ namespace bushfaults {
 // hardware it is, the seed decides:
 //
 //     kUart         sixteen bytes, without pauses; tells when it is empty
-//     kAdapter      15 ms of bytes, and it pauses between packets; tells when it is empty
-//     kMuteAdapter  the same, and does not tell. lib/heritage/serial_pulse counts on it that what
-//     such an
-//                   adapter has leaves within 20 ms, so that much is kept here
+//     kAdapter      15 ms of bytes, or one that is just sent, and it pauses between packets; tells
+//                   when it is empty
+//     kMuteAdapter  the same, and does not tell. lib/heritage/serial_pulse takes such an adapter
+//                   to be late by no more than 20 ms, and so it is here
 //
 // A stalled driver passes nothing on for a while; what the hardware has leaves.
 class PulsePort {
@@ -48,10 +48,13 @@ class PulsePort {
     return 5 * static_cast<std::uint32_t>(unseen_.size() + drive.queued());
   }
   bool idle() const { return driver_.empty() && unseen_.empty() && drive.queued() == 0; }
+  // Changes of the rate or the direction while bytes were under way, wherever they were.
+  std::uint64_t changed_amid_bytes() const { return changed_amid_bytes_; }
   Hardware hardware() const { return hardware_; }
 
  private:
   std::size_t room() const;
+  TimeNs passes_from_ns() const;
   std::uint32_t made_of(std::uint32_t ask) const;
 
   bushd::sim::Random random_;
@@ -62,6 +65,7 @@ class PulsePort {
   TimeNs stalled_until_ns_ = 0;
   TimeNs pause_until_ns_ = 0;
   TimeNs next_pause_ns_ = 0;
+  std::uint64_t changed_amid_bytes_ = 0;
   std::deque<std::uint8_t> driver_;
   std::deque<std::uint8_t> unseen_;
 };

@@ -188,7 +188,7 @@ void BareWorld::advance_to(TimeNs now_ns) {
         port.pulses->drive.set_lines(0);
         port.lines_until_ns = 0;
       }
-      if (port.pulses->drive.faults() > 0) {
+      if (port.pulses->changed_amid_bytes() > 0) {
         recent_.note(now_ns,
                      config_.buses[port.bus].name + ": rate or direction changed amid bytes");
         judge_.line_violated(now_ns, port.motors.front());

@@ -23,7 +23,8 @@ void SerialPulseMaster::count_gone(std::int64_t now_us) {
     sent_.pop_front();
   }
   if (drained(now_us)) recent_.clear();
-  while (!recent_.empty() && recent_.front().gone_ns + kUnseenUs * 1000 <= asked_ns) {
+  while (!recent_.empty() && recent_.front().passed_free_ns &&
+         *recent_.front().passed_free_ns + kUnseenUs * 1000 <= asked_ns) {
     recent_.pop_front();
   }
 }
@@ -45,19 +46,36 @@ void SerialPulseMaster::follow_queue() {
   line_free_ns_ = free_ns;
 }
 
+// What the driver has no more it may have passed on just now, all at once, however long ago it was
+// written: a driver may have stood since it was asked last.
+void SerialPulseMaster::follow_passed_on() {
+  const std::size_t queued = std::min(status_->queued, recent_.size());
+  for (std::size_t i = 0; i < recent_.size() - queued; ++i) {
+    Sent& byte = recent_[i];
+    if (byte.passed_free_ns) continue;
+    passed_free_ns_ = std::max(passed_free_ns_, status_us_ * 1000) + byte.takes_ns;
+    byte.passed_free_ns = passed_free_ns_;
+  }
+}
+
+// A driver that has nothing, and cannot tell what is behind it, has nothing there from then on.
+std::int64_t SerialPulseMaster::drained_us() const {
+  return us_of(std::max(line_free_ns_, passed_free_ns_)) + kUnseenUs;
+}
+
 bool SerialPulseMaster::drained(std::int64_t now_us) const {
   const std::int64_t free_us = us_of(line_free_ns_);
   if (!sent_.empty() || now_us < free_us || status_us_ < free_us) return false;
   if (status_->queued > 0) return false;
   if (status_->empty) return *status_->empty;
-  return now_us >= std::max(free_us, quiet_since_us_) + kUnseenUs;
+  return now_us >= drained_us();
 }
 
 void SerialPulseMaster::wait_until_drained(std::int64_t now_us) {
   const std::int64_t free_us = us_of(line_free_ns_);
   if (status_us_ < free_us) return ask_at(std::max(free_us, now_us));
   if (status_->queued > 0 || status_->empty) return ask_at(now_us + kDrainAskUs);
-  wake_at(std::max(free_us, quiet_since_us_) + kUnseenUs);
+  wake_at(drained_us());
 }
 
 // Since it was asked last the driver may have done nothing.

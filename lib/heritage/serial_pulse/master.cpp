@@ -139,9 +139,11 @@ void SerialPulseMaster::pulse_status(std::int64_t now_us, const link::PulseStatu
   now_us_ = now_us;
   if (!status_ || status.positive != status_->positive) direction_us_ = now_us;
   if (!status_ || status.lines != status_->lines) report_due_us_ = now_us;
-  const bool quiet = status.queued == 0 && (!order_ || order_->bytes.empty());
-  if (!quiet || !status_ || status_->queued > 0 || (order_ && !order_->bytes.empty())) {
-    quiet_since_us_ = now_us;
+  // As much as is ever under way may be another program's.
+  if (!status_ || (view_.phase != link::McuPhase::kOnline && status_->queued > 0)) {
+    const std::int64_t one_ns =
+        status.baud > 0 ? static_cast<std::int64_t>(byte_ns(status.baud)) : 0;
+    passed_free_ns_ = now_us * 1000 + std::max(kMostAheadUs * 1000, kSpareUs * 1000 + one_ns);
   }
   if (order_ && order_->baud) {
     made_[*order_->baud] = status.baud;
@@ -151,6 +153,7 @@ void SerialPulseMaster::pulse_status(std::int64_t now_us, const link::PulseStatu
   status_ = status;
   status_us_ = now_us;
   follow_queue();
+  follow_passed_on();
   for (const int direction : {-1, 1}) {
     if (at_limit(direction)) limit_us_[direction > 0] = now_us;
   }

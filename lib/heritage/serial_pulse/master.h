@@ -51,7 +51,7 @@ class SerialPulseMaster final : public link::BusMaster,
   // Bytes under way, at most: where one takes nearly as long or longer, it and as much before it.
   static constexpr std::int64_t kMostAheadUs = 20'000;
   static constexpr std::int64_t kSpareUs = 5'000;
-  // An adapter that cannot be asked may still have what it was given so long ago.
+  // What an adapter that cannot be asked has leaves so much later, at most, than it would at once.
   static constexpr std::int64_t kUnseenUs = 20'000;
   // The direction is set as long before a step, and kept as long behind it.
   static constexpr std::int64_t kDirectionUs = 1'000;
@@ -123,6 +123,8 @@ class SerialPulseMaster final : public link::BusMaster,
     // On a line: times of its run at which the first and the last of them are due.
     std::int64_t first_ns;
     std::int64_t last_ns;
+    // When it has left at the latest, by its rate, since the driver has passed it on.
+    std::optional<std::int64_t> passed_free_ns{};
   };
   // Steps to be made. `ahead` is ahead of `by_ticks` by what is under way.
   struct Run {
@@ -171,6 +173,8 @@ class SerialPulseMaster final : public link::BusMaster,
   // What has left.
   void count_gone(std::int64_t now_us);
   void follow_queue();
+  void follow_passed_on();
+  std::int64_t drained_us() const;
   bool drained(std::int64_t now_us) const;
   void wait_until_drained(std::int64_t now_us);
   std::uint32_t unsure_steps() const;
@@ -233,7 +237,6 @@ class SerialPulseMaster final : public link::BusMaster,
   bool fresh_ = false;                     // it is of the last step
   std::optional<link::PulseStatus> status_;
   std::int64_t status_us_ = 0;
-  std::int64_t quiet_since_us_ = 0;    // the driver has had no byte
   std::int64_t direction_due_us_ = 0;  // when it may be ordered again
   std::int64_t direction_us_ = 0;      // when the direction was seen as it is
   std::int64_t wake_us_ = 0;
@@ -248,6 +251,8 @@ class SerialPulseMaster final : public link::BusMaster,
   std::deque<Sent> sent_;          // on their way, by their rates
   std::deque<Sent> recent_;        // of late, and not known for sure to have left
   std::int64_t line_free_ns_ = 0;  // when all have left, by their rates
+  // At the latest, by their rates, of what the driver has passed on.
+  std::int64_t passed_free_ns_ = 0;
 
   link::Tick base_tick_ = 0;  // at base_us_; while a planned run is under way ticks follow that
   std::int64_t base_us_ = 0;
