@@ -1,17 +1,33 @@
 #include "daemon/model/precedence.h"
 
-#include <algorithm>
-#include <concepts>
+#include <type_traits>
 #include <utility>
-
-#include "base/overloaded.h"
 
 namespace bushd::daemon {
 namespace {
 
-// Requests are named all: a new one has to be placed.
-template <class Request, class... Of>
-concept OneOf = (std::same_as<Request, Of> || ...);
+// None named: all.
+std::vector<MotorId> motors_of(const Installation& installation, const auto& asked) {
+  api::MotorNames names;
+  if constexpr (requires { asked.motors.front().amount; }) {
+    if (asked.motors.empty()) return {};
+    for (const api::MotorAmount& amount : asked.motors) names.push_back(amount.motor);
+  } else if constexpr (requires { asked.motors; }) {
+    names = asked.motors;
+  } else if constexpr (requires { asked.motor; }) {
+    names = {asked.motor};
+  }
+  return installation.find_known(names, requires { asked.kNamesGroups; }).motors;
+}
+
+std::vector<MotorId> motors_of(const Installation& installation, const api::Home& asked) {
+  if (!asked.all) return installation.find_known(asked.motors, false).motors;
+  std::vector<MotorId> motors;
+  for (const MotorId motor : installation.motors()) {
+    if (installation.config()[motor].home) motors.push_back(motor);
+  }
+  return motors;
+}
 
 }  // namespace
 
@@ -35,36 +51,18 @@ void Precedence::note(const api::Asker& asker, const api::Request& request) {
       if (stops[motor].number < stop.number) stops[motor] = stop;
     }
   };
-  const auto with_lines = [this](const api::MotorNames& names, bool groups) {
-    return installation_.with_lines(installation_.find_known(names, groups).motors);
+  const auto note_motors = [&](const auto& asked) {
+    if (!api::ends(asked.motion())) return;
+    std::vector<MotorId> motors = motors_of(installation_, asked);
+    if (asked.motion() == api::Motion::kEndsOnLines) {
+      motors = installation_.with_lines(std::move(motors));
+    }
+    note(newest_, motors);
+    using Asked = std::remove_cvref_t<decltype(asked)>;
+    if constexpr (std::is_same_v<Asked, api::Hold>) note(holds_, motors);
+    if constexpr (std::is_same_v<Asked, api::EmergencyStop>) note(emergency_stops_, motors);
   };
-  std::visit(
-      Overloaded{[&](const api::Stop& r) { note(newest_, with_lines(r.motors, false)); },
-                 [&](const api::EmergencyStop&) {
-                   const auto all = with_lines({}, false);
-                   note(newest_, all);
-                   note(emergency_stops_, all);
-                 },
-                 [&](const api::Pause& r) { note(newest_, with_lines(r.motors, true)); },
-                 [&](const api::Hold& r) {
-                   const auto motors = installation_.find_known(r.motors, true).motors;
-                   note(newest_, motors);
-                   note(holds_, motors);
-                 },
-                 [&](const api::Disarm& r) {
-                   note(newest_, installation_.find_known(r.motors, false).motors);
-                 },
-                 [&](const api::Jog& r) {
-                   note(newest_, installation_.find_known({r.motor}, false).motors);
-                 },
-                 [](const OneOf<api::Move, api::Enable, api::Disable, api::ClearFaults,
-                                api::SetPosition, api::UseTable, api::ReloadTables, api::Home,
-                                api::Arm, api::PositionCompare, api::ListTables, api::GetTable,
-                                api::SetTable, api::Confirm, api::GetHistory, api::Resume,
-                                api::Release, api::Configure, api::MoveLine, api::MovePath,
-                                api::Camac, api::Follow, api::ArmLine, api::PutProgram,
-                                api::EraseProgram, api::RunPrograms, api::ListPrograms> auto&) {}},
-      request);
+  std::visit(note_motors, request);
 }
 
 void Precedence::note_all(const std::string& by) {
@@ -85,59 +83,20 @@ std::optional<Precedence::Overtaken> Precedence::overtaken(
   return find(newest_, after_stops, motors);
 }
 
-std::vector<MotorId> Precedence::motors_of(const api::Home& request) const {
-  if (!request.all) return installation_.find_known(request.motors, false).motors;
-  std::vector<MotorId> motors;
-  for (const MotorId motor : installation_.motors()) {
-    if (installation_.config()[motor].home) motors.push_back(motor);
-  }
-  return motors;
-}
-
 std::optional<Precedence::Overtaken> Precedence::overtaken(const api::Asker& asker,
                                                            const api::Request& request) const {
   if (asker.after_stops >= counted_.stops()) return std::nullopt;
-  using Answer = std::optional<Overtaken>;
-  const auto moves = [&](const std::vector<MotorId>& motors) {
-    return overtaken(asker.after_stops, motors);
+  const auto by = [&](const auto& asked) -> std::optional<Overtaken> {
+    const auto stops = [&]() -> const Stops* {
+      if (asked.motion() == api::Motion::kBegins) return &newest_;
+      if (asked.motion() == api::Motion::kLiftsHold) return &holds_;
+      if (asked.motion() == api::Motion::kLiftsEmergencyStop) return &emergency_stops_;
+      return nullptr;
+    }();
+    if (stops == nullptr) return std::nullopt;
+    return find(*stops, asker.after_stops, motors_of(installation_, asked));
   };
-  const auto names = [this](const auto& amounts) {
-    api::MotorNames all;
-    for (const api::MotorAmount& amount : amounts) all.push_back(amount.motor);
-    return all.empty() ? std::vector<MotorId>() : installation_.find_known(all, false).motors;
-  };
-  return std::visit(
-      Overloaded{
-          [&](const api::Move& r) { return r.dry_run ? Answer() : moves(names(r.motors)); },
-          [&](const api::MoveLine& r) { return r.dry_run ? Answer() : moves(names(r.motors)); },
-          [&](const api::Arm& r) { return moves(names(r.motors)); },
-          [&](const api::ArmLine& r) { return moves(names(r.motors)); },
-          [&](const api::Home& r) { return moves(motors_of(r)); },
-          [&](const api::Jog& r) {
-            return r.renew ? Answer() : moves(installation_.find_known({r.motor}, false).motors);
-          },
-          [&](const api::Resume& r) {
-            return moves(installation_.find_known(r.motors, true).motors);
-          },
-          [&](const api::Release& r) {
-            return find(holds_, asker.after_stops, installation_.find_known(r.motors, true).motors);
-          },
-          [&](const api::ClearFaults& r) {
-            return find(emergency_stops_, asker.after_stops,
-                        installation_.find_known(r.motors, false).motors);
-          },
-          // Only who lets these wait knows their motors.
-          [](const OneOf<api::MovePath, api::Follow, api::Camac, api::RunPrograms> auto&) {
-            return Answer();
-          },
-          [](const OneOf<api::Stop, api::EmergencyStop, api::Pause, api::Hold, api::Disarm,
-                         api::Enable, api::Disable, api::SetPosition, api::UseTable,
-                         api::ReloadTables, api::PositionCompare, api::ListTables, api::GetTable,
-                         api::SetTable, api::Confirm, api::GetHistory, api::Configure,
-                         api::PutProgram, api::EraseProgram, api::ListPrograms> auto&) {
-            return Answer();
-          }},
-      request);
+  return std::visit(by, request);
 }
 
 }  // namespace bushd::daemon

@@ -1,5 +1,5 @@
 // What a stop ends of what has not begun: all that arrived before it, from whomever and wherever it
-// waits. Stops are counted as they arrive (api::ends_motion), and every request knows after how
+// waits. Stops are counted as they arrive (api::Motion), and every request knows after how
 // many of them it arrived (api::Asker::after_stops). So one comparison tells, for each motor,
 // whether a stop of this motor has come since.
 //
@@ -57,7 +57,6 @@ class Precedence {
 
   std::optional<Overtaken> find(const Stops& stops, std::uint64_t after_stops,
                                 const std::vector<MotorId>& motors) const;
-  std::vector<MotorId> motors_of(const api::Home& request) const;
 
   const Installation& installation_;
   StopCount counted_;

@@ -94,6 +94,7 @@ struct Move {
       "target; its part in the move before ends with stopped. Refused as a whole if one motor "
       "cannot move. The outcome is the worst of its motors.";
   static constexpr std::string_view kResult = "reached; of a dry run done";
+  Motion motion() const { return dry_run ? Motion::kNone : Motion::kBegins; }
   static void fields(auto& self, auto& visit) {
     visit("kind", self.kind, kKind);
     visit(kDryRun, self.dry_run);
@@ -130,6 +131,7 @@ struct MoveLine {
       "limits of one of them ramp all down along the line. The reason of the result names the "
       "motor that limits the line, and how far motors are off it.";
   static constexpr std::string_view kResult = "reached; of a dry run done";
+  Motion motion() const { return dry_run ? Motion::kNone : Motion::kBegins; }
   static void fields(auto& self, auto& visit) {
     visit("kind", self.kind, Move::kKind);
     visit(kDryRun, self.dry_run);
@@ -172,6 +174,7 @@ struct MovePath {
       "them ramp all down along the path.";
   static constexpr std::string_view kResult =
       "reached; of a dry run, and of points that others follow, done";
+  static constexpr Motion motion() { return Motion::kBeginsByService; }
   static void fields(auto& self, auto& visit) {
     visit({"rows", "points of the whole path", kRows}, self.rows);
     visit({"first_row", "of this request; as many as have been taken before"}, self.first_row);
@@ -216,6 +219,7 @@ struct Follow {
       "motion, or without its last row, ramps its motors down by their tables.";
   static constexpr std::string_view kResult =
       "of rows done, when they have been checked; of RUN reached";
+  static constexpr Motion motion() { return Motion::kBeginsByService; }
   static void fields(auto& self, auto& visit) {
     visit("part", self.part, kPart);
     visit({"array",

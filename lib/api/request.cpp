@@ -14,12 +14,7 @@ std::string_view name_of(const Request& request) {
 }
 
 bool ends_motion(const Request& request) {
-  return std::visit(
-      [](const auto& content) {
-        if constexpr (requires { content.ends_motion(); }) return content.ends_motion();
-        return false;
-      },
-      request);
+  return ends(std::visit([](const auto& content) { return content.motion(); }, request));
 }
 
 bool is_repeatable(const Request& request) {

@@ -1,6 +1,7 @@
 // Everything that can be asked of the daemon: one type per request. A new request is a new type,
-// its place in the variant below and a service in the core; no other request changes. What ends
-// motion, or is harmless when it is carried out twice, says so (below: ends_motion, is_repeatable).
+// its place in the variant below and a service in the core; no other request changes. Each says
+// what it does to motion (api/words.h: Motion); what is harmless when it is carried out twice, and
+// what names groups beside motors, says so (is_repeatable, kNamesGroups).
 //
 // Motors and groups are named as in the configuration. Front ends pass names and numbers as they
 // come, however wrong: the core resolves them, checks every range and refuses with a reason. So the
@@ -34,7 +35,7 @@ struct Stop {
       "motors.";
   static constexpr std::string_view kResult =
       "done, once they stand; fault where a name is unknown, link where an MCU is not online";
-  static constexpr bool ends_motion() { return true; }
+  static constexpr Motion motion() { return Motion::kEndsOnLines; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
 };
@@ -47,7 +48,7 @@ struct EmergencyStop {
   static constexpr std::string_view kResult =
       "done, once all MCUs that are online have latched the stop and stand; the reason names the "
       "others";
-  static constexpr bool ends_motion() { return true; }
+  static constexpr Motion motion() { return Motion::kEnds; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };
@@ -60,6 +61,7 @@ struct Enable {
   static constexpr std::string_view kResult =
       "done; of all: where an MCU is online, the reason names the others. Of some motors of an MCU "
       "the reason names its other ones";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
 };
 
@@ -70,6 +72,7 @@ struct Disable {
   static constexpr std::string_view kMeaning =
       "Disables the drivers of the MCUs of these motors. Refused while one of them moves.";
   static constexpr std::string_view kResult = "as of enable_t";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
 };
 
@@ -83,6 +86,7 @@ struct SetPosition {
       "the offset, so that where it stands is this user position. Otherwise, and with `dial`: sets "
       "the position, which is known then.";
   static constexpr std::string_view kResult = "done; a position that was set is known";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) {
     visit({"dial", "user units are those of the dial"}, self.dial);
     names_fields(self, visit, "motors", kOneMotorOrMore);
@@ -96,6 +100,7 @@ struct ClearFaults {
   static constexpr std::string_view kMeaning =
       "Clears latched faults of the MCUs of these motors. Refused while one moves.";
   static constexpr std::string_view kResult = "as of enable_t";
+  static constexpr Motion motion() { return Motion::kLiftsEmergencyStop; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
 };
 
@@ -109,6 +114,7 @@ struct Home {
       "Motors, at rest, look for their switches, those of one MCU one after the other.";
   static constexpr std::string_view kResult =
       "reached: found their switches, and moved on where `home` has a `then`; their trust is known";
+  static constexpr Motion motion() { return Motion::kBegins; }
   static void fields(auto& self, auto& visit) {
     speed_fields(self.speed, visit,
                  "of the fast approach; 0: as fast as table and max_speed allow");
@@ -139,6 +145,7 @@ struct Arm {
       "Motors, at rest, wait for an edge at the trigger input of their MCU; those of one MCU begin "
       "together after it.";
   static constexpr std::string_view kResult = "reached, after the trigger has come";
+  static constexpr Motion motion() { return Motion::kBegins; }
   static void fields(auto& self, auto& visit) {
     visit("edge", self.edge, kEdge);
     visit(kDelay, self.delay_us);
@@ -164,6 +171,7 @@ struct ArmLine {
       "table. Each MCU begins by the edge at its own input; one that has it more than a tick later "
       "ends the line.";
   static constexpr std::string_view kResult = "reached, after the trigger has come";
+  static constexpr Motion motion() { return Motion::kBegins; }
   static void fields(auto& self, auto& visit) {
     visit("edge", self.edge, kEdge);
     visit(Arm::kDelay, self.delay_us);
@@ -182,7 +190,7 @@ struct Disarm {
   static constexpr std::string_view kMeaning =
       "These motors, and all that were armed with them, wait for the trigger no more.";
   static constexpr std::string_view kResult = "done, when they no longer wait";
-  static constexpr bool ends_motion() { return true; }
+  static constexpr Motion motion() { return Motion::kEnds; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
 };
 
@@ -215,6 +223,7 @@ struct PositionCompare {
       "The position compare output of the motor's MCU pulses when the motor arrives at the "
       "position.";
   static constexpr std::string_view kResult = "done";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) {
     MotorAmount position{self.motor, self.position};
     visit("position", position);
@@ -235,6 +244,7 @@ struct Confirm {
   static constexpr std::string_view kMeaning =
       "The positions of these motors, at rest, are right as their MCUs count them: they are known.";
   static constexpr std::string_view kResult = "done; their positions are known";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) {
     names_fields(self, visit, "motors", {"motor_count", "at least 1"});
   }
@@ -249,6 +259,7 @@ struct GetHistory {
   static constexpr std::string_view kName = "get history";
   static constexpr std::string_view kMeaning =
       "What has moved a motor. Refused without a state store. Answered by history_answer_t.";
+  static constexpr Motion motion() { return Motion::kNone; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) {
     visit("motor", self.motor);
@@ -289,6 +300,7 @@ struct Configure {
       "changes them. Answered by configuration_answer_t with the motors that were named.";
   static constexpr std::string_view kResult =
       "done, once the disk has it; the reason says which motor stands beyond its limits";
+  static constexpr Motion motion() { return Motion::kNone; }
   bool is_repeatable() const { return kind == Kind::kShow; }
   static void fields(auto& self, auto& visit) {
     visit("kind", self.kind, kKind);
@@ -318,7 +330,10 @@ struct Jog {
   static constexpr std::string_view kResult =
       "when the jog ends: done by its client, limit at the soft limit, else stopped; of further "
       "requests and renewals at once";
-  bool ends_motion() const { return per_s == 0 && !renew; }
+  Motion motion() const {
+    if (renew) return Motion::kNone;
+    return per_s == 0 ? Motion::kEnds : Motion::kBegins;
+  }
   static void fields(auto& self, auto& visit) {
     visit("motor", self.motor);
     visit({"speed", kMotorUnitPerS, "signed, on the user's scale; 0 ends the jog"}, self.per_s);
@@ -345,7 +360,8 @@ struct Pause {
       "These motors, as far as they move, ramp down and keep their targets: their moves stay open. "
       "Jogs end. Moves of other motors, homing and what waits for the trigger are left alone.";
   static constexpr std::string_view kResult = "done, once they stand";
-  static constexpr bool ends_motion() { return true; }
+  static constexpr bool kNamesGroups = true;
+  static constexpr Motion motion() { return Motion::kEndsOnLines; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
 };
 
@@ -357,6 +373,8 @@ struct Resume {
       "Motors that are paused go on to their targets. Refused as a whole if one of them may not "
       "move.";
   static constexpr std::string_view kResult = "done";
+  static constexpr bool kNamesGroups = true;
+  static constexpr Motion motion() { return Motion::kBegins; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
 };
 
@@ -368,7 +386,8 @@ struct Hold {
       "No motion of these motors begins, and none that is paused goes on, until they are released. "
       "What is under way goes on.";
   static constexpr std::string_view kResult = "done";
-  static constexpr bool ends_motion() { return true; }
+  static constexpr bool kNamesGroups = true;
+  static constexpr Motion motion() { return Motion::kEnds; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
 };
 
@@ -378,6 +397,8 @@ struct Release {
   static constexpr std::string_view kName = "release";
   static constexpr std::string_view kMeaning = "Motors that are held may move again.";
   static constexpr std::string_view kResult = "done";
+  static constexpr bool kNamesGroups = true;
+  static constexpr Motion motion() { return Motion::kLiftsHold; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
 };
 
@@ -391,6 +412,7 @@ struct Camac {
       "Cycles of a CAMAC crate of the configuration, at once. Answered by camac_reply_t.";
   static constexpr std::string_view kResult =
       "done, at once, with X, Q and data of each cycle; what the motors do is told by the modules";
+  static constexpr Motion motion() { return Motion::kBeginsByService; }
   static void fields(auto& self, auto& visit) {
     visit("crate", self.crate);
     camac::Block::fields(self.block, visit);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/table_file.h"
+#include "api/words.h"
 #include "base/fields.h"
 
 namespace bushd::api {
@@ -23,6 +24,7 @@ struct UseTable {
       "Gives a group another table from its next move on, as soon as its MCUs stand. A later "
       "request for the same group ends this one with stopped.";
   static constexpr std::string_view kResult = "done, once all MCUs of the group have the table";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) {
     visit("group", self.group);
     visit(kTableWithRevision, self.table);
@@ -35,6 +37,7 @@ struct ReloadTables {
   static constexpr std::string_view kResult =
       "done; fault if the table of one of several groups was not valid and the old one stays; "
       "refused if no table that has changed is valid";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };
 
@@ -42,6 +45,7 @@ struct ListTables {
   static constexpr std::string_view kName = "list tables";
   static constexpr std::string_view kMeaning =
       "Which tables there are. Answered by table_answer_t.";
+  static constexpr Motion motion() { return Motion::kNone; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };
@@ -51,6 +55,7 @@ struct GetTable {
 
   static constexpr std::string_view kName = "get table";
   static constexpr std::string_view kMeaning = "What a table says. Answered by table_answer_t.";
+  static constexpr Motion motion() { return Motion::kNone; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) { visit(kTableWithRevision, self.table); }
 };
@@ -65,6 +70,7 @@ struct SetTable {
       "The table gets this content as its next revision, or is made; nothing is put in service. A "
       "file that has the content already stays as it is. Answered by table_answer_t with the table "
       "as it is now.";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) {
     visit({"table", "NAME"}, self.table);
     visit({"expected_hash",
@@ -104,6 +110,7 @@ struct PutProgram {
       "arrived whole. Refused while a program of that MCU is under way. Answered by "
       "program_reply_t with this one.";
   static constexpr std::string_view kResult = "done, once it has arrived whole";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) {
     visit({"program", "its name: 1 to 63 of A-Z a-z 0-9 _ . -, the first one no -"}, self.program);
     visit({"text", "TOML"}, self.text);
@@ -119,6 +126,7 @@ struct EraseProgram {
   static constexpr std::string_view kMeaning =
       "The program goes out of the memory of its MCU. Refused while it is under way.";
   static constexpr std::string_view kResult = "done";
+  static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) { visit("program", self.program); }
 };
 
@@ -132,6 +140,7 @@ struct RunPrograms {
   static constexpr std::string_view kResult =
       "reached, when all have come to their ends; the reason names the frame at which each has "
       "ended, and why";
+  static constexpr Motion motion() { return Motion::kBeginsByService; }
   static void fields(auto& self, auto& visit) {
     visit.list({"program_count", "at least 1, none twice"}, "programs", self.programs);
   }
@@ -143,6 +152,7 @@ struct ListPrograms {
       "The programs of all MCUs that can have one, and how far they are. Answered by "
       "program_reply_t.";
   static constexpr std::string_view kResult = "done";
+  static constexpr Motion motion() { return Motion::kNone; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
 };

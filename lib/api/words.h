@@ -1,6 +1,8 @@
 // The words of lib/words, as requests, replies and snapshots use them, and units.
 #pragma once
 
+#include <cstdint>
+
 #include "base/fields.h"
 #include "words/amount.h"
 #include "words/words.h"
@@ -17,6 +19,21 @@ using words::Speed;
 using words::StopMode;
 using words::Trust;
 using words::UserUnits;
+
+// What a request does to motion, as far as stops are concerned: each says it by motion().
+enum class Motion : std::uint8_t {
+  kNone,
+  kBegins,  // of the motors that it names; a stop of one of them that comes later ends it
+  // Only the service in which it waits knows its motors, and asks (Precedence::overtaken).
+  kBeginsByService,
+  kLiftsHold,           // which a hold that comes later ends
+  kLiftsEmergencyStop,  // which an emergency stop that comes later ends
+  kEnds,                // of the motors that it names, or all: counts as a stop
+  kEndsOnLines,         // and of those that are on one line with them
+};
+constexpr bool ends(Motion motion) {
+  return motion == Motion::kEnds || motion == Motion::kEndsOnLines;
+}
 
 // Units of fields whose names do not tell them.
 inline constexpr fields::Unit kMotorUnit{"motor's unit"};

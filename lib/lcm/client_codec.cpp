@@ -36,9 +36,6 @@ std::optional<ClientMessage> decode_subscription(Payload payload) {
   return ClientMessage{.id = {}, .content = *message};
 }
 
-template <class Content>
-constexpr bool kMayEndMotion = requires(const Content& content) { content.ends_motion(); };
-
 // Requests first, in the order of api::Request.
 struct Channels {
   std::vector<std::string> names{};
@@ -53,7 +50,7 @@ struct Channels {
     const std::vector<Decoder> all{decode_request<Content>..., decode_hello, decode_subscription,
                                    decode_request<GetStatus>};
     for (std::size_t i = 0; i < all.size(); ++i) decoders.emplace(views[i], all[i]);
-    const std::array ends{kMayEndMotion<Content>...};
+    const std::array ends{api::ends_motion(Content{})...};
     for (std::size_t i = 0; i < ends.size(); ++i) {
       if (ends[i]) urgent.push_back(views[i]);
     }

@@ -78,8 +78,10 @@ class Describe {
                         .sender = sender,
                         .meaning = std::string(About<T>::kMeaning)};
     if (std::ranges::find(all, own.name, &TypeDescription::name) != all.end()) return;
-    own.needs_session =
-        !requires { About<T>::ends_motion(); } && !requires { About<T>::is_repeatable(); };
+    own.needs_session = !requires { About<T>::is_repeatable(); };
+    if constexpr (requires(const About<T>& about) { about.motion(); }) {
+      own.needs_session = own.needs_session && !api::ends(About<T>{}.motion());
+    }
     if constexpr (requires { About<T>::kResult; }) own.result = About<T>::kResult;
     const T message{};
     Describe describe(all, own);
