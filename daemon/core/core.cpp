@@ -2,71 +2,41 @@
 
 #include <algorithm>
 
-#include "base/overloaded.h"
-#include "daemon/core/request_log.h"
 #include "daemon/model/name_patterns.h"
 
 namespace bushd::daemon {
+namespace {
+
+template <class Taker, class Asked>
+concept TakesInTime = requires(Taker& taker, const api::Asker& asker, const Asked& asked) {
+  taker.request(std::int64_t{}, asker, asked);
+};
+template <class Taker, class Asked>
+concept TakesAnytime = requires(Taker& taker, const api::Asker& asker, const Asked& asked) {
+  taker.request(asker, asked);
+};
+template <class Taker, class Asked>
+constexpr int kTakes = TakesInTime<Taker, Asked> || TakesAnytime<Taker, Asked> ? 1 : 0;
+
+template <class Taker, class Asked>
+void give(Taker& taker, std::int64_t now_us, const api::Asker& asker, const Asked& asked) {
+  if constexpr (TakesInTime<Taker, Asked>) {
+    taker.request(now_us, asker, asked);
+  } else if constexpr (TakesAnytime<Taker, Asked>) {
+    taker.request(asker, asked);
+  }
+}
+
+template <class Taker, class Asked>
+bool may_take(const Taker& taker, const Asked& asked) {
+  if constexpr (requires { taker.would_take(asked); }) return taker.would_take(asked);
+  return true;
+}
+
+}  // namespace
 
 Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
-    : outputs_(outputs),
-      installation_(config, master),
-      interlocks_(installation_),
-      open_moves_(installation_),
-      journal_(installation_, outputs),
-      positions_(installation_, interlocks_, journal_, outputs),
-      kept_(installation_, positions_, journal_, outputs),
-      dry_runs_(installation_),
-      tables_(installation_, interlocks_, outputs),
-      moves_(installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs),
-      idle_drivers_(installation_, outputs,
-                    [this](MotorId motor) { return waiting_requests_.holds(motor); }),
-      homing_(installation_, interlocks_, open_moves_, moves_, kept_, idle_drivers_, outputs),
-      travels_(installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs),
-      programs_(installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs),
-      local_inputs_(installation_),
-      stops_(installation_, moves_, homing_, travels_, programs_, local_inputs_, open_moves_),
-      jogs_(installation_, interlocks_, moves_, open_moves_),
-      pauses_(installation_, interlocks_, moves_, programs_, open_moves_),
-      holds_(installation_, interlocks_, moves_, local_inputs_, open_moves_, kept_, outputs),
-      lines_(installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_),
-      trajectories_(installation_, interlocks_, journal_, moves_, open_moves_),
-      emergency_stop_(installation_, interlocks_, homing_, open_moves_, kept_, outputs),
-      link_faults_(installation_, emergency_stop_, outputs),
-      drivers_(installation_, interlocks_, emergency_stop_),
-      trigger_(installation_, interlocks_, moves_, open_moves_),
-      while_connected_(installation_, moves_, open_moves_),
-      position_compare_(installation_),
-      pseudo_axes_(installation_),
-      state_(
-          installation_, pseudo_axes_, open_moves_,
-          [this](McuId mcu) { return programs_.text(mcu); }, outputs),
-      line_tables_(installation_, lines_),
-      line_room_(installation_),
-      waiting_requests_(
-          installation_, interlocks_, open_moves_, kept_, idle_drivers_, line_tables_, line_room_,
-          [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
-            carry_out(now_us, asker, request);
-          },
-          [this] { return moves_.begins(); },
-          [this](const api::Request& request) { return would_take(request); }),
-      health_(installation_, outputs),
-      settings_(installation_, positions_, kept_, journal_, outputs,
-                [this](MotorId motor) { return waiting_requests_.holds(motor); }),
-      camac_(installation_, interlocks_, open_moves_, tables_, lines_, travels_, programs_, kept_,
-             outputs,
-             [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
-               this->request(now_us, logged(asker, request, outputs_), request);
-             }),
-      // What an MCU's positions are worth comes before whoever goes by that.
-      services_{
-          &kept_,        &idle_drivers_,     &journal_,  &moves_,           &homing_,
-          &link_faults_, &local_inputs_,     &programs_, &stops_,           &emergency_stop_,
-          &drivers_,     &positions_,        &trigger_,  &while_connected_, &position_compare_,
-          &tables_,      &waiting_requests_, &jogs_,     &pauses_,          &holds_,
-          &lines_,       &settings_,         &travels_,  &camac_,           &trajectories_},
-      supervisor_(installation_, journal_, moves_, positions_, kept_, emergency_stop_, services_,
-                  outputs) {
+    : outputs_(outputs), installation_(config, master) {
   positions_.set_offset_listener(
       [this](MotorId motor, const units::Coordinates& before, const api::Asker& by) {
         settings_.offset_set(motor, before, by);
@@ -100,6 +70,11 @@ Core::Core(const config::Config& config, Outputs& outputs, std::uint16_t master)
                 .result = std::string(api::word(ended.outcome)),
                 .reason = ended.reason});
   });
+}
+
+std::vector<Service*> Core::all_services() {
+  return std::apply([](auto&... service) { return std::vector<Service*>{&service...}; },
+                    services());
 }
 
 void Core::port_opened(std::int64_t now_us, BusId bus, const std::string& path) {
@@ -161,59 +136,28 @@ void Core::request(std::int64_t now, const api::Asker& who, const api::Request& 
 
 // Paths, trajectories and lines for the trigger are found out about when they are carried out:
 // their points are many, or their MCUs have yet to get a table.
-bool Core::would_take(const api::Request& request) const {
-  return std::visit(Overloaded{[&](const api::Move& r) { return moves_.would_take(r); },
-                               [&](const api::MoveLine& r) { return lines_.would_take(r); },
-                               [&](const api::Arm& r) { return trigger_.would_take(r); },
-                               [&](const api::Jog& r) { return jogs_.would_take(r); },
-                               [&](const api::SetPosition& r) { return positions_.would_take(r); },
-                               [](const auto&) { return true; }},
-                    request);
+bool Core::would_take(const api::Request& request) {
+  const auto by_all = [this](const auto& asked) {
+    return std::apply([&](auto&... service) { return (may_take(service, asked) && ...); },
+                      services());
+  };
+  return std::visit(by_all, request);
 }
 
 void Core::carry_out(std::int64_t now, const api::Asker& asker, const api::Request& request) {
-  std::visit(Overloaded{
-                 [&](const api::Move& r) { moves_.request(now, asker, r); },
-                 [&](const api::Stop& r) { stops_.request(now, asker, r); },
-                 [&](const api::EmergencyStop& r) { emergency_stop_.request(now, asker, r); },
-                 [&](const api::Enable& r) { drivers_.request(now, asker, r); },
-                 [&](const api::Disable& r) { drivers_.request(now, asker, r); },
-                 [&](const api::ClearFaults& r) { drivers_.request(now, asker, r); },
-                 [&](const api::SetPosition& r) { positions_.request(now, asker, r); },
-                 [&](const api::UseTable& r) { tables_.request(asker, r); },
-                 [&](const api::ReloadTables& r) { tables_.request(asker, r); },
-                 [&](const api::Home& r) { homing_.request(asker, r); },
-                 [&](const api::Arm& r) {
-                   if (!r.while_connected || while_connected_.take(asker)) {
-                     trigger_.request(asker, r);
-                   }
-                 },
-                 [&](const api::Disarm& r) { trigger_.request(asker, r); },
-                 [&](const api::PositionCompare& r) { position_compare_.request(now, asker, r); },
-                 [&](const api::ListTables& r) { outputs_.serve_tables(asker, r); },
-                 [&](const api::GetTable& r) { outputs_.serve_tables(asker, r); },
-                 [&](const api::SetTable& r) { outputs_.serve_tables(asker, r); },
-                 [&](const api::Confirm& r) { kept_.request(asker, r); },
-                 [&](const api::GetHistory& r) { kept_.request(asker, r); },
-                 [&](const api::Jog& r) { jogs_.request(now, asker, r); },
-                 [&](const api::Pause& r) { pauses_.request(now, asker, r); },
-                 [&](const api::Resume& r) { pauses_.request(now, asker, r); },
-                 [&](const api::Hold& r) { holds_.request(now, asker, r); },
-                 [&](const api::Release& r) { holds_.request(asker, r); },
-                 [&](const api::Configure& r) { settings_.request(asker, r); },
-                 [&](const api::MoveLine& r) { lines_.request(now, asker, r); },
-                 [&](const api::MovePath& r) { lines_.request(asker, r); },
-                 [&](const api::Camac& r) { camac_.request(asker, r); },
-                 [&](const api::Follow& r) { trajectories_.request(now, asker, r); },
-                 [&](const api::ArmLine& r) {
-                   if (!r.while_connected || while_connected_.take(asker)) lines_.request(asker, r);
-                 },
-                 [&](const api::PutProgram& r) { programs_.request(asker, r); },
-                 [&](const api::EraseProgram& r) { programs_.request(asker, r); },
-                 [&](const api::RunPrograms& r) { programs_.request(asker, r); },
-                 [&](const api::ListPrograms& r) { programs_.request(asker, r); },
-             },
-             request);
+  const auto by_one = [&](const auto& asked) {
+    if constexpr (requires { asked.while_connected; }) {
+      if (asked.while_connected && !while_connected_.take(asker)) return;
+    }
+    std::apply(
+        [&](auto&... service) {
+          static_assert((kTakes<decltype(service), decltype(asked)> + ...) == 1,
+                        "one service has a function request() for each type of request");
+          (give(service, now, asker, asked), ...);
+        },
+        services());
+  };
+  std::visit(by_one, request);
 }
 
 void Core::keep_up(std::int64_t now_us) {

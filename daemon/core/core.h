@@ -9,9 +9,11 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "api/session.h"
+#include "daemon/core/request_log.h"
 #include "daemon/core/supervisor.h"
 #include "daemon/model/outputs.h"
 #include "daemon/services/camac.h"
@@ -118,45 +120,85 @@ class Core {
  private:
   void end_overtaken(std::int64_t now_us);
   void carry_out(std::int64_t now_us, const api::Asker& asker, const api::Request& request);
-  bool would_take(const api::Request& request) const;
+  bool would_take(const api::Request& request);
+
+  // In the order in which they follow what MCUs tell: what an MCU's positions are worth comes
+  // before whoever goes by that. A request is carried out by the one that has a function request()
+  // for it.
+  auto services() {
+    return std::tie(kept_, idle_drivers_, journal_, moves_, homing_, link_faults_, local_inputs_,
+                    programs_, stops_, emergency_stop_, drivers_, positions_, trigger_,
+                    while_connected_, position_compare_, tables_, waiting_requests_, jogs_, pauses_,
+                    holds_, lines_, settings_, travels_, camac_, trajectories_);
+  }
+  std::vector<Service*> all_services();
 
   Outputs& outputs_;
   Installation installation_;
-  Interlocks interlocks_;
-  OpenMoves open_moves_;
-  Journal journal_;
-  Positions positions_;
-  KeptPositions kept_;
-  DryRuns dry_runs_;
-  TablesInService tables_;
-  Moves moves_;
-  IdleDrivers idle_drivers_;
-  HomingQueue homing_;
-  Travels travels_;
-  Programs programs_;
-  LocalInputs local_inputs_;
-  Stops stops_;
-  Jogs jogs_;
-  Pauses pauses_;
-  Holds holds_;
-  Lines lines_;
-  Trajectories trajectories_;
-  EmergencyStop emergency_stop_;
-  LinkFaults link_faults_;
-  Drivers drivers_;
-  Trigger trigger_;
-  WhileConnected while_connected_;
-  PositionCompare position_compare_;
-  PseudoAxes pseudo_axes_;
-  StatePublisher state_;
-  LineTables line_tables_;
-  LineRoom line_room_;
-  WaitingRequests waiting_requests_;
-  HealthPublisher health_;
-  MotorSettings settings_;
-  Camac camac_;
-  std::vector<Service*> services_;  // in the order in which they follow what MCUs tell
-  Supervisor supervisor_;
+  Interlocks interlocks_{installation_};
+  OpenMoves open_moves_{installation_};
+  Journal journal_{installation_, outputs_};
+  Positions positions_{installation_, interlocks_, journal_, outputs_};
+  KeptPositions kept_{installation_, positions_, journal_, outputs_};
+  DryRuns dry_runs_{installation_};
+  TablesInService tables_{installation_, interlocks_, outputs_};
+  Moves moves_{installation_, interlocks_, journal_, open_moves_, dry_runs_, outputs_};
+  IdleDrivers idle_drivers_{installation_, outputs_,
+                            [this](MotorId motor) { return waiting_requests_.holds(motor); }};
+  HomingQueue homing_{installation_, interlocks_,   open_moves_, moves_,
+                      kept_,         idle_drivers_, outputs_};
+  Travels travels_{installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs_};
+  Programs programs_{installation_, interlocks_, open_moves_, kept_, idle_drivers_, outputs_};
+  LocalInputs local_inputs_{installation_};
+  Stops stops_{installation_, moves_, homing_, travels_, programs_, local_inputs_, open_moves_};
+  Jogs jogs_{installation_, interlocks_, moves_, open_moves_};
+  Pauses pauses_{installation_, interlocks_, moves_, programs_, open_moves_};
+  Holds holds_{installation_, interlocks_, moves_, local_inputs_, open_moves_, kept_, outputs_};
+  Lines lines_{installation_, interlocks_, journal_, moves_, open_moves_, dry_runs_};
+  Trajectories trajectories_{installation_, interlocks_, journal_, moves_, open_moves_};
+  EmergencyStop emergency_stop_{installation_, interlocks_, homing_, open_moves_, kept_, outputs_};
+  LinkFaults link_faults_{installation_, emergency_stop_, outputs_};
+  Drivers drivers_{installation_, interlocks_, emergency_stop_};
+  Trigger trigger_{installation_, interlocks_, moves_, open_moves_};
+  WhileConnected while_connected_{installation_, moves_, open_moves_};
+  PositionCompare position_compare_{installation_};
+  PseudoAxes pseudo_axes_{installation_};
+  StatePublisher state_{installation_, pseudo_axes_, open_moves_,
+                        [this](McuId mcu) { return programs_.text(mcu); }, outputs_};
+  LineTables line_tables_{installation_, lines_};
+  LineRoom line_room_{installation_};
+  WaitingRequests waiting_requests_{
+      installation_,
+      interlocks_,
+      open_moves_,
+      kept_,
+      idle_drivers_,
+      line_tables_,
+      line_room_,
+      [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
+        carry_out(now_us, asker, request);
+      },
+      [this] { return moves_.begins(); },
+      [this](const api::Request& request) { return would_take(request); }};
+  HealthPublisher health_{installation_, outputs_};
+  MotorSettings settings_{
+      installation_, positions_, kept_,
+      journal_,      outputs_,   [this](MotorId motor) { return waiting_requests_.holds(motor); }};
+  Camac camac_{installation_,
+               interlocks_,
+               open_moves_,
+               tables_,
+               lines_,
+               travels_,
+               programs_,
+               kept_,
+               outputs_,
+               [this](std::int64_t now_us, const api::Asker& asker, const api::Request& request) {
+                 this->request(now_us, logged(asker, request, outputs_), request);
+               }};
+  std::vector<Service*> services_ = all_services();
+  Supervisor supervisor_{installation_, journal_,        moves_,    positions_,
+                         kept_,         emergency_stop_, services_, outputs_};
   bool trajectories_in_turn_ = false;
 };
 

@@ -33,6 +33,12 @@ class TablesInService final : public Service {
 
   void request(const api::Asker& asker, const api::UseTable& request);
   void request(const api::Asker& asker, const api::ReloadTables& request);
+  // Files of tables are read and written where nobody waits for the disk.
+  void request(const api::Asker& asker, const api::ListTables& r) {
+    outputs_.serve_tables(asker, r);
+  }
+  void request(const api::Asker& asker, const api::GetTable& r) { outputs_.serve_tables(asker, r); }
+  void request(const api::Asker& asker, const api::SetTable& r) { outputs_.serve_tables(asker, r); }
 
   // A table that is no file, as the request for one; the next daemon is not told of it. One that
   // the group has already is not given to it again.
