@@ -1,6 +1,10 @@
 #include "daemon/matrix/requests.h"
 
-#include "daemon/lab.h"
+#include <algorithm>
+#include <variant>
+
+#include "base/overloaded.h"
+#include "daemon/matrix/watched_lab.h"
 
 namespace bushd::test::matrix {
 namespace {
@@ -47,10 +51,63 @@ api::PutProgram program(const Name& motor, Random& random) {
                   "]\n[[frame]]\nwait_s = 0.05\n[[frame]]\nnext = true\n"};
 }
 
+// Of the motor, as far as it names any; else as it is without values.
+template <class Asked>
+api::Request plain(const Name& motor, const Name&, Random& random) {
+  Asked asked{};
+  if constexpr (requires { asked.motors.front().amount; }) {
+    asked.motors = one(motor, random);
+  } else if constexpr (requires { asked.motors; }) {
+    asked.motors = {motor};
+  } else if constexpr (requires { asked.motor; }) {
+    asked.motor = motor;
+  }
+  return asked;
+}
+
+template <class... Asked>
+std::vector<Row> plain_rows(const std::variant<Asked...>* /*requests*/) {
+  return {{Asked::kName, plain<Asked>}...};
+}
+
+// A type without a row has a plain one.
+std::vector<Row> with_all_types(std::vector<Row> rows) {
+  Random random(1);
+  std::set<std::size_t> types;
+  for (const Row& row : rows) types.insert(row.of("a", "b", random).index());
+  for (const Row& row : plain_rows(static_cast<const api::Request::variant*>(nullptr))) {
+    if (types.insert(row.of("a", "b", random).index()).second) rows.push_back(row);
+  }
+  return rows;
+}
+
+std::set<std::string> named(const std::vector<api::MotorAmount>& amounts) {
+  std::set<std::string> names;
+  for (const api::MotorAmount& amount : amounts) names.insert(amount.motor);
+  return names;
+}
+
+// As far as they are motors.
+std::set<std::string> named(const api::MotorNames& motors) {
+  std::set<std::string> names;
+  for (const std::string& motor : motors) {
+    if (std::ranges::find(kMotors, motor) != kMotors.end()) names.insert(motor);
+  }
+  return names;
+}
+
+std::set<std::string> all() {
+  return {kMotors.begin(), kMotors.end()};
+}
+
+std::set<std::string> or_all(const api::MotorNames& motors) {
+  return motors.empty() ? all() : named(motors);
+}
+
 }  // namespace
 
 const std::vector<Row>& requests() {
-  static const std::vector<Row> kRows{
+  static const std::vector<Row> kRows = with_all_types({
       {"move by",
        [](const Name& m, const Name&, Random& r) -> api::Request {
          return api::Move{.motors = one(m, r)};
@@ -88,7 +145,7 @@ const std::vector<Row>& requests() {
        [](const Name& m, const Name& o, Random&) -> api::Request {
          return trajectory(m, o, api::Follow::Part::kRun);
        }},
-      {"stop", [](const Name& m, const Name&, Random&) -> api::Request { return api::Stop{{m}}; }},
+      {"stop", plain<api::Stop>},
       {"stop, named twice",
        [](const Name& m, const Name&, Random&) -> api::Request { return api::Stop{{m, m}}; }},
       {"stop, and of nobody",
@@ -96,27 +153,22 @@ const std::vector<Row>& requests() {
          return api::Stop{{m, "nobody"}};
        }},
       {"stop all", [](const Name&, const Name&, Random&) -> api::Request { return api::Stop{}; }},
-      {"emergency stop",
-       [](const Name&, const Name&, Random&) -> api::Request { return api::EmergencyStop{}; }},
-      {"enable",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::Enable{{m}}; }},
-      {"disable",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::Disable{{m}}; }},
+      {"emergency stop", plain<api::EmergencyStop>},
+      {"enable", plain<api::Enable>},
+      {"disable", plain<api::Disable>},
       {"disable all",
        [](const Name&, const Name&, Random&) -> api::Request { return api::Disable{}; }},
       {"set",
        [](const Name& m, const Name&, Random& r) -> api::Request {
          return api::SetPosition{.motors = one(m, r), .dial = r() % 2 == 0};
        }},
-      {"clear",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::ClearFaults{{m}}; }},
+      {"clear", plain<api::ClearFaults>},
       {"use table",
        [](const Name&, const Name&, Random& r) -> api::Request {
          return api::UseTable{.group = "axes",
                               .table = r() % 2 == 0 ? "bushd2-exponential" : "bushd2-constant"};
        }},
-      {"reload tables",
-       [](const Name&, const Name&, Random&) -> api::Request { return api::ReloadTables{}; }},
+      {"reload tables", plain<api::ReloadTables>},
       {"home",
        [](const Name& m, const Name&, Random&) -> api::Request {
          return api::Home{.motors = {m}};
@@ -131,91 +183,128 @@ const std::vector<Row>& requests() {
        [](const Name& m, const Name& o, Random& r) -> api::Request {
          return api::ArmLine{.delay_us = 100, .motors = two(m, o, r)};
        }},
-      {"disarm",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::Disarm{{m}}; }},
+      {"disarm", plain<api::Disarm>},
       {"position compare",
-       [](const Name& m, const Name&, Random& r) -> api::Request {
-         return api::PositionCompare{
-             .motor = m,
-             .position = some_steps(r),
-             .arrivals = {.positive = r() % 2 == 0, .negative = r() % 2 == 0},
-             .width_us = 100};
-       }},
-      {"list tables",
-       [](const Name&, const Name&, Random&) -> api::Request { return api::ListTables{}; }},
+       [](const Name& m, const Name&, Random& r) -> api::
+                                                     Request {
+                                                       return api::PositionCompare{
+                                                           .motor = m,
+                                                           .position = some_steps(r),
+                                                           .arrivals = {.positive = r() % 2 == 0,
+                                                                        .negative = r() % 2 == 0},
+                                                           .width_us = 100};
+                                                     }},
+      {"list tables", plain<api::ListTables>},
       {"get table",
-       [](const Name&, const Name&, Random&) -> api::Request {
-         return api::GetTable{"bushd2-constant"};
-       }},
+       [](const Name&, const Name&,
+          Random&) -> api::Request { return api::GetTable{"bushd2-constant"}; }},
       {"set table",
-       [](const Name&, const Name&, Random&) -> api::Request {
-         return api::SetTable{.table = "another"};
-       }},
-      {"confirm",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::Confirm{{m}}; }},
-      {"history",
-       [](const Name& m, const Name&, Random&) -> api::Request {
-         return api::GetHistory{.motor = m};
-       }},
+       [](const Name&, const Name&,
+          Random&) -> api::Request { return api::SetTable{.table = "another"}; }},
+      {"confirm", plain<api::Confirm>},
+      {"history", plain<api::GetHistory>},
       {"show settings",
-       [](const Name& m, const Name&, Random&) -> api::Request {
-         return api::Configure{.motors = {m}};
-       }},
+       [](const Name& m, const Name&,
+          Random&) -> api::Request { return api::Configure{.motors = {m}}; }},
       {"change settings",
-       [](const Name& m, const Name&, Random&) -> api::Request {
-         return api::Configure{.kind = api::Configure::Kind::kChange,
-                               .changes = {{m, "soft_limits", "[-40000, 40000]"}}};
-       }},
+       [](const Name& m, const Name&,
+          Random&) -> api::
+                       Request {
+                         return api::Configure{.kind = api::Configure::Kind::kChange,
+                                               .changes = {{m, "soft_limits", "[-40000, 40000]"}}};
+                       }},
       {"jog",
-       [](const Name& m, const Name&, Random& r) -> api::Request {
-         return api::Jog{.motor = m,
-                         .per_s = r() % 2 == 0 ? 400.0 : -150.0,
-                         .in_steps = true,
-                         .keepalive_ms = 400};
-       }},
+       [](const Name& m, const Name&, Random& r) -> api::
+                                                     Request {
+                                                       return api::Jog{
+                                                           .motor = m,
+                                                           .per_s = r() % 2 == 0 ? 400.0 : -150.0,
+                                                           .in_steps = true,
+                                                           .keepalive_ms = 400};
+                                                     }},
       {"end of a jog",
        [](const Name& m, const Name&, Random&) -> api::Request { return api::Jog{.motor = m}; }},
       {"end of a jog, later",
-       [](const Name& m, const Name&, Random&) -> api::Request {
-         return api::Jog{.motor = m, .steps_after = 60};
-       }},
+       [](const Name& m, const Name&,
+          Random&) -> api::Request { return api::Jog{.motor = m, .steps_after = 60}; }},
       {"renewal of a jog",
-       [](const Name& m, const Name&, Random&) -> api::Request {
-         return api::Jog{.motor = m, .renew = true};
-       }},
-      {"pause",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::Pause{{m}}; }},
+       [](const Name& m, const Name&,
+          Random&) -> api::Request { return api::Jog{.motor = m, .renew = true}; }},
+      {"pause", plain<api::Pause>},
       {"pause all", [](const Name&, const Name&, Random&) -> api::Request { return api::Pause{}; }},
-      {"resume",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::Resume{{m}}; }},
-      {"hold", [](const Name& m, const Name&, Random&) -> api::Request { return api::Hold{{m}}; }},
-      {"release",
-       [](const Name& m, const Name&, Random&) -> api::Request { return api::Release{{m}}; }},
+      {"resume", plain<api::Resume>},
+      {"hold", plain<api::Hold>},
+      {"release", plain<api::Release>},
       {"start of a program",
-       [](const Name&, const Name&, Random&) -> api::Request {
-         return api::Camac{.crate = 1, .block = {.cycles = {{5, 0, 26, 0}}}};
-       }},
+       [](const Name&, const Name&, Random&)
+           -> api::
+               Request { return api::Camac{.crate = 1, .block = {.cycles = {{5, 0, 26, 0}}}}; }},
       {"clear of a module",
-       [](const Name&, const Name&, Random&) -> api::Request {
-         return api::Camac{.crate = 1, .block = {.cycles = {{7, 0, 24, 0}}}};
-       }},
+       [](const Name&, const Name&, Random&)
+           -> api::
+               Request { return api::Camac{.crate = 1, .block = {.cycles = {{7, 0, 24, 0}}}}; }},
       {"put program",
        [](const Name& m, const Name&, Random& r) -> api::Request { return program(m, r); }},
       {"run programs",
        [](const Name& m, const Name&, Random&) -> api::Request { return api::RunPrograms{{m}}; }},
-      {"list programs",
-       [](const Name&, const Name&, Random&) -> api::Request { return api::ListPrograms{}; }},
+      {"list programs", plain<api::ListPrograms>},
       {"erase program",
        [](const Name& m, const Name&, Random&) -> api::Request { return api::EraseProgram{m}; }},
-  };
+  });
   return kRows;
 }
 
-std::vector<int> rows_of_each_type() {
-  std::vector<int> rows(std::variant_size_v<api::Request::variant>);
-  Random random(1);
-  for (const Row& row : requests()) ++rows[row.of("a", "b", random).index()];
-  return rows;
+Claims claims_of(const api::Request& request) {
+  return std::visit(
+      Overloaded{
+          [](const api::Move& r) {
+            return Claims{.moves = r.dry_run ? std::set<std::string>() : named(r.motors)};
+          },
+          [](const api::MoveLine& r) {
+            return Claims{.moves = r.dry_run ? std::set<std::string>() : named(r.motors)};
+          },
+          [](const api::MovePath& r) {
+            return Claims{.moves = r.dry_run ? std::set<std::string>() : named(r.motors)};
+          },
+          [](const api::Follow& r) {
+            return Claims{.moves = r.part == api::Follow::Part::kRun ? named(r.motors)
+                                                                     : std::set<std::string>()};
+          },
+          [](const api::Arm& r) { return Claims{.moves = named(r.motors)}; },
+          [](const api::ArmLine& r) { return Claims{.moves = named(r.motors)}; },
+          [](const api::Home& r) {
+            const std::set<std::string> homed =
+                r.all ? std::set<std::string>{"a", "e"} : named(r.motors);
+            return Claims{.moves = homed, .places = homed};
+          },
+          [](const api::Jog& r) {
+            // Its end is answered when the motor stands.
+            return r.per_s == 0 && !r.renew ? Claims{} : Claims{.moves = {r.motor}};
+          },
+          [](const api::Stop& r) { return Claims{.stops = or_all(r.motors)}; },
+          [](const api::EmergencyStop&) { return Claims{.stops = all()}; },
+          // Homing and what waits for the trigger go on; the state tells of those that are paused.
+          [](const api::Pause&) { return Claims{}; },
+          [](const api::Resume& r) { return Claims{.resumes = or_all(r.motors)}; },
+          [](const api::Hold&) { return Claims{}; },
+          [](const api::Release&) { return Claims{}; },
+          [](const api::SetPosition& r) { return Claims{.places = named(r.motors)}; },
+          [](const api::Camac& r) {
+            const bool starts = std::ranges::any_of(
+                r.block.cycles, [](const camac::Naf& naf) { return naf.function == 26; });
+            return starts ? Claims{.programs = {"program", "shutter"}} : Claims{};
+          },
+          [](const api::ClearFaults&) { return Claims{}; },
+          [](const api::Disarm&) { return Claims{}; },
+          [](const api::Confirm& r) { return Claims{.places = named(r.motors)}; },
+          // The rows below name a program as its motor.
+          [](const api::RunPrograms& r) { return Claims{.moves = named(r.programs)}; },
+          []<class Asked>(const Asked&) {
+            static_assert(Asked::motion() == api::Motion::kNone, "say here what it asks for");
+            return Claims{};
+          },
+      },
+      request);
 }
 
 }  // namespace bushd::test::matrix

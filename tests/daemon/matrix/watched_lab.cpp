@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "daemon/matrix/claims.h"
+#include "daemon/matrix/requests.h"
 
 namespace bushd::test::matrix {
 namespace {
