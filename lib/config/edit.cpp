@@ -34,14 +34,12 @@ tl::unexpected<Error> cannot(const std::string& motor, SettingKey key, const std
 
 // What a value is in TOML.
 std::string toml_text(SettingKey key, const std::string& value) {
-  const bool is_word = key == SettingKey::kDirection || key == SettingKey::kInputActive ||
-                       key == SettingKey::kPhaseSequence;
-  return is_word ? "\"" + value + "\"" : value;
+  return is_word(key) ? "\"" + value + "\"" : value;
 }
 
 // Such a value has no key.
-bool is_none(SettingKey key, std::string_view value) {
-  return key != SettingKey::kOffset && key != SettingKey::kDirection && value == "none";
+bool is_none(std::string_view value) {
+  return value == "none";
 }
 
 Span value_span(const TomlText& text, const toml::node& node) {
@@ -72,7 +70,7 @@ class Editing {
 
   std::optional<std::string> set(SettingKey key, const std::string& value) const {
     const toml::node* node = section_.get(name_of(key));
-    const bool none = is_none(key, value);
+    const bool none = is_none(value);
     if (node == nullptr) return none ? std::string(toml_.text()) : add(key, value);
     if (none) return remove(key, *node);
     return replaced(value_span(toml_, *node), toml_text(key, value));
@@ -127,7 +125,7 @@ class Editing {
 
 // What the document has to be afterwards.
 Result<void> put(toml::table& section, const Edit& edit) {
-  if (is_none(edit.key, edit.value)) {
+  if (is_none(edit.value)) {
     section.erase(name_of(edit.key));
     return {};
   }

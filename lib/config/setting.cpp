@@ -18,23 +18,6 @@ namespace {
 
 constexpr std::string_view kNone = "none";
 
-// In the order of the enumeration.
-constexpr std::array<std::string_view, kSettingKeys.size()> kKeyNames = {
-    "offset",   "direction", "soft_limits", "input_active", "local",         "keypad",
-    "velocity", "currents",  "max_speed",   "acceleration", "phase_sequence"};
-constexpr std::array<std::string_view, kSettingKeys.size()> kAllowed = {
-    "a number of user units",
-    "negative, positive",
-    "[LOWEST, HIGHEST] dial position, or none",
-    "closed, open",
-    "true, false",
-    "true, false",
-    "MIN,MAX,ACCELERATION, whole numbers of 1..40000 steps/s, MIN to 40000 steps/s and 1..8388607 "
-    "steps/s^2, or none",
-    "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or none",
-    "a number above 0, of units per second (of steps per second without a unit), or none",
-    "a number above 0 and at most 1, of the acceleration of its table",
-    "wave, full, half; three-phase is for other windings"};
 // What an inline table of these keys has, in order.
 constexpr std::array<std::string_view, 3> kVelocityNames = {"min_steps_per_s", "max_steps_per_s",
                                                             "steps_per_s2"};
@@ -55,11 +38,30 @@ std::optional<double> number_of(std::string_view text) {
   return value;
 }
 
-tl::unexpected<Error> refuse(SettingKey key, std::string_view text, std::string_view why = {}) {
-  const std::string_view allowed = kAllowed.at(static_cast<std::size_t>(key));
-  if (why.empty())
-    return fail(fmt::format("{}: is \"{}\"; allowed: {}", name_of(key), text, allowed));
-  return fail(fmt::format("{}: {}; allowed: {}", name_of(key), why, allowed));
+tl::unexpected<Error> refuse(SettingKey key, std::string_view text, std::string_view why = {});
+
+Result<Settings> with_scale(Settings settings, SettingKey key, std::string_view text,
+                            units::Scale scale) {
+  auto coordinates = units::Coordinates::make(std::move(scale));
+  if (!coordinates) return refuse(key, text, coordinates.error().message);
+  settings.coordinates = std::move(*coordinates);
+  return settings;
+}
+
+Result<Settings> with_offset(Settings settings, std::string_view text) {
+  const auto offset = number_of(text);
+  if (!offset) return refuse(SettingKey::kOffset, text);
+  units::Scale scale = settings.coordinates.scale();
+  scale.offset = *offset;
+  return with_scale(std::move(settings), SettingKey::kOffset, text, std::move(scale));
+}
+
+Result<Settings> with_direction(Settings settings, std::string_view text) {
+  const std::string_view word = trimmed(text);
+  if (word != "positive" && word != "negative") return refuse(SettingKey::kDirection, text);
+  units::Scale scale = settings.coordinates.scale();
+  scale.negative = word == "negative";
+  return with_scale(std::move(settings), SettingKey::kDirection, text, std::move(scale));
 }
 
 std::optional<units::SoftLimits> limits_of(std::string_view text) {
@@ -177,6 +179,11 @@ std::string text_of(const std::optional<Currents>& currents) {
                      currents->hold_ma, kCurrentsNames[3], currents->fast_decay ? "fast" : "slow");
 }
 
+std::string text_of(const std::optional<units::SoftLimits>& limits) {
+  if (!limits) return std::string(kNone);
+  return fmt::format("[{}, {}]", limits->low, limits->high);
+}
+
 Result<Settings> with_input_level(Settings settings, std::string_view text) {
   const std::string_view word = trimmed(text);
   if (word != "closed" && word != "open") return refuse(SettingKey::kInputActive, text);
@@ -184,22 +191,23 @@ Result<Settings> with_input_level(Settings settings, std::string_view text) {
   return settings;
 }
 
-// Whether local inputs or a keypad at its MCU move it.
-Result<Settings> with_people(Settings settings, SettingKey key, std::string_view text) {
+// Whether local inputs, or a keypad, at its MCU move it.
+template <SettingKey kKey, bool Drive::* kMoves>
+Result<Settings> with_people(Settings settings, std::string_view text) {
   const std::string_view word = trimmed(text);
-  if (word != "true" && word != "false") return refuse(key, text);
+  if (word != "true" && word != "false") return refuse(kKey, text);
   if (word == "true" && settings.max_speed) {
-    return refuse(key, text,
+    return refuse(kKey, text,
                   "local motion goes by the table alone, and may be faster than max_speed; set "
                   "max_speed=none first");
   }
   if (word == "true" && settings.idle_disabled) {
     return refuse(
-        key, text,
+        kKey, text,
         "its MCU has idle_disable_s, and local inputs cannot enable disabled drivers; leave "
         "idle_disable_s out in bushd.toml first");
   }
-  (key == SettingKey::kLocal ? settings.drive.local : settings.drive.keypad) = word == "true";
+  settings.drive.*kMoves = word == "true";
   return settings;
 }
 
@@ -242,24 +250,149 @@ Result<Settings> with_phase_sequence(Settings settings, std::string_view text) {
   return settings;
 }
 
-std::string_view why_not(SettingKey key) {
-  switch (key) {
-    case SettingKey::kVelocity:
-      return "no local inputs move it; set local=true or keypad=true first";
-    case SettingKey::kInputActive:
-      return "it needs a motor without `inputs`, and no other motor may use the input that has the "
-             "number of its output; change `inputs` in bushd.toml";
-    case SettingKey::kLocal:
-    case SettingKey::kKeypad:
-      return "its bus has no MCU with local inputs or a keypad";
-    case SettingKey::kCurrents:
-    case SettingKey::kPhaseSequence:
-      return "its MCU does not drive it by phases; give that `steps = \"phases\"` in bushd.toml "
-             "first";
-    default:
-      return "it has no unit, so its positions are steps; give it `unit` and `steps_per_unit` in "
-             "bushd.toml first";
+bool always(const Settings&) {
+  return true;
+}
+bool has_unit(const Settings& settings) {
+  return settings.coordinates.has_unit();
+}
+bool has_mcu(const Settings& settings) {
+  return settings.has_mcu;
+}
+bool has_phases(const Settings& settings) {
+  return settings.phases;
+}
+constexpr std::string_view kNoUnit =
+    "it has no unit, so its positions are steps; give it `unit` and `steps_per_unit` in "
+    "bushd.toml first";
+constexpr std::string_view kNoPeople = "its bus has no MCU with local inputs or a keypad";
+constexpr std::string_view kNoPhases =
+    "its MCU does not drive it by phases; give that `steps = \"phases\"` in bushd.toml first";
+
+// All about a key but what takes it up.
+struct Row {
+  std::string_view name;     // as in bushd.toml
+  std::string_view allowed;  // for errors
+  std::string_view help;     // behind the name: an example, or what it is
+  bool is_word = false;      // in quotes in bushd.toml
+  bool (*applies)(const Settings&) = always;
+  std::string_view why_not = {};  // where it does not apply
+  bool (*is_reported)(const Settings&) = always;
+  std::string (*text)(const Settings&);
+  Result<Settings> (*with)(Settings, std::string_view text);
+};
+
+// In the order of SettingKey.
+constexpr std::array<Row, kSettingKeys.size()> kRows{{
+    {.name = "offset",
+     .allowed = "a number of user units",
+     .help = "12.5",
+     .applies = has_unit,
+     .why_not = kNoUnit,
+     .text =
+         [](const Settings& now) {
+           const double offset = now.coordinates.scale().offset;
+           return fmt::format("{}", offset == 0 ? 0.0 : offset);
+         },
+     .with = with_offset},
+    {.name = "direction",
+     .allowed = "negative, positive",
+     .help = "negative, positive",
+     .is_word = true,
+     .applies = has_unit,
+     .why_not = kNoUnit,
+     .text =
+         [](const Settings& now) {
+           return std::string(now.coordinates.scale().negative ? "negative" : "positive");
+         },
+     .with = with_direction},
+    {.name = "soft_limits",
+     .allowed = "[LOWEST, HIGHEST] dial position, or none",
+     .help = "-5,30 (on the dial), none",
+     .text = [](const Settings& now) { return text_of(now.soft_limits); },
+     .with = with_soft_limits},
+    {.name = "input_active",
+     .allowed = "closed, open",
+     .help = "closed, open: its one input",
+     .is_word = true,
+     .applies = [](const Settings& now) { return now.has_one_input; },
+     .why_not = "it needs a motor without `inputs`, and no other motor may use the input that has "
+                "the number of its output; change `inputs` in bushd.toml",
+     .is_reported = [](const Settings& now) { return now.drive.input_open; },
+     .text =
+         [](const Settings& now) { return std::string(now.drive.input_open ? "open" : "closed"); },
+     .with = with_input_level},
+    {.name = "local",
+     .allowed = "true, false",
+     .help = "true, false: local inputs of its MCU move it",
+     .applies = has_mcu,
+     .why_not = kNoPeople,
+     .is_reported = [](const Settings& now) { return now.drive.local; },
+     .text = [](const Settings& now) { return fmt::format("{}", now.drive.local); },
+     .with = with_people<SettingKey::kLocal, &Drive::local>},
+    {.name = "keypad",
+     .allowed = "true, false",
+     .help = "true, false: the keypad of its MCU moves it",
+     .applies = has_mcu,
+     .why_not = kNoPeople,
+     .is_reported = [](const Settings& now) { return now.drive.keypad; },
+     .text = [](const Settings& now) { return fmt::format("{}", now.drive.keypad); },
+     .with = with_people<SettingKey::kKeypad, &Drive::keypad>},
+    {.name = "velocity",
+     .allowed = "MIN,MAX,ACCELERATION, whole numbers of 1..40000 steps/s, MIN to 40000 steps/s and "
+                "1..8388607 steps/s^2, or none",
+     .help = "MIN,MAX,ACCELERATION of local inputs, in steps/s and steps/s^2",
+     .applies = [](const Settings& now) { return now.drive.moved_by_people(); },
+     .why_not = "no local inputs move it; set local=true or keypad=true first",
+     .text = [](const Settings& now) { return text_of(now.drive.velocity); },
+     .with = with_velocity},
+    {.name = "currents",
+     .allowed = "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or "
+                "none",
+     .help = "RAMP,CRUISE,HOLD in mA, with slow or fast behind them",
+     .applies = has_phases,
+     .why_not = kNoPhases,
+     .text = [](const Settings& now) { return text_of(now.drive.currents); },
+     .with = with_currents},
+    {.name = "max_speed",
+     .allowed = "a number above 0, of units per second (of steps per second without a unit), or "
+                "none",
+     .help = "2.5 in units a second, none",
+     .is_reported = [](const Settings& now) { return now.max_speed.has_value(); },
+     .text =
+         [](const Settings& now) {
+           return now.max_speed ? fmt::format("{}", *now.max_speed) : std::string(kNone);
+         },
+     .with = with_max_speed},
+    {.name = "acceleration",
+     .allowed = "a number above 0 and at most 1, of the acceleration of its table",
+     .help = "0.5 of that of its table",
+     .is_reported = [](const Settings& now) { return now.drive.acceleration != 1; },
+     .text = [](const Settings& now) { return fmt::format("{}", now.drive.acceleration); },
+     .with = with_acceleration},
+    {.name = "phase_sequence",
+     .allowed = "wave, full, half; three-phase is for other windings",
+     .help = "wave, full or half, of all motors of its MCU",
+     .is_word = true,
+     .applies = has_phases,
+     .why_not = kNoPhases,
+     .text =
+         [](const Settings& now) {
+           return std::string(fieldbus::kSequenceNames.at(now.drive.phase_sequence));
+         },
+     .with = with_phase_sequence},
+}};
+
+const Row& row_of(SettingKey key) {
+  return kRows.at(static_cast<std::size_t>(key));
+}
+
+tl::unexpected<Error> refuse(SettingKey key, std::string_view text, std::string_view why) {
+  const Row& row = row_of(key);
+  if (why.empty()) {
+    return fail(fmt::format("{}: is \"{}\"; allowed: {}", row.name, text, row.allowed));
   }
+  return fail(fmt::format("{}: {}; allowed: {}", row.name, why, row.allowed));
 }
 
 }  // namespace
@@ -277,7 +410,15 @@ Settings settings_of(const Motor& motor, const Mcu& mcu) {
 }
 
 std::string_view name_of(SettingKey key) {
-  return kKeyNames.at(static_cast<std::size_t>(key));
+  return row_of(key).name;
+}
+
+std::string help_of(SettingKey key) {
+  return fmt::format("{}={}", row_of(key).name, row_of(key).help);
+}
+
+bool is_word(SettingKey key) {
+  return row_of(key).is_word;
 }
 
 bool goes_first(SettingKey key, std::string_view value) {
@@ -292,63 +433,15 @@ std::optional<SettingKey> setting_key_of(std::string_view name) {
 }
 
 bool applies(const Settings& settings, SettingKey key) {
-  switch (key) {
-    case SettingKey::kSoftLimits:
-    case SettingKey::kMaxSpeed:
-    case SettingKey::kAcceleration:
-      return true;
-    case SettingKey::kInputActive:
-      return settings.has_one_input;
-    case SettingKey::kLocal:
-    case SettingKey::kKeypad:
-      return settings.has_mcu;
-    case SettingKey::kVelocity:
-      return settings.drive.moved_by_people();
-    case SettingKey::kCurrents:
-    case SettingKey::kPhaseSequence:
-      return settings.phases;
-    default:
-      return settings.coordinates.has_unit();
-  }
+  return row_of(key).applies(settings);
 }
 
 bool is_reported(const Settings& settings, SettingKey key) {
-  if (key == SettingKey::kInputActive) return settings.drive.input_open;
-  if (key == SettingKey::kLocal) return settings.drive.local;
-  if (key == SettingKey::kKeypad) return settings.drive.keypad;
-  if (key == SettingKey::kMaxSpeed) return settings.max_speed.has_value();
-  if (key == SettingKey::kAcceleration) return settings.drive.acceleration != 1;
-  return applies(settings, key);
+  return applies(settings, key) && row_of(key).is_reported(settings);
 }
 
 std::string text_of(const Settings& settings, SettingKey key) {
-  const units::Scale& scale = settings.coordinates.scale();
-  switch (key) {
-    case SettingKey::kOffset:
-      return fmt::format("{}", scale.offset == 0 ? 0.0 : scale.offset);
-    case SettingKey::kDirection:
-      return scale.negative ? "negative" : "positive";
-    case SettingKey::kInputActive:
-      return settings.drive.input_open ? "open" : "closed";
-    case SettingKey::kLocal:
-      return settings.drive.local ? "true" : "false";
-    case SettingKey::kKeypad:
-      return settings.drive.keypad ? "true" : "false";
-    case SettingKey::kVelocity:
-      return text_of(settings.drive.velocity);
-    case SettingKey::kCurrents:
-      return text_of(settings.drive.currents);
-    case SettingKey::kAcceleration:
-      return fmt::format("{}", settings.drive.acceleration);
-    case SettingKey::kPhaseSequence:
-      return std::string(fieldbus::kSequenceNames.at(settings.drive.phase_sequence));
-    case SettingKey::kMaxSpeed:
-      return settings.max_speed ? fmt::format("{}", *settings.max_speed) : std::string(kNone);
-    case SettingKey::kSoftLimits:
-      break;
-  }
-  if (!settings.soft_limits) return std::string(kNone);
-  return fmt::format("[{}, {}]", settings.soft_limits->low, settings.soft_limits->high);
+  return row_of(key).text(settings);
 }
 
 std::string line_of(const Settings& settings, SettingKey key) {
@@ -357,32 +450,10 @@ std::string line_of(const Settings& settings, SettingKey key) {
 }
 
 Result<Settings> with(Settings settings, SettingKey key, std::string_view text) {
-  if (!applies(settings, key)) return fail(fmt::format("{}: {}", name_of(key), why_not(key)));
+  const Row& row = row_of(key);
+  if (!row.applies(settings)) return fail(fmt::format("{}: {}", row.name, row.why_not));
   settings.written.set(static_cast<std::size_t>(key));
-  if (key == SettingKey::kSoftLimits) return with_soft_limits(std::move(settings), text);
-  if (key == SettingKey::kInputActive) return with_input_level(std::move(settings), text);
-  if (key == SettingKey::kLocal || key == SettingKey::kKeypad) {
-    return with_people(std::move(settings), key, text);
-  }
-  if (key == SettingKey::kVelocity) return with_velocity(std::move(settings), text);
-  if (key == SettingKey::kCurrents) return with_currents(std::move(settings), text);
-  if (key == SettingKey::kMaxSpeed) return with_max_speed(std::move(settings), text);
-  if (key == SettingKey::kAcceleration) return with_acceleration(std::move(settings), text);
-  if (key == SettingKey::kPhaseSequence) return with_phase_sequence(std::move(settings), text);
-  units::Scale scale = settings.coordinates.scale();
-  if (key == SettingKey::kDirection) {
-    const std::string_view word = trimmed(text);
-    if (word != "positive" && word != "negative") return refuse(key, text);
-    scale.negative = word == "negative";
-  } else {
-    const auto offset = number_of(text);
-    if (!offset) return refuse(key, text);
-    scale.offset = *offset;
-  }
-  auto coordinates = units::Coordinates::make(std::move(scale));
-  if (!coordinates) return refuse(key, text, coordinates.error().message);
-  settings.coordinates = std::move(*coordinates);
-  return settings;
+  return row.with(std::move(settings), text);
 }
 
 Result<void> check_soft_limits(const units::Coordinates& coordinates,

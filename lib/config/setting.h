@@ -4,6 +4,7 @@
 
 #include <array>
 #include <bitset>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,6 +15,9 @@
 
 namespace bushd::config {
 
+// In the order in which they may be taken: a velocity is of a motor that people move. What goes
+// before all others is said by goes_first(). All that is said about a key stands in its row of
+// setting.cpp.
 enum class SettingKey {
   kOffset,
   kDirection,
@@ -25,20 +29,21 @@ enum class SettingKey {
   kCurrents,
   kMaxSpeed,
   kAcceleration,
-  kPhaseSequence
+  kPhaseSequence,
+  kCount
 };
-// In the order in which they may be taken: a velocity is of a motor that people move. What goes
-// before all others is said by goes_first().
-inline constexpr std::array kSettingKeys = {
-    SettingKey::kOffset,       SettingKey::kDirection,    SettingKey::kSoftLimits,
-    SettingKey::kInputActive,  SettingKey::kLocal,        SettingKey::kKeypad,
-    SettingKey::kVelocity,     SettingKey::kCurrents,     SettingKey::kMaxSpeed,
-    SettingKey::kAcceleration, SettingKey::kPhaseSequence};
+inline constexpr auto kSettingKeys = [] {
+  std::array<SettingKey, static_cast<std::size_t>(SettingKey::kCount)> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<SettingKey>(i);
+  return all;
+}();
 
 // By SettingKey.
 using WrittenKeys = std::bitset<kSettingKeys.size()>;
 
 std::string_view name_of(SettingKey key);  // as in bushd.toml
+std::string help_of(SettingKey key);       // "offset=12.5": for the help of commands
+bool is_word(SettingKey key);              // bushd.toml has its value in quotes
 // A motor that has no max_speed any more may be moved by people, and one that they do not move any
 // more may have one. `value` is one that text_of() makes.
 bool goes_first(SettingKey key, std::string_view value);

@@ -128,6 +128,26 @@ TEST(Edit, SoftLimitsThatAreNoneGoAndTheirCommentsStay) {
   expect("offset = 1\n", {{"theta", kSoftLimits, "none"}}, "offset = 1\n");
 }
 
+TEST(Edit, EachKeyIsReadBackAsItIsWritten) {
+  const std::string path = "/nonexistent/bushd.toml";
+  const std::string address = "address = 1\n";
+  const std::string all_apply =
+      replaced(with_theta("local = true\n"), address, address + "steps = \"phases\"\n");
+  for (const SettingKey key : kSettingKeys) {
+    SCOPED_TRACE(name_of(key));
+    const auto value_in = [&](const std::string& text) {
+      const Config config = parse(text, path).value();
+      const Motor& theta = config.motors.front();
+      return text_of(settings_of(theta, config.mcu_of(theta)), key);
+    };
+    const std::string value = value_in(all_apply);
+    const std::string out = after(all_apply, {{"theta", key, value}});
+    const std::string written = std::string(name_of(key)) + " = ";
+    EXPECT_EQ(out.find(written) != std::string::npos, value != "none") << out;
+    EXPECT_EQ(value_in(out), value);
+  }
+}
+
 TEST(Edit, TheEndOfAFileAndItsNewlinesStay) {
   const std::string text = with_theta("") + "unit = \"mm\"\nsteps_per_unit = 1\noffset = 4";
   EXPECT_EQ(after(text, {{"slit", kOffset, "5"}}),

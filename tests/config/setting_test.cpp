@@ -19,7 +19,10 @@ Settings blade() {
 }
 
 TEST(Setting, KeysHaveTheNamesOfTheFile) {
-  for (const SettingKey key : kSettingKeys) EXPECT_EQ(setting_key_of(name_of(key)), key);
+  for (const SettingKey key : kSettingKeys) {
+    EXPECT_EQ(setting_key_of(name_of(key)), key);
+    EXPECT_THAT(help_of(key), testing::StartsWith(std::string(name_of(key)) + "="));
+  }
   EXPECT_FALSE(setting_key_of("unit"));
   EXPECT_FALSE(setting_key_of(""));
 }

@@ -6,6 +6,7 @@
 
 #include "base/printable.h"
 #include "commands.h"
+#include "config/setting.h"
 #include "settings.h"
 
 namespace bushctl {
@@ -81,6 +82,14 @@ int run(Client& client, const api::Configure& request, const ConfigOptions& opti
   return show(options.diff ? differences(std::move(configuration)) : configuration, options);
 }
 
+std::string keys_help() {
+  std::string lines;
+  for (const auto key : bushd::config::kSettingKeys) {
+    lines += fmt::format("{:37}{}\n", "", help_of(key));
+  }
+  return lines;
+}
+
 }  // namespace
 
 void add_config_commands(CommandLine& commands) {
@@ -88,20 +97,8 @@ void add_config_commands(CommandLine& commands) {
   commands.add("config", "Change settings of motors in operation")
       .footer(
           "bushctl config [NAME]                what they are, and what bushd.toml says\n"
-          "bushctl config NAME KEY=VALUE...     changes them, at rest: offset=12.5, "
-          "direction=negative,\n"
-          "                                     soft_limits=-5,30 (on the dial), "
-          "soft_limits=none,\n"
-          "                                     input_active=open or closed, of its one input,\n"
-          "                                     local=true, keypad=true: who at its MCU moves it,\n"
-          "                                     velocity=MIN,MAX,ACCELERATION of local inputs, in "
-          "steps/s and steps/s^2,\n"
-          "                                     currents=RAMP,CRUISE,HOLD in mA, with slow or fast "
-          "behind them,\n"
-          "                                     max_speed=2.5 in units a second, max_speed=none,\n"
-          "                                     acceleration=0.5 of that of its table,\n"
-          "                                     phase_sequence=wave, full or half, of all motors "
-          "of its MCU\n"
+          "bushctl config NAME KEY=VALUE...     changes them, at rest:\n" +
+          keys_help() +
           "bushctl config --diff                what differs from bushd.toml\n"
           "bushctl config --save                writes that into bushd.toml, on the PC of bushd\n"
           "What is changed is kept in the state store, and counts until its key in bushd.toml is "

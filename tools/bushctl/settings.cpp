@@ -23,10 +23,8 @@ using bushd::Result;
 
 // A value of a key that a newer daemon has is a text.
 nlohmann::json parsed(const std::string& key, const std::string& value) {
-  for (const auto word : {config::SettingKey::kDirection, config::SettingKey::kInputActive,
-                          config::SettingKey::kPhaseSequence}) {
-    if (key == name_of(word)) return value;
-  }
+  const auto known = config::setting_key_of(key);
+  if (known && is_word(*known)) return value;
   if (value == "none") return nullptr;
   nlohmann::json json = nlohmann::json::parse(value, nullptr, false);
   return json.is_discarded() ? nlohmann::json(value) : json;
