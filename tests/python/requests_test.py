@@ -5,6 +5,7 @@ import socket
 import unittest
 
 from bushd import NoDaemon, Table, aio, messages
+from bushd.asks import Asks
 
 QUIET = {"utime_us", "session", "client_id", "number"}  # of each request
 
@@ -82,6 +83,15 @@ def way(**values):
     return [{"motor": name, **({"in_steps": True, "steps": value} if isinstance(value, int) else {"user": value})} for name, value in values.items()]
 
 
+def made_of_its_type(name):
+    """Of a function that make_told writes: what it is given is what the message says."""
+    defaults = type_of(name)()
+    said = {field.name: ["m", "n"] if field.count else type(getattr(defaults, field.name))(3) for field in defaults.FIELDS
+            if field.name not in ("request", "motor_count")}
+    values = [value for field, given in said.items() for value in (given if field == "motors" else [given])]
+    return lambda c: getattr(c, name)(*values), name.upper(), said
+
+
 MOVE = messages.move_t
 TABLE = Table(name="own", time_unit_ns=40_000, accel=(3, 2), hash="0a", revision=4)
 CAMAC = {"crate": 2, "mode": messages.camac_request_t.SINGLE, "count": 1, "last_station": 23, "last_subaddress": 15,
@@ -134,9 +144,8 @@ ASKED = [
      {"table": "own", "expected_hash": "0a", "content": {"name": "own", "revision": 4, "time_unit_ns": 40_000, "accel": [3, 2]}}),
     (lambda c: c.tables.use("group0", "own"), "USE_TABLE", {"group": "group0", "table": "own"}),
     (lambda c: c.tables.reload(), "RELOAD_TABLES", {}),
-    *((lambda c, name=name: getattr(c, name)("m", "n"), channel, {"motors": ["m", "n"]}) for name, channel in (
-        ("confirm", "CONFIRM"), ("enable", "ENABLE"), ("disable", "DISABLE"), ("clear", "CLEAR_FAULTS"), ("disarm", "DISARM"),
-        ("pause", "PAUSE"), ("resume", "RESUME"), ("hold", "HOLD"), ("release", "RELEASE"))),
+    (lambda c: c.clear("m", "n"), "CLEAR_FAULTS", {"motors": ["m", "n"]}),
+    *(made_of_its_type(name) for name in vars(Asks) if not name.startswith("_")),
 ]
 
 

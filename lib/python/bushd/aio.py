@@ -22,8 +22,6 @@ from .requests import ask
 from .session import Timing
 from .status import StatusCollector
 
-KEEP: object = object()  # of config(): leave the setting as it is
-
 
 class Connecting:
     """What `connect()` returns: to be awaited, or entered by `async with`."""
@@ -168,18 +166,6 @@ class Client(Moving):
         motor_amounts = requests.motor_amounts(wanted.values, wanted.in_steps)
         return await self._result(ask("SET_POSITION", motors=motor_amounts, dial=dial), check)
 
-    async def confirm(self, *names: str, check: bool = True) -> model.Result:
-        """Says that the positions of these motors (at least one), at rest, are right as shown: they are KNOWN."""
-        return await self._result(ask("CONFIRM", motors=names), check)
-
-    async def enable(self, *names: str, check: bool = True) -> model.Result:
-        """Enables the drivers of the MCUs of these motors; none named: of all."""
-        return await self._result(ask("ENABLE", motors=names), check)
-
-    async def disable(self, *names: str, check: bool = True) -> model.Result:
-        """Disables them. Refused while one of their motors moves."""
-        return await self._result(ask("DISABLE", motors=names), check)
-
     async def clear(self, *names: str, check: bool = True) -> model.Result:
         """Clears faults, and a latched emergency stop, of the MCUs of these motors; none named: of all."""
         return await self._result(ask("CLEAR_FAULTS", motors=names), check)
@@ -208,21 +194,7 @@ class Client(Moving):
         request = ask("POSITION_COMPARE", position=amount, arrivals=arrivals, delay_us=delay_us, width_us=width_us)
         return await self._result(request, check)
 
-    async def config(
-        self,
-        name: str | None = None,
-        *,
-        offset: float | object = KEEP,
-        direction: str | object = KEEP,
-        soft_limits: tuple[float, float] | None | object = KEEP,
-        input_active: str | object = KEEP,
-        local: bool | object = KEEP,
-        keypad: bool | object = KEEP,
-        velocity: tuple[int, int, int] | None | object = KEEP,
-        currents: tuple[int | str, ...] | None | object = KEEP,
-        max_speed: float | None | object = KEEP,
-        acceleration: float | object = KEEP,
-    ) -> model.Configuration:
+    async def config(self, name: str | None = None, **settings: object) -> model.Configuration:
         """Shows the settings of this motor (or of all), or changes those that are written, of a motor at rest.
 
             client.config("theta", soft_limits=(-5.0, 30.0))    # None: no soft limits
@@ -232,15 +204,14 @@ class Client(Moving):
             client.config("theta", currents=(1500, 1000, 300, "fast"))   # ramp, cruise, hold in mA, decay
             client.config("theta", max_speed=2.5)               # above 0, in units a second; None: as fast as its table
             client.config("theta", acceleration=0.5)            # of that of its table, above 0 and at most 1
+            client.config("theta", phase_sequence="half")       # or "wave", "full"; of all motors of its MCU
 
         They are kept until the key in bushd.toml is edited. Returns what holds now, and what the file says.
         """
-        given = {key: value for key, value in locals().items() if key not in ("self", "name")}
-        changes = {key: value for key, value in given.items() if value is not KEEP}
-        if changes and name is None:
+        if settings and name is None:
             raise TypeError("name the motor whose settings are to change")
-        if changes and name is not None:
-            request = requests.change_configuration(name, changes)
+        if settings and name is not None:
+            request = requests.change_configuration(name, settings)
         else:
             request = ask("CONFIGURE", kind="SHOW", motors=[] if name is None else [name], repeatable=True)
         return there((await self._ask(request)).detail.configuration)

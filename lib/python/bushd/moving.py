@@ -7,12 +7,12 @@ from typing import Literal, overload
 
 from . import arguments, model, requests
 from .arguments import Amount
-from .asking import Asking
+from .asks import Asks
 from .motion import Jog, Motion
 from .requests import Fields, Names, Rows, ask, line, motor_amounts, trigger, way, with_duration, with_speed
 
 
-class Moving(Asking):
+class Moving(Asks):
     """What moves motors, and what ends that."""
 
     @overload
@@ -288,10 +288,6 @@ class Moving(Asking):
         how = {**trigger(edge, delay_us, while_connected), **with_duration(duration_s)}
         return await self._accepted(ask("ARM_LINE", **how, **way(**wanted.how, speed=speed)), list(wanted.values))
 
-    async def disarm(self, *names: str, check: bool = True) -> model.Result:
-        """Ends the wait for the trigger of these motors, and of all armed with them; none named: of all."""
-        return await self._result(ask("DISARM", motors=names), check)
-
     @overload
     async def run_programs(self, *names: str, wait: Literal[True] = True, check: bool = True) -> model.MoveResult: ...
     @overload
@@ -345,21 +341,3 @@ class Moving(Asking):
     async def emergency_stop(self, *, check: bool = True) -> model.Result:
         """Stops all motors of all buses at once, until `clear()`."""
         return await self._result(ask("EMERGENCY_STOP", repeatable=True), check)
-
-    async def pause(self, *names: str, check: bool = True) -> model.Result:
-        """Ramps down these motors, or those of these groups, and keeps their targets; none named: all.
-
-        Their moves stay open until `resume()`, a stop or a new target."""
-        return await self._result(ask("PAUSE", motors=names), check)
-
-    async def resume(self, *names: str, check: bool = True) -> model.Result:
-        """Lets paused motors, or those of these groups, go on to their targets; none named: all."""
-        return await self._result(ask("RESUME", motors=names), check)
-
-    async def hold(self, *names: str, check: bool = True) -> model.Result:
-        """Refuses motions of these motors or groups (none named: all) until `release()`; what is under way goes on."""
-        return await self._result(ask("HOLD", motors=names), check)
-
-    async def release(self, *names: str, check: bool = True) -> model.Result:
-        """Allows motions of motors or groups that are held; none named: of all."""
-        return await self._result(ask("RELEASE", motors=names), check)
