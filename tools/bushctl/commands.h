@@ -20,20 +20,18 @@ enum Exit : int {
 
 // status, where, watch, health
 void add_view_commands(CommandLine& commands);
-// move, arm, disarm, stop, estop, home, set, compare
+// move, arm, stop, estop, home, set, compare
 void add_motion_commands(CommandLine& commands);
 // follow
 void add_follow_command(CommandLine& commands);
-// enable, disable, clear
-void add_driver_commands(CommandLine& commands);
-// confirm, history
+// disarm, pause, resume, hold, release, enable, disable, clear, confirm
+void add_plain_commands(CommandLine& commands);
+// history
 void add_history_commands(CommandLine& commands);
 // path
 void add_path_commands(CommandLine& commands);
 // jog
 void add_jog_commands(CommandLine& commands);
-// pause, resume, hold, release
-void add_pause_commands(CommandLine& commands);
 // config
 void add_config_commands(CommandLine& commands);
 // table list, show, use, reload

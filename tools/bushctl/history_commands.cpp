@@ -1,4 +1,4 @@
-// Subcommands about positions that are kept: confirming them, and what has moved motors.
+// The subcommand that shows what has moved a motor.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -20,19 +20,6 @@ using bushd::client::Client;
 using nlohmann::ordered_json;
 
 constexpr std::uint32_t kMostPast = 1000;
-
-void add_confirm(CommandLine& commands) {
-  const auto motors = std::make_shared<api::MotorNames>();
-  commands.add("confirm", "Confirm that motors stand where they are shown")
-      .footer(
-          "Positions that are restored or uncertain ('bushctl where') are known then, and nothing "
-          "moves. Where a motor stands elsewhere, use 'set' or 'home'.")
-      .words("NAME", motors.get(), kMotors, Command::Needed::kYes)
-      .run([&commands, motors] {
-        return send(commands.connection(), api::Confirm{*motors}, Client::Until::kResult,
-                    Hope::kDone);
-      });
-}
 
 void print_json(const std::string& motor, const api::MotionHistory& history) {
   ordered_json json = bushd::json_of(history);
@@ -101,7 +88,6 @@ void add_history(CommandLine& commands) {
 }  // namespace
 
 void add_history_commands(CommandLine& commands) {
-  add_confirm(commands);
   add_history(commands);
 }
 

@@ -16,8 +16,7 @@ int main(int argc, char** argv) {
     bushctl::add_path_commands(commands);
     bushctl::add_follow_command(commands);
     bushctl::add_jog_commands(commands);
-    bushctl::add_pause_commands(commands);
-    bushctl::add_driver_commands(commands);
+    bushctl::add_plain_commands(commands);
     bushctl::add_history_commands(commands);
     bushctl::add_config_commands(commands);
     bushctl::add_table_commands(commands);

@@ -217,17 +217,6 @@ void add_arm(CommandLine& commands) {
       });
 }
 
-void add_disarm(CommandLine& commands) {
-  const auto motors = std::make_shared<api::MotorNames>();
-  commands.add("disarm", "Cancel moves that wait for the trigger")
-      .footer("What waits for the same trigger, or was armed together, is disarmed together.")
-      .words("NAME", motors.get(), kMotorsOrAll, Command::Needed::kNo)
-      .run([&commands, motors] {
-        return send(commands.connection(), api::Disarm{*motors}, Client::Until::kResult,
-                    Hope::kDone);
-      });
-}
-
 void add_compare(CommandLine& commands) {
   struct Options {
     std::string motor;
@@ -346,7 +335,6 @@ void add_set(CommandLine& commands) {
 void add_motion_commands(CommandLine& commands) {
   add_move(commands);
   add_arm(commands);
-  add_disarm(commands);
   add_compare(commands);
   add_stop(commands);
   add_estop(commands);

@@ -51,7 +51,7 @@ api::PutProgram program(const Name& motor, Random& random) {
                   "]\n[[frame]]\nwait_s = 0.05\n[[frame]]\nnext = true\n"};
 }
 
-// Of the motor, as far as it names any; else as it is without values.
+// Names the motor, where it names any; all else is as without values.
 template <class Asked>
 api::Request plain(const Name& motor, const Name&, Random& random) {
   Asked asked{};

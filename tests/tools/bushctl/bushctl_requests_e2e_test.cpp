@@ -118,29 +118,51 @@ TEST(Bushctl, AnEmergencyStopSucceedsIfItIsDoneEverywhere) {
   EXPECT_EQ(bushctl({"estop"}).code, 0);
 }
 
+template <class Request>
+constexpr bool kOnlyNamesMotors = requires(Request request) {
+  request.motors = api::MotorNames{};
+} && sizeof(Request) == sizeof(api::MotorNames);
+
+// The subcommand has the first word of its name.
+template <class Request>
+void expect_subcommand() {
+  if constexpr (kOnlyNamesMotors<Request>) {
+    const std::string name(Request::kName.substr(0, Request::kName.find(' ')));
+    SCOPED_TRACE(name);
+    FakeDaemon daemon;
+    daemon.start(always(Outcome::kDone));
+    EXPECT_EQ(bushctl({name, "theta", "phi"}).code, 0);
+    EXPECT_THAT(only<Request>(daemon).motors, ElementsAre("theta", "phi"));
+  }
+}
+
+template <class... Request>
+void expect_subcommands(const std::variant<Request...>* /*requests*/) {
+  (expect_subcommand<Request>(), ...);
+}
+
+TEST(Bushctl, EachRequestThatOnlyNamesMotorsHasASubcommand) {
+  expect_subcommands(static_cast<const api::Request::variant*>(nullptr));
+}
+
 TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
   FakeDaemon daemon;
   daemon.start(always(Outcome::kDone));
   EXPECT_EQ(bushctl({"stop"}).code, 0);
   EXPECT_EQ(bushctl({"stop", "theta", "--wait"}).code, 0);
-  EXPECT_EQ(bushctl({"enable", "theta", "phi"}).code, 0);
   EXPECT_EQ(bushctl({"disable"}).code, 0);
+  EXPECT_EQ(bushctl({"confirm"}).code, 2) << "of no motor";
   EXPECT_EQ(bushctl({"set", "theta", "-100"}).code, 0);
-  EXPECT_EQ(bushctl({"clear"}).code, 0);
   EXPECT_EQ(bushctl({"estop"}).code, 1) << "done for a reason: not everywhere";
-  EXPECT_EQ(bushctl({"disarm", "theta"}).code, 0);
   EXPECT_EQ(bushctl({"compare", "theta", "-5", "--width-us", "7"}).code, 0);
   const auto requests = daemon.requests();
-  ASSERT_EQ(requests.size(), 9u);
+  ASSERT_EQ(requests.size(), 6u);
   EXPECT_TRUE(std::get<api::Stop>(requests[0]).motors.empty());
   EXPECT_THAT(std::get<api::Stop>(requests[1]).motors, ElementsAre("theta"));
-  EXPECT_THAT(std::get<api::Enable>(requests[2]).motors, ElementsAre("theta", "phi"));
-  EXPECT_TRUE(std::get<api::Disable>(requests[3]).motors.empty());
-  EXPECT_EQ(std::get<api::SetPosition>(requests[4]).motors, user({{"theta", -100}}));
-  EXPECT_TRUE(std::holds_alternative<api::ClearFaults>(requests[5]));
-  EXPECT_TRUE(std::holds_alternative<api::EmergencyStop>(requests[6]));
-  EXPECT_THAT(std::get<api::Disarm>(requests[7]).motors, ElementsAre("theta"));
-  const auto compare = std::get<api::PositionCompare>(requests[8]);
+  EXPECT_TRUE(std::get<api::Disable>(requests[2]).motors.empty());
+  EXPECT_EQ(std::get<api::SetPosition>(requests[3]).motors, user({{"theta", -100}}));
+  EXPECT_TRUE(std::holds_alternative<api::EmergencyStop>(requests[4]));
+  const auto compare = std::get<api::PositionCompare>(requests[5]);
   EXPECT_EQ(compare.position, api::Amount(api::UserUnits{-5}));
   EXPECT_EQ(compare.width_us, 7);
 }
