@@ -270,144 +270,96 @@ void put(const bushd_acknowledgement& m, Fields& f) {
 }
 
 template <class Message>
-std::string text(const char* name, const bushd_frame& frame,
-                 bushd_status (*decode)(const uint8_t*, size_t, Message*)) {
-  Message message{};
+Message decoded_by(bushd_status (*)(const uint8_t*, size_t, Message*));
+
+template <auto kDecode>
+bushd_status read(const bushd_frame& frame, Fields* fields) {
+  decltype(decoded_by(kDecode)) message{};
   // One report alone does not say which motors there are.
-  if constexpr (std::is_same_v<Message, bushd_report>) message.motor_count = BUSHD_MOTORS_PER_MCU;
-  const bushd_status status = decode(frame.payload, frame.payload_size, &message);
-  if (status != BUSHD_OK) return std::string(name) + ": " + bushd_status_text(status);
-  Fields fields;
-  put(message, fields);
-  return name + fields.text();
+  if constexpr (requires { message.motor_count; }) message.motor_count = BUSHD_MOTORS_PER_MCU;
+  const bushd_status status = kDecode(frame.payload, frame.payload_size, &message);
+  if (status == BUSHD_OK) put(message, *fields);
+  return status;
 }
 
-std::string empty_text(const char* name, const bushd_frame& frame) {
-  return frame.payload_size == 0 ? name : std::string(name) + ": payload not empty";
+bushd_status read_nothing(const bushd_frame& frame, Fields* /*fields*/) {
+  return frame.payload_size == 0 ? BUSHD_OK : BUSHD_E_LENGTH;
+}
+
+struct Row {
+  uint8_t type;
+  const char* name;
+  bushd_status (*read)(const bushd_frame& frame, Fields* fields);
+};
+constexpr Row kAcknowledgement = {BUSHD_TYPE_REPLY, "acknowledgement",
+                                  read<bushd_decode_acknowledgement>};
+constexpr Row kRows[] = {
+    {BUSHD_MSG_IDENTIFY, "identify", read<bushd_decode_identify>},
+    {BUSHD_MSG_CONFIGURE, "configure", read<bushd_decode_configure>},
+    {BUSHD_MSG_TABLE_BEGIN, "table_begin", read<bushd_decode_table_begin>},
+    {BUSHD_MSG_TABLE_DATA, "table_data", read<bushd_decode_table_data>},
+    {BUSHD_MSG_TABLE_END, "table_end", read<bushd_decode_table_end>},
+    {BUSHD_MSG_ASSIGN, "assign", read<bushd_decode_assign>},
+    {BUSHD_MSG_CONTROL, "control", read<bushd_decode_control>},
+    {BUSHD_MSG_SET_POSITION, "set_position", read<bushd_decode_set_position>},
+    {BUSHD_MSG_POLL, "poll", read<bushd_decode_poll>},
+    {BUSHD_MSG_SYNC, "sync", read<bushd_decode_sync>},
+    {BUSHD_MSG_TICKS, "ticks", read<bushd_decode_ticks>},
+    {BUSHD_MSG_TABLE_TICKS, "table_ticks", read<bushd_decode_table_ticks>},
+    {BUSHD_MSG_TABLE_RUN, "table_run", read<bushd_decode_table_run>},
+    {BUSHD_MSG_LINE_RUN, "line_run", read<bushd_decode_line_run>},
+    {BUSHD_MSG_LINE_TRIGGER, "line_trigger", read<bushd_decode_line_trigger>},
+    {BUSHD_MSG_TRIGGER, "trigger", read<bushd_decode_trigger>},
+    {BUSHD_MSG_POSITION_COMPARE, "position_compare", read<bushd_decode_position_compare>},
+    {BUSHD_MSG_EMERGENCY, "emergency", read<bushd_decode_emergency>},
+    {BUSHD_MSG_EMISSION, "emission", read<bushd_decode_emission>},
+    {BUSHD_MSG_SET_ADDRESS, "set_address", read<bushd_decode_set_address>},
+    {BUSHD_MSG_TABLES, "get_tables", read_nothing},
+    {BUSHD_MSG_INPUTS, "set_inputs", read<bushd_decode_set_inputs>},
+    {BUSHD_MSG_MOTOR_INPUTS, "motor_inputs", read<bushd_decode_motor_inputs>},
+    {BUSHD_MSG_HOME, "home", read<bushd_decode_home>},
+    {BUSHD_MSG_TRAVEL, "travel", read<bushd_decode_travel>},
+    {BUSHD_MSG_LOCAL, "local", read<bushd_decode_local>},
+    {BUSHD_MSG_CURRENTS, "currents", read<bushd_decode_currents>},
+    {BUSHD_MSG_VELOCITY, "set_velocity", read<bushd_decode_set_velocity>},
+    {BUSHD_MSG_OUTPUTS, "set_outputs", read<bushd_decode_set_outputs>},
+    {BUSHD_MSG_PROGRAM_PUT, "program_put", read<bushd_decode_program_put>},
+    {BUSHD_MSG_PROGRAM, "program_control", read<bushd_decode_program_control>},
+    {BUSHD_MSG_PROGRAM_STATE, "get_program_state", read_nothing},
+    {BUSHD_TYPE_REPLY | BUSHD_MSG_PROGRAM_STATE, "program_state", read<bushd_decode_program_state>},
+    {BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES, "tables", read<bushd_decode_tables>},
+    {BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY, "identity", read<bushd_decode_identity>},
+    {BUSHD_TYPE_REPLY | BUSHD_MSG_POLL, "report", read<bushd_decode_report>},
+};
+
+const Row* row_of(const bushd_frame& frame) {
+  for (const Row& row : kRows) {
+    if (row.type == frame.type) return &row;
+  }
+  return (frame.type & BUSHD_TYPE_REPLY) != 0 ? &kAcknowledgement : nullptr;
 }
 
 }  // namespace
 
 std::string message_text(const bushd_frame& frame) {
-  switch (frame.type) {
-    case BUSHD_MSG_IDENTIFY:
-      return text("identify", frame, bushd_decode_identify);
-    case BUSHD_MSG_CONFIGURE:
-      return text("configure", frame, bushd_decode_configure);
-    case BUSHD_MSG_TABLE_BEGIN:
-      return text("table_begin", frame, bushd_decode_table_begin);
-    case BUSHD_MSG_TABLE_DATA:
-      return text("table_data", frame, bushd_decode_table_data);
-    case BUSHD_MSG_TABLE_END:
-      return text("table_end", frame, bushd_decode_table_end);
-    case BUSHD_MSG_ASSIGN:
-      return text("assign", frame, bushd_decode_assign);
-    case BUSHD_MSG_CONTROL:
-      return text("control", frame, bushd_decode_control);
-    case BUSHD_MSG_SET_POSITION:
-      return text("set_position", frame, bushd_decode_set_position);
-    case BUSHD_MSG_POLL:
-      return text("poll", frame, bushd_decode_poll);
-    case BUSHD_MSG_SYNC:
-      return text("sync", frame, bushd_decode_sync);
-    case BUSHD_MSG_TICKS:
-      return text("ticks", frame, bushd_decode_ticks);
-    case BUSHD_MSG_TABLE_TICKS:
-      return text("table_ticks", frame, bushd_decode_table_ticks);
-    case BUSHD_MSG_TABLE_RUN:
-      return text("table_run", frame, bushd_decode_table_run);
-    case BUSHD_MSG_LINE_RUN:
-      return text("line_run", frame, bushd_decode_line_run);
-    case BUSHD_MSG_LINE_TRIGGER:
-      return text("line_trigger", frame, bushd_decode_line_trigger);
-    case BUSHD_MSG_TRIGGER:
-      return text("trigger", frame, bushd_decode_trigger);
-    case BUSHD_MSG_POSITION_COMPARE:
-      return text("position_compare", frame, bushd_decode_position_compare);
-    case BUSHD_MSG_EMERGENCY:
-      return text("emergency", frame, bushd_decode_emergency);
-    case BUSHD_MSG_EMISSION:
-      return text("emission", frame, bushd_decode_emission);
-    case BUSHD_MSG_SET_ADDRESS:
-      return text("set_address", frame, bushd_decode_set_address);
-    case BUSHD_MSG_TABLES:
-      return empty_text("get_tables", frame);
-    case BUSHD_MSG_INPUTS:
-      return text("set_inputs", frame, bushd_decode_set_inputs);
-    case BUSHD_MSG_MOTOR_INPUTS:
-      return text("motor_inputs", frame, bushd_decode_motor_inputs);
-    case BUSHD_MSG_HOME:
-      return text("home", frame, bushd_decode_home);
-    case BUSHD_MSG_TRAVEL:
-      return text("travel", frame, bushd_decode_travel);
-    case BUSHD_MSG_LOCAL:
-      return text("local", frame, bushd_decode_local);
-    case BUSHD_MSG_CURRENTS:
-      return text("currents", frame, bushd_decode_currents);
-    case BUSHD_MSG_VELOCITY:
-      return text("set_velocity", frame, bushd_decode_set_velocity);
-    case BUSHD_MSG_OUTPUTS:
-      return text("set_outputs", frame, bushd_decode_set_outputs);
-    case BUSHD_MSG_PROGRAM_PUT:
-      return text("program_put", frame, bushd_decode_program_put);
-    case BUSHD_MSG_PROGRAM:
-      return text("program_control", frame, bushd_decode_program_control);
-    case BUSHD_MSG_PROGRAM_STATE:
-      return empty_text("get_program_state", frame);
-    case BUSHD_TYPE_REPLY | BUSHD_MSG_PROGRAM_STATE:
-      return text("program_state", frame, bushd_decode_program_state);
-    case BUSHD_TYPE_REPLY | BUSHD_MSG_TABLES:
-      return text("tables", frame, bushd_decode_tables);
-    case BUSHD_TYPE_REPLY | BUSHD_MSG_IDENTIFY:
-      return text("identity", frame, bushd_decode_identity);
-    case BUSHD_TYPE_REPLY | BUSHD_MSG_POLL:
-      return text("report", frame, bushd_decode_report);
-    default:
-      if (frame.type & BUSHD_TYPE_REPLY) {
-        return text("acknowledgement", frame, bushd_decode_acknowledgement);
-      }
-      return "unknown message";
-  }
+  const Row* row = row_of(frame);
+  if (row == nullptr) return "unknown message";
+  Fields fields;
+  const bushd_status status = row->read(frame, &fields);
+  if (status != BUSHD_OK) return std::string(row->name) + ": " + bushd_status_text(status);
+  return row->name + fields.text();
+}
+
+bool is_message(const bushd_frame& frame) {
+  const Row* row = row_of(frame);
+  Fields fields;
+  return row != nullptr && row->read(frame, &fields) == BUSHD_OK;
 }
 
 std::set<std::string> message_names() {
-  return {"identify",
-          "identity",
-          "configure",
-          "table_begin",
-          "table_data",
-          "table_end",
-          "assign",
-          "control",
-          "set_position",
-          "poll",
-          "report",
-          "sync",
-          "ticks",
-          "acknowledgement",
-          "table_ticks",
-          "table_run",
-          "emergency",
-          "set_address",
-          "get_tables",
-          "tables",
-          "set_inputs",
-          "emission",
-          "home",
-          "local",
-          "trigger",
-          "position_compare",
-          "motor_inputs",
-          "line_run",
-          "travel",
-          "currents",
-          "line_trigger",
-          "set_velocity",
-          "set_outputs",
-          "program_put",
-          "program_control",
-          "get_program_state",
-          "program_state"};
+  std::set<std::string> names{kAcknowledgement.name};
+  for (const Row& row : kRows) names.insert(row.name);
+  return names;
 }
 
 }  // namespace bushd::test
