@@ -1,9 +1,9 @@
 """The vectors as C arrays, for firmware builds."""
 
 from answers import line_answers, move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes
-from chosen import FRAMES, IDENTIFY_WINDOWS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS
+from chosen import IDENTIFY_WINDOWS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS
 from definitions import frame, identify_window
-from messages import LAYOUTS, payload_of
+from messages import FRAMES, LAYOUTS, payload_of
 
 
 def c_array(kind, name, values):

@@ -18,9 +18,9 @@ sys.dont_write_bytecode = True  # no caches in the source tree
 
 from answers import line_answers, move_bytes, rest_bytes, run_state, slot_lists, take_over_bytes  # noqa: E402
 from c_header import c_header  # noqa: E402
-from chosen import FRAMES, IDENTIFY_WINDOWS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS  # noqa: E402
+from chosen import IDENTIFY_WINDOWS, LINES, MOVES, RUN_STATES, SLOTS, TABLES, TAKE_OVERS  # noqa: E402
 from definitions import frame, identify_window  # noqa: E402
-from messages import LAYOUTS, payload_of  # noqa: E402
+from messages import FRAMES, LAYOUTS, payload_of  # noqa: E402
 
 HERE = pathlib.Path(__file__).resolve().parent
 
