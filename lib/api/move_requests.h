@@ -101,6 +101,7 @@ struct Move {
     speed_fields(self.speed, visit);
     names_fields(self, visit, "motors", kOneMotorOrMore);
   }
+  friend bool operator==(const Move&, const Move&) = default;
 };
 
 struct MoveLine {
@@ -141,6 +142,7 @@ struct MoveLine {
     feed_fields(self.feed, visit);
     names_fields(self, visit, "motors", kMotorCount);
   }
+  friend bool operator==(const MoveLine&, const MoveLine&) = default;
 };
 
 struct MovePath {
@@ -189,6 +191,7 @@ struct MovePath {
                {"speeds", kMotorUnitPerS, "not to be exceeded on the way to that row; 0: `speed`"},
                self.speeds);
   }
+  friend bool operator==(const MovePath&, const MovePath&) = default;
 };
 
 struct Follow {
@@ -232,6 +235,7 @@ struct Follow {
     visit.list({"position_count", "row_count times motor_count"},
                {"positions", kMotorUnit, "row by row: one for each motor"}, self.positions);
   }
+  friend bool operator==(const Follow&, const Follow&) = default;
 };
 
 }  // namespace bushd::api

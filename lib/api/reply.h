@@ -76,6 +76,7 @@ struct MotorResult {
     visit({"most_steps_per_s", "not exceeded by any of them; 0 of what the MCU makes by itself"},
           self.most_steps_per_s);
   }
+  friend bool operator==(const MotorResult&, const MotorResult&) = default;
 };
 
 struct MovePlan {
@@ -93,11 +94,13 @@ struct MovePlan {
       visit({"duration_us", "to its last step"}, self.duration_us);
       visit("peak_steps_per_s", self.peak_steps_per_s);
     }
+    friend bool operator==(const Motor&, const Motor&) = default;
   };
   // Frames of the motion alone: no polls, synchronisation and repeats.
   struct Traffic {
     std::int64_t frames = 0;
     std::int64_t bytes = 0;
+    friend bool operator==(const Traffic&, const Traffic&) = default;
   };
   std::int64_t duration_us = 0;
   std::int64_t ticks = 0;
@@ -128,6 +131,7 @@ struct MovePlan {
                self.points_us);
     visit.set(self.traffic, traffic.frames < 0 ? std::optional<Traffic>{} : traffic);
   }
+  friend bool operator==(const MovePlan&, const MovePlan&) = default;
 };
 
 struct TableEntry {
@@ -150,9 +154,11 @@ struct TableEntry {
     visit("start_steps_per_s", self.start_steps_per_s, good);
     visit("max_steps_per_s", self.max_steps_per_s, good);
   }
+  friend bool operator==(const TableEntry&, const TableEntry&) = default;
 };
 struct TableList {
   std::vector<TableEntry> entries{};
+  friend bool operator==(const TableList&, const TableList&) = default;
 };
 
 struct PastMotion {
@@ -195,6 +201,7 @@ struct MotionHistory {
   static void fields(auto& self, auto& visit) {
     visit.list("motion_count", {"motions", "the newest first; in parts"}, self.motions);
   }
+  friend bool operator==(const MotionHistory&, const MotionHistory&) = default;
 };
 
 struct MotorSetting {
@@ -225,6 +232,7 @@ struct Configuration {
     visit({"sha256", "of its text as the daemon knows it"}, self.sha256);
     visit.list("setting_count", {"settings", "in parts"}, self.settings);
   }
+  friend bool operator==(const Configuration&, const Configuration&) = default;
 };
 
 struct CamacResult {
@@ -331,10 +339,13 @@ struct ProgramList {
   friend bool operator==(const ProgramList&, const ProgramList&) = default;
 };
 
-struct Accepted {};
+struct Accepted {
+  friend bool operator==(const Accepted&, const Accepted&) = default;
+};
 
 struct Refused {
   std::string reason{};
+  friend bool operator==(const Refused&, const Refused&) = default;
 };
 
 // Motors of moves, homing and arming, in the request's order; a plan of a dry run; answers of the
@@ -355,6 +366,7 @@ struct Completed {
   Outcome outcome = Outcome::kDone;
   std::string reason{};
   Detail detail{};
+  friend bool operator==(const Completed&, const Completed&) = default;
 };
 
 struct Reply : std::variant<Accepted, Refused, Completed> {

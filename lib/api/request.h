@@ -38,6 +38,7 @@ struct Stop {
   static constexpr Motion motion() { return Motion::kEndsOnLines; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  friend bool operator==(const Stop&, const Stop&) = default;
 };
 
 struct EmergencyStop {
@@ -51,6 +52,7 @@ struct EmergencyStop {
   static constexpr Motion motion() { return Motion::kEnds; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
+  friend bool operator==(const EmergencyStop&, const EmergencyStop&) = default;
 };
 
 struct Enable {
@@ -63,6 +65,7 @@ struct Enable {
       "the reason names its other ones";
   static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  friend bool operator==(const Enable&, const Enable&) = default;
 };
 
 struct Disable {
@@ -74,6 +77,7 @@ struct Disable {
   static constexpr std::string_view kResult = "as of enable_t";
   static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  friend bool operator==(const Disable&, const Disable&) = default;
 };
 
 struct SetPosition {
@@ -91,6 +95,7 @@ struct SetPosition {
     visit({"dial", "user units are those of the dial"}, self.dial);
     names_fields(self, visit, "motors", kOneMotorOrMore);
   }
+  friend bool operator==(const SetPosition&, const SetPosition&) = default;
 };
 
 struct ClearFaults {
@@ -102,6 +107,7 @@ struct ClearFaults {
   static constexpr std::string_view kResult = "as of enable_t";
   static constexpr Motion motion() { return Motion::kLiftsEmergencyStop; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  friend bool operator==(const ClearFaults&, const ClearFaults&) = default;
 };
 
 struct Home {
@@ -124,6 +130,7 @@ struct Home {
         {"all", "all motors with a home switch, in the order of their `home`; none is named then"},
         self.all);
   }
+  friend bool operator==(const Home&, const Home&) = default;
 };
 
 inline constexpr fields::Field kWhileConnected{
@@ -153,6 +160,7 @@ struct Arm {
     visit(kWhileConnected, self.while_connected);
     names_fields(self, visit, {"motors", "by so much, not 0"}, kOneMotorOrMore);
   }
+  friend bool operator==(const Arm&, const Arm&) = default;
 };
 
 struct ArmLine {
@@ -181,6 +189,7 @@ struct ArmLine {
     visit(kWhileConnected, self.while_connected);
     names_fields(self, visit, {"motors", "each makes a step at least"}, MoveLine::kMotorCount);
   }
+  friend bool operator==(const ArmLine&, const ArmLine&) = default;
 };
 
 struct Disarm {
@@ -192,6 +201,7 @@ struct Disarm {
   static constexpr std::string_view kResult = "done, when they no longer wait";
   static constexpr Motion motion() { return Motion::kEnds; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  friend bool operator==(const Disarm&, const Disarm&) = default;
 };
 
 // Directions as a sum of bits.
@@ -235,6 +245,7 @@ struct PositionCompare {
     visit({"delay_us", "from the step to the pulse", kDelayUs}, self.delay_us);
     visit({"width_us", "of the pulse; of no meaning without arrivals", kWidthUs}, self.width_us);
   }
+  friend bool operator==(const PositionCompare&, const PositionCompare&) = default;
 };
 
 struct Confirm {
@@ -248,6 +259,7 @@ struct Confirm {
   static void fields(auto& self, auto& visit) {
     names_fields(self, visit, "motors", {"motor_count", "at least 1"});
   }
+  friend bool operator==(const Confirm&, const Confirm&) = default;
 };
 
 struct GetHistory {
@@ -265,6 +277,7 @@ struct GetHistory {
     visit("motor", self.motor);
     visit({"most", "motions, the newest", kMost}, self.most);
   }
+  friend bool operator==(const GetHistory&, const GetHistory&) = default;
 };
 
 struct Configure {
@@ -308,6 +321,7 @@ struct Configure {
     visit.list("change_count", {"changes", "of CHANGE and SAVED"}, self.changes);
     visit({"file_sha256", "of SAVED: of bushd.toml as it is now"}, self.file_sha256);
   }
+  friend bool operator==(const Configure&, const Configure&) = default;
 };
 
 struct Jog {
@@ -350,6 +364,7 @@ struct Jog {
            kStepsAfter},
           self.steps_after, fields::NoneIs<std::int64_t>{-1});
   }
+  friend bool operator==(const Jog&, const Jog&) = default;
 };
 
 struct Pause {
@@ -363,6 +378,7 @@ struct Pause {
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kEndsOnLines; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  friend bool operator==(const Pause&, const Pause&) = default;
 };
 
 struct Resume {
@@ -376,6 +392,7 @@ struct Resume {
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kBegins; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  friend bool operator==(const Resume&, const Resume&) = default;
 };
 
 struct Hold {
@@ -389,6 +406,7 @@ struct Hold {
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kEnds; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  friend bool operator==(const Hold&, const Hold&) = default;
 };
 
 struct Release {
@@ -400,6 +418,7 @@ struct Release {
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kLiftsHold; }
   static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  friend bool operator==(const Release&, const Release&) = default;
 };
 
 struct Camac {
@@ -417,6 +436,7 @@ struct Camac {
     visit("crate", self.crate);
     camac::Block::fields(self.block, visit);
   }
+  friend bool operator==(const Camac&, const Camac&) = default;
 };
 
 struct Request : std::variant<Move, Stop, EmergencyStop, Enable, Disable, SetPosition, ClearFaults,

@@ -299,6 +299,7 @@ struct McuHealth {
           self.clock_offset_us);
     visit({"two_masters", "it hears two of them"}, self.two_masters);
   }
+  friend bool operator==(const McuHealth&, const McuHealth&) = default;
 };
 
 struct HealthSnapshot {
@@ -313,6 +314,7 @@ struct HealthSnapshot {
             fields::If{self.below_us != INT64_MAX});
       visit({"answers", "below this bound and not below that of the bin before"}, self.answers);
     }
+    friend bool operator==(const Latency&, const Latency&) = default;
   };
   std::string bus{};
   std::string port_state{};
@@ -351,6 +353,7 @@ struct HealthSnapshot {
                self.latency);
     visit.list("mcu_count", "mcus", self.mcus);
   }
+  friend bool operator==(const HealthSnapshot&, const HealthSnapshot&) = default;
 };
 
 struct CamacLam {

@@ -29,6 +29,7 @@ struct UseTable {
     visit("group", self.group);
     visit(kTableWithRevision, self.table);
   }
+  friend bool operator==(const UseTable&, const UseTable&) = default;
 };
 
 struct ReloadTables {
@@ -39,6 +40,7 @@ struct ReloadTables {
       "refused if no table that has changed is valid";
   static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
+  friend bool operator==(const ReloadTables&, const ReloadTables&) = default;
 };
 
 struct ListTables {
@@ -48,6 +50,7 @@ struct ListTables {
   static constexpr Motion motion() { return Motion::kNone; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
+  friend bool operator==(const ListTables&, const ListTables&) = default;
 };
 
 struct GetTable {
@@ -58,6 +61,7 @@ struct GetTable {
   static constexpr Motion motion() { return Motion::kNone; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& self, auto& visit) { visit(kTableWithRevision, self.table); }
+  friend bool operator==(const GetTable&, const GetTable&) = default;
 };
 
 struct SetTable {
@@ -80,6 +84,7 @@ struct SetTable {
           self.expected_hash);
     visit({"content", "its hash does not matter"}, self.content);
   }
+  friend bool operator==(const SetTable&, const SetTable&) = default;
 };
 
 struct PutProgram {
@@ -117,6 +122,7 @@ struct PutProgram {
     visit.list("file_count", "points", self.points);
     visit({"dry_run", "it is checked, and what it would do is told"}, self.dry_run);
   }
+  friend bool operator==(const PutProgram&, const PutProgram&) = default;
 };
 
 struct EraseProgram {
@@ -128,6 +134,7 @@ struct EraseProgram {
   static constexpr std::string_view kResult = "done";
   static constexpr Motion motion() { return Motion::kNone; }
   static void fields(auto& self, auto& visit) { visit("program", self.program); }
+  friend bool operator==(const EraseProgram&, const EraseProgram&) = default;
 };
 
 struct RunPrograms {
@@ -144,6 +151,7 @@ struct RunPrograms {
   static void fields(auto& self, auto& visit) {
     visit.list({"program_count", "at least 1, none twice"}, "programs", self.programs);
   }
+  friend bool operator==(const RunPrograms&, const RunPrograms&) = default;
 };
 
 struct ListPrograms {
@@ -155,6 +163,7 @@ struct ListPrograms {
   static constexpr Motion motion() { return Motion::kNone; }
   static constexpr bool is_repeatable() { return true; }
   static void fields(auto& /*self*/, auto& /*visit*/) {}
+  friend bool operator==(const ListPrograms&, const ListPrograms&) = default;
 };
 
 }  // namespace bushd::api

@@ -56,6 +56,10 @@ TEST_F(PublishingTest, AChangeIsPublishedAtOnce) {
   EXPECT_EQ(publish(kFirst, state_), 0u);
   state_.detail = "drivers disabled";
   EXPECT_EQ(publish(kFirst, state_), 1u);
+  state_.program = "scan waits, frame 3";  // its motors rest
+  EXPECT_EQ(publish(kFirst, state_), 1u);
+  ++state_.tick;
+  EXPECT_EQ(publish(kFirst, state_), 0u);
 }
 
 TEST_F(PublishingTest, WhatCannotBeSentIsTold) {

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 #include <random>
 #include <string>
 
 #include "lcm/all_messages.h"
+#include "lcm/arrival.h"
 #include "lcm/oracle.h"
 #include "lcm/random_message.h"
 #include "lcm/wire.h"
@@ -15,37 +17,18 @@
 namespace bushd::lcm {
 namespace {
 
-const RequestId kId{.session = -7, .client_id = "scan-hall-4711", .number = 1};
+using test::expect_arrives;
+using test::kId;
 
-// By way of the messages: encoded, decoded and encoded again it is the same.
-ClientMessage over_the_wire(const api::Request& request) {
-  const auto packet = encode(12, kId, request);
-  EXPECT_TRUE(packet) << packet.error().text();
-  const auto message = decode_client_message(packet->channel, packet->payload);
-  EXPECT_TRUE(message);
-  EXPECT_EQ(message->id, kId);
-  const auto again = encode(12, message->id, std::get<api::Request>(message->content));
-  EXPECT_EQ(again->payload, packet->payload);
-  EXPECT_EQ(again->channel, packet->channel);
-  return *message;
-}
-
-template <class T>
-T request_over_the_wire(const T& request) {
-  return std::get<T>(std::get<api::Request>(over_the_wire(request).content));
-}
-
-ReplyMessage reply_over_the_wire(const api::Reply& reply) {
+void expect_reply_arrives(const api::Reply& reply) {
   const auto packets = encode(12, kId, reply);
-  EXPECT_TRUE(packets) << packets.error().text();
-  EXPECT_EQ(packets->size(), 1u);
-  const Packet& packet = packets->front();
-  const auto message = decode_daemon_message(packet.channel, packet.payload);
-  EXPECT_TRUE(message);
-  auto out = std::get<ReplyMessage>(*message);
-  EXPECT_EQ(out.id, kId);
-  EXPECT_EQ(encode(12, out.id, out.reply)->front().payload, packet.payload);
-  return out;
+  ASSERT_TRUE(packets) << packets.error().text();
+  ASSERT_EQ(packets->size(), 1u);
+  const auto [channel, payload] = packets->front();
+  const auto arrived = std::get<ReplyMessage>(*decode_daemon_message(channel, payload));
+  EXPECT_EQ(arrived.id, kId);
+  EXPECT_TRUE(arrived.reply == reply);
+  EXPECT_EQ(encode(12, arrived.id, arrived.reply)->front().payload, payload);
 }
 
 template <class... Content>
@@ -67,149 +50,94 @@ TEST(Codec, EveryRequestHasAChannelOfItsOwn) {
 }
 
 TEST(Codec, MovesArriveAsTheyWereMeant) {
-  const auto move =
-      request_over_the_wire(api::Move{.kind = api::Move::Kind::kAbsolute,
-                                      .motors = {{"theta", -400}, {"chi", api::UserUnits{2.5}}},
-                                      .dry_run = true});
-  EXPECT_EQ(move.kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(move.motors,
-            (std::vector<api::MotorAmount>{{"theta", -400}, {"chi", api::UserUnits{2.5}}}));
-  EXPECT_TRUE(move.dry_run);
+  expect_arrives(api::Move{.kind = api::Move::Kind::kAbsolute,
+                           .motors = {{"theta", -400}, {"chi", api::UserUnits{2.5}}},
+                           .dry_run = true});
 }
 
 TEST(Codec, OtherRequestsDoToo) {
-  EXPECT_EQ(request_over_the_wire(api::Stop{{"a", "b"}}).motors, (api::MotorNames{"a", "b"}));
-  request_over_the_wire(api::EmergencyStop{});
-  EXPECT_EQ(request_over_the_wire(api::Enable{{"a"}}).motors, api::MotorNames{"a"});
-  EXPECT_EQ(request_over_the_wire(api::Disable{}).motors, api::MotorNames{});
-  EXPECT_EQ(request_over_the_wire(api::SetPosition{.motors = {{"a", 5}}}).motors.front().amount,
-            api::Amount(std::int64_t{5}));
-  EXPECT_EQ(request_over_the_wire(api::ClearFaults{{"a"}}).motors, api::MotorNames{"a"});
-  EXPECT_EQ(request_over_the_wire(api::UseTable{"group", "own@2"}).table, "own@2");
-  request_over_the_wire(api::ReloadTables{});
-  EXPECT_EQ(request_over_the_wire(api::Home{{"a"}}).motors, api::MotorNames{"a"});
-  const auto arm = request_over_the_wire(api::Arm{
-      .edge = api::Edge::kFalling, .delay_us = 100, .motors = {{"a", 3}}, .while_connected = true});
-  EXPECT_TRUE(arm.while_connected);
-  EXPECT_EQ(arm.edge, api::Edge::kFalling);
-  EXPECT_EQ(arm.delay_us, 100);
-  const auto armed =
-      request_over_the_wire(api::ArmLine{.edge = api::Edge::kFalling,
-                                         .delay_us = 77,
-                                         .kind = api::Move::Kind::kAbsolute,
-                                         .motors = {{"a", 3}, {"b", api::UserUnits{-0.5}}},
-                                         .speed = api::Speed{.per_s = 4, .in_steps = true},
-                                         .duration_s = 2.5,
-                                         .while_connected = true});
-  EXPECT_TRUE(armed.while_connected);
-  EXPECT_EQ(armed.edge, api::Edge::kFalling);
-  EXPECT_EQ(armed.delay_us, 77);
-  EXPECT_EQ(armed.kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(armed.motors, (std::vector<api::MotorAmount>{{"a", 3}, {"b", api::UserUnits{-0.5}}}));
-  EXPECT_EQ(armed.speed, (api::Speed{.per_s = 4, .in_steps = true}));
-  EXPECT_EQ(armed.duration_s, 2.5);
-  EXPECT_FALSE(request_over_the_wire(api::ArmLine{.motors = {{"a", 3}}}).duration_s);
-  EXPECT_EQ(request_over_the_wire(api::Disarm{{"a"}}).motors, api::MotorNames{"a"});
-  const auto compare = request_over_the_wire(api::PositionCompare{
-      .motor = "a", .position = 9, .arrivals = {.negative = true}, .delay_us = 5, .width_us = 6});
-  EXPECT_FALSE(compare.arrivals.positive);
-  EXPECT_TRUE(compare.arrivals.negative);
-  EXPECT_EQ(compare.width_us, 6);
-  EXPECT_EQ(request_over_the_wire(api::Confirm{{"a"}}).motors, api::MotorNames{"a"});
-  const auto history = request_over_the_wire(api::GetHistory{.motor = "a", .most = 7});
-  EXPECT_EQ(history.motor, "a");
-  EXPECT_EQ(history.most, 7);
-  EXPECT_TRUE(request_over_the_wire(api::Home{.all = true}).all);
+  const std::vector<api::MotorAmount> both{{"a", 3}, {"b", api::UserUnits{-0.5}}};
+  const std::vector<api::Configure::Change> changes{{"a", "offset", "2.5"}};
+  const api::TableFile table{.content = {.name = "own",
+                                         .time_unit_ns = 4000,
+                                         .accel = {2500, 1200},
+                                         .decel = std::vector<std::uint16_t>{1200, 2500},
+                                         .cruise = std::uint16_t{900},
+                                         .revision = 2}};
   const camac::Block block{.mode = camac::BlockMode::kScan,
                            .cycles = {{5, 15, 31, 0xFFFFFF}, {31, 0, 0, 7}},
                            .count = 9,
                            .last_station = 23,
                            .last_subaddress = 3};
-  const auto cycles = request_over_the_wire(api::Camac{.crate = 62, .block = block});
-  EXPECT_EQ(cycles.crate, 62);
-  EXPECT_EQ(cycles.block, block);
-  using Kind = api::Configure::Kind;
-  EXPECT_EQ(request_over_the_wire(api::Configure{.motors = {"a"}}).motors, api::MotorNames{"a"});
-  for (const Kind kind : {Kind::kShow, Kind::kChange, Kind::kSaved}) {
-    const auto configure = request_over_the_wire(
-        api::Configure{.kind = kind, .changes = {{"a", "offset", "2.5"}}, .file_sha256 = "abc"});
-    EXPECT_EQ(configure.kind, kind);
-    EXPECT_EQ(configure.changes, (std::vector<api::Configure::Change>{{"a", "offset", "2.5"}}));
-    EXPECT_EQ(configure.file_sha256, "abc");
+  for (const api::Request& request : std::vector<api::Request>{
+           api::Stop{{"a", "b"}},
+           api::EmergencyStop{},
+           api::Enable{{"a"}},
+           api::Disable{},
+           api::SetPosition{.motors = {{"a", 5}}},
+           api::ClearFaults{{"a"}},
+           api::UseTable{"group", "own@2"},
+           api::ReloadTables{},
+           api::Home{{"a"}},
+           api::Home{.all = true},
+           api::Arm{.edge = api::Edge::kFalling,
+                    .delay_us = 100,
+                    .motors = {{"a", 3}},
+                    .while_connected = true},
+           api::ArmLine{.edge = api::Edge::kFalling,
+                        .delay_us = 77,
+                        .kind = api::Move::Kind::kAbsolute,
+                        .motors = both,
+                        .speed = api::Speed{.per_s = 4, .in_steps = true},
+                        .duration_s = 2.5,
+                        .while_connected = true},
+           api::ArmLine{.motors = {{"a", 3}}},
+           api::Disarm{{"a"}},
+           api::PositionCompare{.motor = "a",
+                                .position = 9,
+                                .arrivals = {.negative = true},
+                                .delay_us = 5,
+                                .width_us = 6},
+           api::Confirm{{"a"}},
+           api::GetHistory{.motor = "a", .most = 7},
+           api::Camac{.crate = 62, .block = block},
+           api::Configure{.motors = {"a"}},
+           api::Configure{.changes = changes, .file_sha256 = "abc"},
+           api::Configure{
+               .kind = api::Configure::Kind::kChange, .changes = changes, .file_sha256 = "abc"},
+           api::Configure{
+               .kind = api::Configure::Kind::kSaved, .changes = changes, .file_sha256 = "abc"},
+           api::MoveLine{.kind = api::Move::Kind::kAbsolute,
+                         .motors = both,
+                         .dry_run = true,
+                         .speed = api::Speed{.per_s = 2.5},
+                         .duration_s = 12.5,
+                         .law = api::MoveLine::Law::kElementary,
+                         .feed = api::Speed{.per_s = 7, .in_steps = true}},
+           api::MoveLine{},
+           api::MovePath{.motors = {"a"},
+                         .rows = 3,
+                         .first_row = 1,
+                         .positions = {0.5, -2},
+                         .speeds = {0, 2},
+                         .corners = api::MovePath::Corners::kExact,
+                         .dry_run = true,
+                         .speed = api::Speed{.per_s = 2.5}},
+           api::Follow{.part = api::Follow::Part::kLastRows,
+                       .array = 7,
+                       .motors = {"a", "b"},
+                       .cubic = true,
+                       .stretch = 1.5,
+                       .time_s = {0, 0.5},
+                       .positions = {1, 2, 3, 4.25}},
+           api::Follow{.part = api::Follow::Part::kRun},
+           api::Jog{.motor = "a", .per_s = -2.5, .keepalive_ms = 300, .steps_after = 7},
+           api::Jog{.renew = true},
+           api::ListTables{},
+           api::GetTable{"own"},
+           api::SetTable{.table = "own", .content = table, .expected_hash = "abc"}}) {
+    expect_arrives(request);
   }
-  const auto line = request_over_the_wire(
-      api::MoveLine{.kind = api::Move::Kind::kAbsolute,
-                    .motors = {{"a", std::int64_t{4}}, {"b", api::UserUnits{-0.5}}},
-                    .dry_run = true,
-                    .speed = api::Speed{.per_s = 2.5},
-                    .duration_s = 12.5,
-                    .law = api::MoveLine::Law::kElementary,
-                    .feed = api::Speed{.per_s = 7, .in_steps = true}});
-  EXPECT_EQ(line.law, api::MoveLine::Law::kElementary);
-  EXPECT_EQ(line.feed, (api::Speed{.per_s = 7, .in_steps = true}));
-  EXPECT_FALSE(request_over_the_wire(api::MoveLine{}).feed);
-  EXPECT_EQ(line.kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(line.motors,
-            (std::vector<api::MotorAmount>{{"a", std::int64_t{4}}, {"b", api::UserUnits{-0.5}}}));
-  EXPECT_TRUE(line.dry_run);
-  EXPECT_EQ(line.speed, (api::Speed{.per_s = 2.5}));
-  EXPECT_EQ(line.duration_s, 12.5);
-  EXPECT_FALSE(request_over_the_wire(api::MoveLine{}).duration_s);
-  const auto path = request_over_the_wire(api::MovePath{.motors = {"a"},
-                                                        .rows = 3,
-                                                        .first_row = 1,
-                                                        .positions = {0.5, -2},
-                                                        .speeds = {0, 2},
-                                                        .corners = api::MovePath::Corners::kExact,
-                                                        .dry_run = true,
-                                                        .speed = api::Speed{.per_s = 2.5}});
-  EXPECT_EQ(path.motors, api::MotorNames{"a"});
-  EXPECT_EQ(path.rows, 3);
-  EXPECT_EQ(path.first_row, 1);
-  EXPECT_EQ(path.positions, (std::vector<double>{0.5, -2}));
-  EXPECT_EQ(path.speeds, (std::vector<double>{0, 2}));
-  EXPECT_EQ(path.corners, api::MovePath::Corners::kExact);
-  EXPECT_TRUE(path.dry_run);
-  EXPECT_EQ(path.speed, (api::Speed{.per_s = 2.5}));
-  const api::Follow rows{.part = api::Follow::Part::kLastRows,
-                         .array = 7,
-                         .motors = {"a", "b"},
-                         .cubic = true,
-                         .stretch = 1.5,
-                         .time_s = {0, 0.5},
-                         .positions = {1, 2, 3, 4.25}};
-  const auto follow = request_over_the_wire(rows);
-  EXPECT_EQ(follow.part, rows.part);
-  EXPECT_EQ(follow.array, 7);
-  EXPECT_EQ(follow.motors, rows.motors);
-  EXPECT_TRUE(follow.cubic);
-  EXPECT_EQ(follow.stretch, 1.5);
-  EXPECT_EQ(follow.time_s, rows.time_s);
-  EXPECT_EQ(follow.positions, rows.positions);
-  EXPECT_EQ(request_over_the_wire(api::Follow{.part = api::Follow::Part::kRun}).part,
-            api::Follow::Part::kRun);
-  const auto jog = request_over_the_wire(
-      api::Jog{.motor = "a", .per_s = -2.5, .keepalive_ms = 300, .steps_after = 7});
-  EXPECT_EQ(jog.motor, "a");
-  EXPECT_EQ(jog.per_s, -2.5);
-  EXPECT_EQ(jog.keepalive_ms, 300);
-  EXPECT_EQ(jog.steps_after, 7);
-  EXPECT_FALSE(request_over_the_wire(api::Jog{.renew = true}).steps_after);
-  request_over_the_wire(api::ListTables{});
-  EXPECT_EQ(request_over_the_wire(api::GetTable{"own"}).table, "own");
-  const auto set = request_over_the_wire(
-      api::SetTable{.table = "own",
-                    .content = {{.name = "own",
-                                 .time_unit_ns = 4000,
-                                 .accel = {2500, 1200},
-                                 .decel = std::vector<std::uint16_t>{1200, 2500},
-                                 .cruise = std::uint16_t{900},
-                                 .revision = 2}},
-                    .expected_hash = "abc"});
-  EXPECT_EQ(set.expected_hash, "abc");
-  EXPECT_EQ(set.content.content.accel, (std::vector<std::uint16_t>{2500, 1200}));
-  EXPECT_EQ(set.content.content.cruise, 900);
-  EXPECT_EQ(set.content.content.revision, 2u);
 }
 
 TEST(Codec, HelloSubscriptionAndStatusArrive) {
@@ -258,44 +186,18 @@ TEST(Codec, WhatNoMessageMeansIsRefused) {
 }
 
 TEST(Codec, RepliesArriveAsTheyWereMeant) {
-  EXPECT_TRUE(std::holds_alternative<api::Accepted>(reply_over_the_wire(api::Accepted{}).reply));
-  EXPECT_EQ(std::get<api::Refused>(reply_over_the_wire(api::Refused{"why"}).reply).reason, "why");
+  expect_reply_arrives(api::Accepted{});
+  expect_reply_arrives(api::Refused{"why"});
   const api::TableRef table{.name = "own", .revision = 2, .hash = "0123abcd"};
-  const auto moved = std::get<api::Completed>(
-      reply_over_the_wire(
-          api::Completed{
-              .outcome = api::Outcome::kLimit,
-              .reason = "theta: stopped",
-              .detail =
-                  std::vector<api::MotorResult>{
-                      {"theta", api::Outcome::kLimit, 7, 1.75, -0.25, "mm", 2, table, "me"},
-                      {"chi", api::Outcome::kReached, 9, 9, 9, "steps", 0, table}}})
-          .reply);
-  EXPECT_EQ(moved.outcome, api::Outcome::kLimit);
-  const auto& motors = std::get<std::vector<api::MotorResult>>(moved.detail);
-  EXPECT_EQ(motors.at(1).motor, "chi");
-  EXPECT_EQ(motors.at(1).table, table);
-  EXPECT_EQ(motors.at(0).position_steps, 7);
-  EXPECT_EQ(motors.at(0).user, 1.75);
-  EXPECT_EQ(motors.at(0).dial, -0.25);
-  EXPECT_EQ(motors.at(0).unit, "mm");
-  EXPECT_EQ(motors.at(0).precision, 2);
-  EXPECT_EQ(motors.at(0).who, "me");
+  expect_reply_arrives(
+      api::Completed{.outcome = api::Outcome::kLimit,
+                     .reason = "theta: stopped",
+                     .detail = std::vector<api::MotorResult>{
+                         {"theta", api::Outcome::kLimit, 7, 1.75, -0.25, "mm", 2, table, "me"},
+                         {"chi", api::Outcome::kReached, 9, 9, 9, "steps", 0, table}}});
 }
 
 TEST(Codec, PlansAndTablesDoToo) {
-  api::MovePlan plan;
-  plan.ticks = 5;
-  plan.motors.push_back({.motor = "a", .steps = 3, .duration_us = 4, .peak_steps_per_s = 5});
-  const auto planned = std::get<api::Completed>(
-      reply_over_the_wire(api::Completed{.reason = "r", .detail = plan}).reply);
-  EXPECT_FALSE(std::get<api::MovePlan>(planned.detail).traffic);
-  EXPECT_EQ(std::get<api::MovePlan>(planned.detail).motors.front().steps, 3);
-  const auto list = std::get<api::Completed>(
-      reply_over_the_wire(
-          api::Completed{.reason = "r", .detail = api::TableList{{{.name = "own", .fault = "f"}}}})
-          .reply);
-  EXPECT_EQ(std::get<api::TableList>(list.detail).entries.front().fault, "f");
   const api::PastMotion motion{.utime_us = 1,
                                .what = "move",
                                .who = "w",
@@ -305,53 +207,41 @@ TEST(Codec, PlansAndTablesDoToo) {
                                .reason = "r",
                                .from_text = "-2.0 mm",
                                .to_text = "3.0 mm"};
-  const auto history = std::get<api::Completed>(
-      reply_over_the_wire(
-          api::Completed{.reason = "r", .detail = api::MotionHistory{{motion, motion}}})
-          .reply);
-  EXPECT_EQ(std::get<api::MotionHistory>(history.detail).motions,
-            std::vector<api::PastMotion>({motion, motion}));
-  const api::CamacResult crate{
-      .block = {.responses = {{true, false, 0xFFFFFF}, {false, true, 0}}, .tally = 2},
-      .requests = 1U << 22};
-  const auto answered = std::get<api::Completed>(
-      reply_over_the_wire(api::Completed{.reason = "r", .detail = crate}).reply);
-  EXPECT_EQ(std::get<api::CamacResult>(answered.detail), crate);
-  const api::Configuration configuration{
-      .path = "/etc/b.toml",
-      .sha256 = "abc",
-      .settings = {{.motor = "a", .key = "offset", .value = "2.5", .in_file = "0"}}};
-  const auto configured = std::get<api::Configuration>(
-      std::get<api::Completed>(
-          reply_over_the_wire(api::Completed{.reason = "r", .detail = configuration}).reply)
-          .detail);
-  EXPECT_EQ(configured.path, configuration.path);
-  EXPECT_EQ(configured.sha256, configuration.sha256);
-  EXPECT_EQ(configured.settings, configuration.settings);
-  const api::TableFile own{.content = {.name = "own", .time_unit_ns = 4000, .accel = {2500, 1200}},
-                           .hash = "abc"};
-  const auto content = std::get<api::Completed>(
-      reply_over_the_wire(api::Completed{.reason = "r", .detail = own}).reply);
-  EXPECT_EQ(std::get<api::TableFile>(content.detail), own);
+  for (const api::Detail& detail : std::vector<api::Detail>{
+           api::MovePlan{
+               .ticks = 5,
+               .motors = {{.motor = "a", .steps = 3, .duration_us = 4, .peak_steps_per_s = 5}}},
+           api::TableList{{{.name = "own", .fault = "f"}}}, api::MotionHistory{{motion, motion}},
+           api::CamacResult{
+               .block = {.responses = {{true, false, 0xFFFFFF}, {false, true, 0}}, .tally = 2},
+               .requests = 1U << 22},
+           api::Configuration{
+               .path = "/etc/b.toml",
+               .sha256 = "abc",
+               .settings = {{.motor = "a", .key = "offset", .value = "2.5", .in_file = "0"}}},
+           api::TableFile{.content = {.name = "own", .time_unit_ns = 4000, .accel = {2500, 1200}},
+                          .hash = "abc"}}) {
+    expect_reply_arrives(api::Completed{.reason = "r", .detail = detail});
+  }
 }
 
-// Decodes the parts of a reply in this order of their indices, and puts them together.
-api::Completed put_together(const api::Reply& reply, const std::vector<std::size_t>& order) {
+// Its parts, decoded in this order of their indices and put together, are this reply.
+void expect_put_together(const api::Reply& reply, const std::vector<std::size_t>& order) {
   const auto packets = encode(1, kId, reply);
-  EXPECT_TRUE(packets);
+  ASSERT_TRUE(packets);
   ReplyParts parts;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const Packet& packet = packets->at(order[i]);
+  std::optional<api::Reply> whole;
+  for (const std::size_t part : order) {
+    EXPECT_FALSE(whole);
+    const Packet& packet = packets->at(part);
     EXPECT_LE(packet.payload.size(), kMaxMessageBytes);
     const auto message =
         std::get<ReplyMessage>(*decode_daemon_message(packet.channel, packet.payload));
     EXPECT_EQ(message.id, kId);
     EXPECT_EQ(message.parts, static_cast<std::int32_t>(packets->size()));
-    const auto whole = parts.add(message);
-    EXPECT_EQ(whole.has_value(), i + 1 == order.size());
-    if (whole) return std::get<api::Completed>(*whole);
+    whole = parts.add(message);
   }
-  return {};
+  EXPECT_TRUE(whole == reply);
 }
 
 TEST(Codec, ResultsOf2048MotorsComeInParts) {
@@ -376,21 +266,7 @@ TEST(Codec, ResultsOf2048MotorsComeInParts) {
   std::vector<std::size_t> order{4, 2, 2, 1, 3, 4};
   for (std::size_t part = 5; part < parts; ++part) order.push_back(part);
   order.push_back(0);
-  const auto whole = put_together(reply, order);
-  EXPECT_EQ(whole.outcome, api::Outcome::kLink);
-  EXPECT_EQ(whole.reason, "r");
-  const auto& arrived = std::get<std::vector<api::MotorResult>>(whole.detail);
-  ASSERT_EQ(arrived.size(), motors.size());
-  for (std::size_t i = 0; i < motors.size(); ++i) {
-    EXPECT_EQ(arrived[i].motor, motors[i].motor);
-    EXPECT_EQ(arrived[i].outcome, motors[i].outcome);
-    EXPECT_EQ(arrived[i].position_steps, motors[i].position_steps);
-    EXPECT_EQ(arrived[i].user, motors[i].user);
-    EXPECT_EQ(arrived[i].dial, motors[i].dial);
-    EXPECT_EQ(arrived[i].unit, motors[i].unit);
-    EXPECT_EQ(arrived[i].precision, motors[i].precision);
-    EXPECT_EQ(arrived[i].table, motors[i].table);
-  }
+  expect_put_together(reply, order);
 }
 
 TEST(Codec, APlanOf2048MotorsComesInParts) {
@@ -398,12 +274,7 @@ TEST(Codec, APlanOf2048MotorsComesInParts) {
   for (int i = 0; i < 2048; ++i) {
     plan.motors.push_back({.motor = "motor" + std::to_string(i), .steps = i, .duration_us = 2 * i});
   }
-  const auto whole = put_together(api::Completed{.reason = "r", .detail = plan}, {1, 0});
-  const auto& arrived = std::get<api::MovePlan>(whole.detail);
-  EXPECT_EQ(arrived.ticks, 6);
-  EXPECT_EQ(arrived.traffic->bytes, 8);
-  ASSERT_EQ(arrived.motors.size(), 2048u);
-  for (int i = 0; i < 2048; ++i) EXPECT_EQ(arrived.motors[static_cast<std::size_t>(i)].steps, i);
+  expect_put_together(api::Completed{.reason = "r", .detail = plan}, {1, 0});
 }
 
 TEST(Codec, AListOfManyTablesComesInParts) {
@@ -413,9 +284,7 @@ TEST(Codec, AListOfManyTablesComesInParts) {
   std::vector<std::size_t> order(encode(1, kId, reply)->size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = order.size() - 1 - i;
   EXPECT_GT(order.size(), 5u);
-  const auto whole = put_together(reply, order);
-  EXPECT_EQ(std::get<api::TableList>(whole.detail).entries.size(), 5000u);
-  EXPECT_EQ(whole.reason, "all tables");
+  expect_put_together(reply, order);
 }
 
 TEST(Codec, LongBlocksOfACrateComeInParts) {
@@ -423,8 +292,7 @@ TEST(Codec, LongBlocksOfACrateComeInParts) {
   for (std::uint32_t i = 0; i < 20'000; ++i) {
     crate.block.responses.push_back({.x = i % 2 == 0, .q = i % 3 == 0, .data = i});
   }
-  const auto whole = put_together(api::Completed{.reason = "r", .detail = crate}, {1, 0});
-  EXPECT_EQ(std::get<api::CamacResult>(whole.detail), crate);
+  expect_put_together(api::Completed{.reason = "r", .detail = crate}, {1, 0});
 }
 
 TEST(Codec, LamArrives) {
@@ -499,10 +367,8 @@ TEST(Codec, SnapshotsArriveAsTheyAre) {
                                    .latency = {{1000, 7}, {INT64_MAX, 1}},
                                    .mcus = {{.mcu = "hall:1", .ramp_downs = 3}}};
   const auto sick = encode(part, health);
-  const auto heard = std::get<HealthMessage>(*decode_daemon_message("HEALTH", sick->payload));
-  EXPECT_EQ(heard.snapshot.latency.at(1).answers, 1u);
-  EXPECT_EQ(heard.snapshot.mcus.at(0).ramp_downs, 3u);
-  EXPECT_FALSE(heard.snapshot.mcus.at(0).low_water_ticks);
+  EXPECT_EQ(std::get<HealthMessage>(*decode_daemon_message("HEALTH", sick->payload)).snapshot,
+            health);
 }
 
 TEST(Codec, TheStateOfSixteenMotorsFitsAnEthernetFrameTwice) {
@@ -511,7 +377,7 @@ TEST(Codec, TheStateOfSixteenMotorsFitsAnEthernetFrameTwice) {
   EXPECT_LT(encode(Part{}, 0, state)->payload.size(), 2 * 1400u);
 }
 
-// Whatever decodes can be encoded.
+// Whatever decodes can be encoded, and a request arrives then as it is.
 template <class... Pair>
 std::vector<std::vector<std::uint8_t>> random_payloads(test::Random& random,
                                                        const std::tuple<Pair...>* /*all*/) {
@@ -525,9 +391,13 @@ TEST(Codec, RandomMessagesOfEveryChannelDoNoHarm) {
       for (const std::string_view channel : client_channels()) {
         const auto message = decode_client_message(channel, payload);
         if (!message) continue;
-        if (const auto* request = std::get_if<api::Request>(&message->content)) {
-          EXPECT_TRUE(encode(0, message->id, *request));
-        }
+        const auto* request = std::get_if<api::Request>(&message->content);
+        if (request == nullptr) continue;
+        const auto packet = encode(0, message->id, *request);
+        ASSERT_TRUE(packet);
+        // What cannot be said, as a code of a table that has none, has become nothing by then.
+        const auto said = decode_client_message(packet->channel, packet->payload);
+        expect_arrives(std::get<api::Request>(said->content));
       }
       for (const std::string_view channel : daemon_channels()) {
         const auto message = decode_daemon_message(channel, payload);

@@ -7,47 +7,33 @@
 #include <utility>
 #include <vector>
 
-#include "lcm/codec.h"
+#include "lcm/arrival.h"
 
 namespace bushd::lcm {
 namespace {
 
-const RequestId kAsker{.session = 2, .client_id = "me", .number = 3};
-
-template <class Request>
-Request carried(const Request& request) {
-  const auto packet = encode(1, kAsker, api::Request(request));
-  EXPECT_TRUE(packet) << packet.error().text();
-  const auto message = decode_client_message(packet->channel, packet->payload);
-  EXPECT_TRUE(message);
-  return std::get<Request>(std::get<api::Request>(message->content));
-}
+using test::kId;
 
 TEST(ProgramMessages, RequestsArriveAsTheyWereMeant) {
-  const std::vector<api::PutProgram::Points> points{{"p.csv", "x\n1\n"}, {"q.csv", ""}};
-  const auto put =
-      carried(api::PutProgram{.program = "scan", .text = "t\n", .points = points, .dry_run = true});
-  EXPECT_EQ(put.program, "scan");
-  EXPECT_EQ(put.text, "t\n");
-  EXPECT_EQ(put.points, points);
-  EXPECT_TRUE(put.dry_run);
-  EXPECT_EQ(carried(api::EraseProgram{"scan"}).program, "scan");
-  EXPECT_EQ(carried(api::RunPrograms{{"p", "q"}}).programs, (std::vector<std::string>{"p", "q"}));
+  test::expect_arrives(api::PutProgram{.program = "scan",
+                                       .text = "t\n",
+                                       .points = {{"p.csv", "x\n1\n"}, {"q.csv", ""}},
+                                       .dry_run = true});
+  test::expect_arrives(api::EraseProgram{"scan"});
+  test::expect_arrives(api::RunPrograms{{"p", "q"}});
 }
 
 // All that a program may be, in one message.
 TEST(ProgramMessages, TheGreatestProgramArrives) {
   const std::string half(api::PutProgram::kMostBytes / 2, '#');
-  const auto put =
-      carried(api::PutProgram{.program = "scan", .text = half, .points = {{"p.csv", half}}});
-  EXPECT_EQ(put.text, half);
-  EXPECT_EQ(put.points.at(0).text, half);
+  test::expect_arrives(
+      api::PutProgram{.program = "scan", .text = half, .points = {{"p.csv", half}}});
 }
 
 // On LCM a client hears the channels of this list, and no other.
 TEST(ProgramMessages, ClientsListenToTheChannelOfTheAnswer) {
   const api::Completed reply{.reason = "r", .detail = api::ProgramList{}};
-  const std::string channel = encode(1, kAsker, reply).value().front().channel;
+  const std::string channel = encode(1, kId, reply).value().front().channel;
   EXPECT_EQ(channel, "PROGRAM_REPLY");
   EXPECT_EQ(std::ranges::count(daemon_channels(), channel), 1);
 }
@@ -81,7 +67,7 @@ TEST(ProgramMessages, ProgramsOfManyMcusComeInParts) {
     list.programs.push_back(std::move(entry));
   }
   const api::Completed reply{.reason = "r", .detail = list};
-  const auto packets = encode(1, kAsker, reply).value();
+  const auto packets = encode(1, kId, reply).value();
   EXPECT_GT(packets.size(), 1u);
   ReplyParts parts;
   std::optional<api::Reply> whole;
