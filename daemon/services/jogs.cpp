@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "daemon/services/allowed.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -20,18 +22,17 @@ Result<void> in_range(const api::Jog& request) {
   using Jog = api::Jog;
   if (request.per_s == 0 && !request.renew) return {};
   if (!Jog::kKeepaliveMs.has(request.keepalive_ms)) {
-    return fail("keepalive time of " + std::to_string(request.keepalive_ms) +
-                " ms; allowed: " + std::to_string(Jog::kKeepaliveMs.least) + " to " +
-                std::to_string(Jog::kKeepaliveMs.most) + " ms");
+    return fail("keepalive time of " + std::to_string(request.keepalive_ms) + " ms" +
+                allowed(Jog::kKeepaliveMs) + " ms");
   }
   if (!request.steps_after) return {};
   return fail("steps after the stop event belong to the request that ends the jog, of speed 0");
 }
 
 Result<void> check_steps_after(std::int64_t steps) {
-  if (steps >= 0 && steps <= motion::Motor::kMaxPosition) return {};
-  return fail(std::to_string(steps) + " steps after the stop event; allowed: 0 to " +
-              std::to_string(motion::Motor::kMaxPosition));
+  if (api::Jog::kStepsAfter.has(steps)) return {};
+  return fail(std::to_string(steps) + " steps after the stop event" +
+              allowed(api::Jog::kStepsAfter));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "base/units/ratio.h"
 #include "bus/rs485/unique_id.h"
+#include "daemon/services/allowed.h"
 #include "daemon/services/open_moves.h"
 
 namespace bushd::daemon {
@@ -161,9 +162,8 @@ void KeptPositions::request(const api::Asker& asker, const api::GetHistory& requ
   const auto motor = installation_.find(request.motor);
   if (!motor) return asker.answer(api::Refused{motor.error().text()});
   if (!api::GetHistory::kMost.has(request.most)) {
-    return asker.answer(api::Refused{std::to_string(request.most) +
-                                     " lines of history; allowed: 1 to " +
-                                     std::to_string(api::GetHistory::kMost.most)});
+    return asker.answer(api::Refused{std::to_string(request.most) + " lines of history" +
+                                     allowed(api::GetHistory::kMost)});
   }
   if (!keeper_) {
     return asker.answer(

@@ -10,9 +10,9 @@ namespace bushd::daemon {
 namespace {
 
 Result<void> few_enough(std::size_t motors) {
-  if (motors <= api::MoveLine::kMostMotors) return {};
+  if (motors <= api::MoveLine::kMotors.most) return {};
   return fail(fmt::format("{} motors are named; a line has at most {}", motors,
-                          api::MoveLine::kMostMotors));
+                          api::MoveLine::kMotors.most));
 }
 
 }  // namespace

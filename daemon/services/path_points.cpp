@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "daemon/services/allowed.h"
+
 namespace bushd::daemon {
 namespace {
 
@@ -13,13 +15,13 @@ using api::MovePath;
 
 Result<void> check(const MovePath& part) {
   const std::size_t width = part.motors.size();
-  if (width == 0 || width > api::MoveLine::kMostMotors) {
-    return fail(
-        fmt::format("{} motors are named; a path has 1 to {}", width, api::MoveLine::kMostMotors));
+  if (constexpr auto kMotors = api::MoveLine::kMotors; !kMotors.has(width)) {
+    return fail(fmt::format("{} motors are named; a path has {} to {}", width, kMotors.least,
+                            kMotors.most));
   }
-  if (part.rows < 1 || part.rows > MovePath::kMostRows) {
-    return fail(fmt::format("path of {} points; allowed: 1 to {}; make several paths of it",
-                            part.rows, MovePath::kMostRows));
+  if (!MovePath::kRows.has(part.rows)) {
+    return fail(fmt::format("path of {} points{}; make several paths of it", part.rows,
+                            allowed(MovePath::kRows)));
   }
   if (static_cast<std::size_t>(part.rows) * width > PathPoints::kMostValues) {
     return fail(
@@ -28,11 +30,11 @@ Result<void> check(const MovePath& part) {
                     part.rows, width, PathPoints::kMostValues));
   }
   const std::size_t values = part.positions.size();
-  if (values == 0 || values > MovePath::kMostValues || values % width != 0) {
+  if (!MovePath::kValues.has(values) || values % width != 0) {
     return fail(
         fmt::format("{} positions of {} motors in one request; allowed: whole rows, at "
                     "most {} positions",
-                    values, width, MovePath::kMostValues));
+                    values, width, MovePath::kValues.most));
   }
   const std::size_t rows = values / width;
   if (!part.speeds.empty() && (width != 1 || part.speeds.size() != rows)) {

@@ -1,13 +1,15 @@
 #include "daemon/services/position_compare.h"
 
+#include <cstdlib>
 #include <string>
+
+#include "daemon/services/allowed.h"
 
 namespace bushd::daemon {
 namespace {
 
-bool within(std::int64_t value, std::int64_t least, std::int64_t most) {
-  return value >= least && value <= most;
-}
+static_assert(api::PositionCompare::kDelayUs.most == BUSHD_POSITION_COMPARE_MAX_DELAY_US &&
+              api::PositionCompare::kWidthUs.most == BUSHD_POSITION_COMPARE_MAX_WIDTH_US);
 
 bushd_position_compare message_of(const api::PositionCompare& request, const motion::Motor& motor) {
   bushd_position_compare message{};
@@ -46,18 +48,17 @@ Result<MotorId> PositionCompare::check(const api::PositionCompare& request) cons
   if (!request.arrivals.any()) return id;
   const auto position = installation_[*id].scale().steps_of_position(request.position);
   if (!position) return fail(request.motor + ": " + position.error().message);
-  if (!within(*position, -motion::Motor::kMaxPosition, motion::Motor::kMaxPosition)) {
+  if (std::abs(*position) > motion::Motor::kMaxPosition) {
     return fail(request.motor + ": positions lie within +-" +
                 std::to_string(motion::Motor::kMaxPosition));
   }
   if (!api::PositionCompare::kDelayUs.has(request.delay_us)) {
-    return fail("a delay of " + std::to_string(request.delay_us) +
-                " us before the pulse; allowed: 0 to " +
-                std::to_string(api::PositionCompare::kDelayUs.most));
+    return fail("a delay of " + std::to_string(request.delay_us) + " us before the pulse" +
+                allowed(api::PositionCompare::kDelayUs));
   }
   if (!api::PositionCompare::kWidthUs.has(request.width_us)) {
-    return fail("a pulse of " + std::to_string(request.width_us) + " us; allowed: 1 to " +
-                std::to_string(api::PositionCompare::kWidthUs.most));
+    return fail("a pulse of " + std::to_string(request.width_us) + " us" +
+                allowed(api::PositionCompare::kWidthUs));
   }
   return id;
 }

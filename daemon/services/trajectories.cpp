@@ -63,9 +63,9 @@ auto Trajectories::find(const api::Asker& asker, std::int64_t number) -> Place {
 auto Trajectories::begin(const api::Asker& asker, const api::Follow& request) -> Result<Place> {
   const auto motors = installation_.find(request.motors);
   if (!motors) return fail(motors.error());
-  if (motors->size() > api::Follow::kMostMotors) {
+  if (motors->size() > api::MoveLine::kMotors.most) {
     return fail(fmt::format("{} motors are named; a trajectory has at most {}", motors->size(),
-                            api::Follow::kMostMotors));
+                            api::MoveLine::kMotors.most));
   }
   if (!api::Follow::kStretch.has(request.stretch)) {
     return fail(fmt::format("times stretched by {}; allowed: {} to {}", request.stretch,

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "daemon/services/allowed.h"
 #include "words/remedy.h"
 
 namespace bushd::daemon {
@@ -15,8 +16,8 @@ Result<void> check_trigger_delay(std::int64_t delay_us) {
   static_assert(kAllowed.least == BUSHD_TRIGGER_MIN_DELAY_US &&
                 kAllowed.most == BUSHD_TRIGGER_MAX_DELAY_US);
   if (kAllowed.has(delay_us)) return {};
-  return fail("a delay of " + std::to_string(delay_us) + " us after the trigger; allowed: " +
-              std::to_string(kAllowed.least) + " to " + std::to_string(kAllowed.most));
+  return fail("a delay of " + std::to_string(delay_us) + " us after the trigger" +
+              allowed(kAllowed));
 }
 
 void Trigger::request(const api::Asker& asker, const api::Arm& request) {

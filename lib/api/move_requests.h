@@ -106,9 +106,8 @@ struct Move {
 
 struct MoveLine {
   enum class Law { kLeading, kElementary };  // engine/line.h, engine/elementary.h
-  static constexpr std::size_t kMostMotors = 127;
-  static constexpr fields::Field kMotorCount{"motor_count", "none twice",
-                                             fields::Range<std::size_t>{1, kMostMotors}};
+  static constexpr fields::Range<std::size_t> kMotors{1, 127};
+  static constexpr fields::Field kMotorCount{"motor_count", "none twice", kMotors};
 
   Move::Kind kind = Move::Kind::kRelative;
   std::vector<MotorAmount> motors{};
@@ -147,8 +146,8 @@ struct MoveLine {
 
 struct MovePath {
   enum class Corners { kContinuous, kExact };
-  static constexpr std::int32_t kMostRows = 100'000;
-  static constexpr std::size_t kMostValues = 4096;
+  static constexpr fields::Range<std::int32_t> kRows{1, 100'000};
+  static constexpr fields::Range<std::size_t> kValues{1, 4096};  // of one request
 
   MotorNames motors{};
   std::int32_t rows = 0;
@@ -160,8 +159,6 @@ struct MovePath {
   std::optional<Speed> speed{};
   std::optional<Speed> feed{};
 
-  static constexpr fields::Range<std::int32_t> kRows{1, kMostRows};
-  static constexpr fields::Range<std::size_t> kValues{1, kMostValues};
   static constexpr fields::OneOf kCorners{
       {{"CONTINUOUS",
         "passed at speeds at which no motor jumps by more than it starts with from rest"},
@@ -196,7 +193,6 @@ struct MovePath {
 
 struct Follow {
   enum class Part { kRows, kLastRows, kRun };
-  static constexpr std::size_t kMostMotors = 127;
   static constexpr std::size_t kMostRows = 100'000;       // of a trajectory
   static constexpr std::size_t kMostNumbers = 1'000'000;  // positions of a trajectory
 
@@ -209,7 +205,6 @@ struct Follow {
   std::vector<double> positions{};
 
   static constexpr fields::Range<double> kStretch{0.001, 1000};
-  static constexpr fields::Range<std::size_t> kMotors{1, kMostMotors};
   static constexpr fields::OneOf kPart{
       {{"ROWS"}, {"LAST_ROWS", "no row follows these"}, {"RUN", "has no rows"}}};
   static constexpr std::string_view kName = "follow";
@@ -230,7 +225,7 @@ struct Follow {
           self.array);
     visit({"cubic", "between rows; else linear"}, self.cubic);
     visit({"stretch", "all times are so many times as long", kStretch}, self.stretch);
-    names_fields(self, visit, "motors", {"motor_count", "none twice", kMotors});
+    names_fields(self, visit, "motors", MoveLine::kMotorCount);
     visit.list("row_count", {"time_s", "each later than the one before, below 10^8"}, self.time_s);
     visit.list({"position_count", "row_count times motor_count"},
                {"positions", kMotorUnit, "row by row: one for each motor"}, self.positions);

@@ -22,6 +22,7 @@
 #include "api/table_requests.h"
 #include "api/words.h"
 #include "base/fields.h"
+#include "base/units/coordinates.h"
 #include "words/camac.h"
 
 namespace bushd::api {
@@ -326,7 +327,8 @@ struct Configure {
 
 struct Jog {
   static constexpr fields::Range<std::int64_t> kKeepaliveMs{50, 10'000};
-  static constexpr fields::Range<std::int64_t> kStepsAfter{-1, 2'147'483'647};
+  static constexpr fields::Range<std::int64_t> kStepsAfter{0, units::Coordinates::kMaxSteps};
+  static constexpr fields::NoneIs<std::int64_t> kNoSteps{-1};
 
   std::string motor{};
   double per_s = 0;
@@ -361,8 +363,8 @@ struct Jog {
           self.renew);
     visit({"steps_after", fields::Unit{"steps"},
            "with speed 0: ends so many steps after where the motor is now; -1: as soon as possible",
-           kStepsAfter},
-          self.steps_after, fields::NoneIs<std::int64_t>{-1});
+           fields::Range{kNoSteps.none, kStepsAfter.most}},
+          self.steps_after, kNoSteps);
   }
   friend bool operator==(const Jog&, const Jog&) = default;
 };

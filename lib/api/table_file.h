@@ -21,7 +21,7 @@ struct TableFile {
   static constexpr std::string_view kMeaning = "What a table's file says (docs/tables.md).";
   // What no file can say becomes 0, which tables::check() names.
   static void fields(auto& self, auto& visit) {
-    constexpr fields::Range<std::int32_t> kCodes{1, 65535};
+    constexpr fields::Range<std::int32_t> kCodes = words::TableContent::kCode;
     constexpr fields::OrZero<std::int32_t> kCode{kCodes.most};
     constexpr fields::Unit kTimeUnit{"time_unit_ns"};
     auto& content = self.content;
@@ -39,7 +39,7 @@ struct TableFile {
     visit({"time_unit_ns", "of the delays below",
            fields::Range<std::int64_t>{1, words::TableContent::kMaxTimeUnitNs}},
           content.time_unit_ns, fields::OrZero<std::int64_t>{words::TableContent::kMaxTimeUnitNs});
-    visit({"cruise", kTimeUnit, "1..65535; 0: the last of accel"}, cruise_told,
+    visit({"cruise", kTimeUnit, "0: the last of accel", fields::Range{0, kCodes.most}}, cruise_told,
           fields::If{cruise_told != 0});
     visit.list("accel_count", {"accel", kTimeUnit, "slow to fast", kCodes}, content.accel, kCode);
     visit.list({"decel_count", "0: accel reversed"}, {"decel", kTimeUnit, "fast to slow", kCodes},

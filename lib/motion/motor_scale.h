@@ -14,8 +14,7 @@ namespace bushd::motion {
 
 class MotorScale {
  public:
-  // MCUs count positions in 32 bits.
-  static constexpr std::int64_t kMaxPosition = INT32_MAX;
+  static constexpr std::int64_t kMaxPosition = units::Coordinates::kMaxSteps;
 
   // `max_speed`: user units/s.
   explicit MotorScale(units::Coordinates coordinates = {},

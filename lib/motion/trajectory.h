@@ -28,7 +28,6 @@ class Trajectory {
  public:
   using Position = std::int64_t;
   static constexpr Position kStep = Position{1} << 32;
-  static constexpr std::size_t kMostRows = 100'000;
   enum class Interpolation { kLinear, kCubic };
 
   // Precondition: motors >= 1.

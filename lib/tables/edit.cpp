@@ -19,7 +19,7 @@ using Codes = std::vector<std::uint16_t>;
 constexpr double kNoise = 1e-6;
 constexpr double kPathNoise = 1e-9;  // of a step; a side's path is up to 131070 steps
 constexpr int kHalvings = 60;        // of a path that a double holds
-constexpr double kLongestCode = std::numeric_limits<std::uint16_t>::max();
+constexpr double kLongestCode = kCode.most;
 // The share of a speed that rounding may take; a finer time unit is taken beyond it.
 constexpr double kMostShortfall = 0.01;
 constexpr double kLongestSide = std::numeric_limits<std::int32_t>::max();
@@ -66,9 +66,9 @@ Result<std::uint16_t> rounded_up(double units, std::uint32_t time_unit_ns) {
   }
   if (code <= kLongestCode) return static_cast<std::uint16_t>(code);
   return fail(
-      fmt::format("a delay becomes {:.0f} time units; allowed: up to 65535. Use a longer time "
+      fmt::format("a delay becomes {:.0f} time units; allowed: up to {}. Use a longer time "
                   "unit (\"bushtab resample --time-unit\")",
-                  code));
+                  code, kCode.most));
 }
 
 // Precondition: the content's time unit is that of the new codes.
@@ -335,17 +335,17 @@ Result<TableContent> scale_speed(TableContent content, double factor) {
   if (in_old_unit && (too_short || unit_ns >= content.time_unit_ns)) return *in_old_unit;
   if (unit_ns > kMaxTimeUnitNs) {
     return fail(
-        fmt::format("the slowest delay becomes {:.6g} s; allowed: up to {:.6g} s, 65535 time units "
+        fmt::format("the slowest delay becomes {:.6g} s; allowed: up to {:.6g} s, {} time units "
                     "of 1 s. Use a factor of {:.3g} or more",
-                    extent.slowest * content.time_unit_ns * 1e-9 / factor, kLongestCode,
+                    extent.slowest * content.time_unit_ns * 1e-9 / factor, kLongestCode, kCode.most,
                     factor * unit_ns / kMaxTimeUnitNs * (1 + 1e-2)));
   }
   if (unit_ns > 1 && too_short) {
     return fail(fmt::format(
         "the slowest delay is {:.0f} times the fastest one, so no time unit tells both by codes of "
-        "1..65535 at this factor. Use one that is a whole number or 1 over a whole number, or "
+        "{}..{} at this factor. Use one that is a whole number or 1 over a whole number, or "
         "delete slow codes",
-        extent.slowest / extent.fastest));
+        extent.slowest / extent.fastest, kCode.least, kCode.most));
   }
   return in_best_unit(content, 1 / factor, unit_ns);
 }

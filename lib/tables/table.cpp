@@ -13,6 +13,10 @@ bool is_control(char c) {
   return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
 }
 
+std::string code_is_zero() {
+  return fmt::format("is 0; allowed: {}..{} time units", kCode.least, kCode.most);
+}
+
 std::optional<ContentFault> check_name(const std::string& name) {
   if (!name.empty() && name.size() <= kMaxNameLength &&
       std::none_of(name.begin(), name.end(), is_control)) {
@@ -51,7 +55,7 @@ ContentFault place(bushd_status status, std::uint32_t engine_index, bool in_dece
   const std::size_t at = in_decel ? last - engine_index : engine_index;
   switch (status) {
     case BUSHD_E_TABLE_ZERO:
-      return {key, at, "is 0; allowed: 1..65535 time units"};
+      return {key, at, code_is_zero()};
     case BUSHD_E_TABLE_UNSORTED: {
       // Two codes clash; the one that comes later in the file is the one to name.
       const std::size_t later = in_decel ? at + 1 : at;
@@ -102,8 +106,8 @@ std::optional<ContentFault> check_written(const TableContent& content) {
   const bushd_status status = bushd_table_check_written(&view);
   if (status == BUSHD_OK) return std::nullopt;
   return ContentFault{"accel", std::nullopt,
-                      fmt::format("or decel: {}; allowed: 1..65535 time units, 2147483647 in all",
-                                  bushd_status_text(status))};
+                      fmt::format("or decel: {}; allowed: {}..{} time units, 2147483647 in all",
+                                  bushd_status_text(status), kCode.least, kCode.most)};
 }
 
 // `codes`: what is wrong with them.
@@ -118,7 +122,7 @@ std::optional<ContentFault> check_all(const TableContent& content, Codes&& codes
   if (auto fault = check_sizes(content)) return fault;
   if (auto fault = codes(content)) return fault;
   if (content.cruise == std::uint16_t{0}) {
-    return ContentFault{"cruise", std::nullopt, "is 0; allowed: 1..65535 time units"};
+    return ContentFault{"cruise", std::nullopt, code_is_zero()};
   }
   return std::nullopt;
 }

@@ -21,6 +21,7 @@ inline constexpr std::int64_t kMaxRevision = 2147483647;
 using words::TableContent;
 inline constexpr std::uint32_t kMaxTimeUnitNs = TableContent::kMaxTimeUnitNs;
 inline constexpr std::size_t kMaxNameLength = TableContent::kMaxNameLength;
+inline constexpr bushd::fields::Range<std::int32_t> kCode = TableContent::kCode;
 
 // SHA-256, as 64 hexadecimal digits, of what moves a motor: time unit, both sides and cruise delay,
 // whether written or implied. Name, description and revision do not count.

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <limits>
 #include <utility>
 
 #include "tables/toml_file.h"
@@ -12,16 +11,16 @@
 namespace bushd::tables {
 namespace {
 
-constexpr std::int64_t kLongestDelay = std::numeric_limits<std::uint16_t>::max();
 constexpr std::string_view kUnits = "(time units)";
 
 Result<std::vector<std::uint16_t>> read_codes(const TomlReader& reader, std::string_view key) {
-  const auto elements = reader.array(key, "an array of whole numbers 1..65535 (time units)");
+  const auto elements = reader.array(
+      key, fmt::format("an array of whole numbers {}..{} {}", kCode.least, kCode.most, kUnits));
   if (!elements) return fail(elements.error());
   std::vector<std::uint16_t> codes;
   codes.reserve((*elements)->size());
   for (const toml::node& node : **elements) {
-    const auto code = reader.integer(key, codes.size(), node, 1, kLongestDelay, kUnits);
+    const auto code = reader.integer(key, codes.size(), node, kCode.least, kCode.most, kUnits);
     if (!code) return fail(code.error());
     codes.push_back(static_cast<std::uint16_t>(*code));
   }
@@ -48,7 +47,7 @@ Result<TableContent> read_content(const TomlReader& reader) {
     content.decel = std::move(*decel);
   }
   if (reader.has("cruise")) {
-    const auto cruise = reader.integer("cruise", 1, kLongestDelay, kUnits);
+    const auto cruise = reader.integer("cruise", kCode.least, kCode.most, kUnits);
     if (!cruise) return fail(cruise.error());
     content.cruise = static_cast<std::uint16_t>(*cruise);
   }

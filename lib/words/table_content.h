@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "base/fields.h"
+
 namespace bushd::words {
 
 // In the file's order. Whether it is a table, tables::check() tells.
@@ -15,6 +17,7 @@ struct TableContent {
   // One second: above it nothing can be told apart any more, and the engine's sums of two rests fit
   // 32 bits.
   static constexpr std::uint32_t kMaxTimeUnitNs = 1'000'000'000;
+  static constexpr bushd::fields::Range<std::int32_t> kCode{1, UINT16_MAX};  // time units
 
   std::string name{};
   std::uint32_t time_unit_ns = 0;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/completion.h"
+#include "base/fields.h"
 #include "client/client.h"
 
 namespace CLI {
@@ -56,6 +57,13 @@ class Command {
   template <class Number>
   Command& number(const std::string& name, Number* value, Number least, Number most,
                   const std::string& text, Needed needed = Needed::kNo);
+  // As a field declares it.
+  template <class Number, class Told>
+  Command& number(const std::string& name, Number* value, bushd::fields::Range<Told> range,
+                  const std::string& text, Needed needed = Needed::kNo) {
+    return number(name, value, static_cast<Number>(range.least), static_cast<Number>(range.most),
+                  text, needed);
+  }
   // All words that are left.
   Command& words(const std::string& name, std::vector<std::string>* value, const std::string& text,
                  Needed needed);

@@ -19,8 +19,6 @@ namespace api = bushd::api;
 using bushd::client::Client;
 using nlohmann::ordered_json;
 
-constexpr std::uint32_t kMostPast = 1000;
-
 void print_json(const std::string& motor, const api::MotionHistory& history) {
   ordered_json json = bushd::json_of(history);
   json["motor"] = motor;
@@ -77,7 +75,7 @@ void add_history(CommandLine& commands) {
           "Positions are in the motor's unit, as it was then; STEPS is where it stood in the end. "
           "Needs a state store ([state] in bushd.toml).")
       .option("NAME", &options->motor, "Motor")
-      .number("--most", &options->most, 1u, kMostPast, "How many lines")
+      .number("--most", &options->most, api::GetHistory::kMost, "How many lines")
       .flag("--json", &options->json, "Print JSON")
       .run([&commands, options] {
         return with_client(commands.connection(),

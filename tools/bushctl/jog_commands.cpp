@@ -124,10 +124,10 @@ void add_jog_commands(CommandLine& commands) {
                       "First speed of the keys; else as its table starts")
       .number<double>("--step", &options->step, 1e-9, 1e9,
                       "First step of the keys; else a few steps")
-      .number<std::int64_t>("--pulses-after", &options->pulses_after, 0, 2'147'483'647,
-                            "End so many steps after the stop event")
-      .number<std::uint32_t>("--keepalive-ms", &options->keepalive_ms, 50, 10'000,
-                             "Ramped down when nothing is heard of this program for so long")
+      .number("--pulses-after", &options->pulses_after, api::Jog::kStepsAfter,
+              "End so many steps after the stop event")
+      .number("--keepalive-ms", &options->keepalive_ms, api::Jog::kKeepaliveMs,
+              "Ramped down when nothing is heard of this program for so long")
       .run([&commands, options] { return run(commands.connection(), *options); });
 }
 

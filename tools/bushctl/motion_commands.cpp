@@ -194,9 +194,8 @@ void add_arm(CommandLine& commands) {
           "bushctl ends, however that comes. "
           "With --wait the exit code is 0 only if every motor "
           "reached its target.")
-      .number<std::int64_t>("--delay-us", &options->delay_us, bushd::api::Arm::kDelayUs.least,
-                            bushd::api::Arm::kDelayUs.most,
-                            "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
+      .number("--delay-us", &options->delay_us, bushd::api::Arm::kDelayUs,
+              "Delay from the edge, beyond the three ticks", Command::Needed::kYes)
       .flag("--line", &options->line, "Along a straight line; all motors on one bus")
       .option_with("--line", "--duration", &options->duration,
                    "With --line: take at least so many seconds")
@@ -229,12 +228,10 @@ void add_compare(CommandLine& commands) {
       .option("NAME", &options->motor, "The motor; its MCU's position compare output pulses")
       .option("POSITION", &options->position, "Position in the motor's unit, or off")
       .flag("--steps", &options->steps, kSteps)
-      .number<std::int64_t>(
-          "--delay-us", &options->pulse.delay_us, bushd::api::PositionCompare::kDelayUs.least,
-          bushd::api::PositionCompare::kDelayUs.most, "Delay from the step to the pulse")
-      .number<std::int64_t>(
-          "--width-us", &options->pulse.width_us, bushd::api::PositionCompare::kWidthUs.least,
-          bushd::api::PositionCompare::kWidthUs.most, "Width of the pulse, at least a slot")
+      .number("--delay-us", &options->pulse.delay_us, bushd::api::PositionCompare::kDelayUs,
+              "Delay from the step to the pulse")
+      .number("--width-us", &options->pulse.width_us, bushd::api::PositionCompare::kWidthUs,
+              "Width of the pulse, at least a slot")
       .choice("--direction", &options->pulse.direction, {"both", "positive", "negative"},
               "Direction of arrival")
       .run([&commands, options] {

@@ -22,7 +22,7 @@ using bushd::Result;
 std::vector<api::MovePath> in_parts(const api::MovePath& whole) {
   const std::size_t width = whole.motors.size();
   const std::size_t rows = whole.positions.size() / width;
-  const std::size_t most = std::max<std::size_t>(api::MovePath::kMostValues / width, 1);
+  const std::size_t most = std::max<std::size_t>(api::MovePath::kValues.most / width, 1);
   std::vector<api::MovePath> parts;
   for (std::size_t first = 0; first < rows; first += most) {
     const std::size_t end = std::min(first + most, rows);
@@ -81,16 +81,16 @@ std::string PathFile::located(const std::string& reason) const {
 Result<PathFile> parse_path(std::string_view text, const std::string& file,
                             const std::string& corners, const std::string& speed,
                             const std::string& feed) {
-  auto table = bushd::csv::parse_numbers(text, file, api::MovePath::kMostRows);
+  auto table = bushd::csv::parse_numbers(text, file, api::MovePath::kRows.most);
   if (!table) return fail(table.error());
   const auto along = parse_feed(feed, Numbers::kUser);
   if (!along) return fail(along.error());
   const auto not_faster = parse_speed(speed, Numbers::kUser);
   if (!not_faster) return fail(not_faster.error());
   const std::size_t width = table->columns.size();
-  if (width > api::MoveLine::kMostMotors) {
+  if (width > api::MoveLine::kMotors.most) {
     return fail(fmt::format("{}: {} columns; a path has at most {} motors", file, width,
-                            api::MoveLine::kMostMotors));
+                            api::MoveLine::kMotors.most));
   }
   api::MovePath whole{.motors = {},
                       .rows = static_cast<std::int32_t>(table->rows()),

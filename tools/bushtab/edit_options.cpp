@@ -48,7 +48,7 @@ std::shared_ptr<Codes> codes_command(CLI::App* command, bool takes_codes) {
   if (takes_codes) {
     command->add_option("CODE", options->codes, "Delays in time units")
         ->required()
-        ->check(whole_number(1, 65535,
+        ->check(whole_number(bushd::tables::kCode.least, bushd::tables::kCode.most,
                              "a code has 16 bits. For longer delays take a longer time unit first: "
                              "bushtab resample TABLE --time-unit T"));
   } else {

@@ -274,7 +274,8 @@ void TableEditor::ask(Prompt prompt, std::string text) {
 std::string TableEditor::prompt_text() const {
   switch (prompt_) {
     case Prompt::kCode:
-      return fmt::format("{}, code 1..65535: {}", range_text(), typed_);
+      return fmt::format("{}, code {}..{}: {}", range_text(), tables::kCode.least,
+                         tables::kCode.most, typed_);
     case Prompt::kGoTo:
       return "go to (12: accel[12], d12: decel[12], c: cruise): " + typed_;
     case Prompt::kPercent:
@@ -317,7 +318,8 @@ TableEditor::Wish TableEditor::answer() {
 void TableEditor::enter_code(std::string_view text) {
   const auto code = number_of<std::uint16_t>(text);
   if (!code || *code == 0) {
-    message_ = fmt::format("\"{}\" is not a code; allowed: 1..65535", text);
+    message_ = fmt::format("\"{}\" is not a code; allowed: {}..{}", text, tables::kCode.least,
+                           tables::kCode.most);
     return;
   }
   if (change_to(with_code(content(), range(), *code))) {

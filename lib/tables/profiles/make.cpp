@@ -184,7 +184,7 @@ Result<std::uint32_t> unit_for(const Spec& spec, const Delays& accel, const Dela
   const double longest_ns = std::max(side_ns(accel), side_ns(decel));
   std::uint32_t unit_ns = 1;
   while (unit_ns < kMaxTimeUnitNs &&
-         (slowest_ns > 65535.0 * unit_ns ||
+         (slowest_ns > static_cast<double>(kCode.most) * unit_ns ||
           longest_ns + static_cast<double>(kMaxCodes) * unit_ns > kLongestSideUnits * unit_ns)) {
     unit_ns = next_unit(unit_ns);
   }
@@ -193,7 +193,7 @@ Result<std::uint32_t> unit_for(const Spec& spec, const Delays& accel, const Dela
 
 Result<std::vector<std::uint16_t>> rounded(const Spec& spec, const Delays& delays,
                                            std::uint32_t unit_ns) {
-  const double highest = spec.code_bits == 8 ? 255 : 65535;
+  const double highest = spec.code_bits == 8 ? 255 : kCode.most;
   // A time unit that was asked for may be coarse, and that of v64 is its source's.
   const bool coarse = spec.code_bits == 16 && (spec.time_unit_ns || uses_v64(spec));
   const double lowest = coarse ? 1 : kBushdFastest;

@@ -38,7 +38,7 @@ TEST(PathFile, IsSentInParts) {
   for (const api::MovePath& part : path->parts) {
     EXPECT_EQ(part.rows, 3000);
     EXPECT_EQ(part.first_row, rows);
-    EXPECT_LE(part.positions.size(), api::MovePath::kMostValues);
+    EXPECT_LE(part.positions.size(), api::MovePath::kValues.most);
     EXPECT_EQ(part.positions.front(), rows);
     rows += static_cast<std::int32_t>(part.positions.size() / 3);
   }
