@@ -20,36 +20,25 @@ def move(amounts, in_steps=False):
 
 
 def reply(request, phase, outcome="", reason="", part=0, parts=1, session=None):
-    header = messages.reply_header_t()
-    header.session = request.session if session is None else session
-    header.client_id = request.client_id
-    header.number = request.number
-    header.phase = phase
-    header.outcome = outcome
-    header.reason = reason
-    header.part, header.parts = part, parts
-    return header
+    return messages.reply_header_t(
+        session=request.session if session is None else session, client_id=request.client_id, number=request.number,
+        phase=phase, outcome=outcome, reason=reason, part=part, parts=parts,
+    )
 
 
 def answer(*arguments, motors=(), **named):
-    message = messages.answer_t()
-    message.reply = reply(*arguments, **named)
-    message.motors = [
+    results = [
         messages.motor_result_t(
             motor=name, outcome="reached", position_steps=int(name[1:]), user_position=float(name[1:]), unit="mm", precision=3,
             asked_by="me", legs=1, most_steps_per_s=100.0,
         )
         for name in motors
     ]
-    return message.encode()
+    return messages.answer_t(reply=reply(*arguments, **named), motors=results).encode()
 
 
 def state(run=1, sequence=1, part=0, parts=1):
-    message = messages.mcu_state_t()
-    message.run, message.sequence = run, sequence
-    message.part, message.parts = part, parts
-    message.state = "READY"
-    return message.encode()
+    return messages.mcu_state_t(run=run, sequence=sequence, part=part, parts=parts, state="READY").encode()
 
 
 class Daemon:
@@ -89,11 +78,8 @@ class Daemon:
 
     def welcome(self, session=11, run=1, nonce=None):
         hello = [message for channel, message in self.sent if channel == "HELLO"][-1]
-        message = messages.welcome_t()
-        message.client_id = hello.client_id
-        message.nonce = hello.nonce if nonce is None else nonce
-        message.session, message.run = session, run
-        self.tell("WELCOME", message.encode())
+        nonce = hello.nonce if nonce is None else nonce
+        self.tell("WELCOME", messages.welcome_t(client_id=hello.client_id, nonce=nonce, session=session, run=run).encode())
 
     def request(self):
         return self.sent[-1][1].request
@@ -417,26 +403,16 @@ class ExactlyOnce(unittest.TestCase):
 
 class HostileBytes(unittest.TestCase):
     def valid(self):
-        request = messages.request_t()
-        request.client_id, request.number = "me", 1
-        welcome = messages.welcome_t()
-        welcome.client_id, welcome.nonce, welcome.session = "me", 7, 1
-        table = messages.table_answer_t()
-        table.reply = reply(request, RESULT, "done")
-        table.tables, table.table_count = [messages.table_t()], 1
-        table.tables[0].accel, table.tables[0].accel_count = [5, 4, 3], 3
-        history = messages.history_answer_t()
-        history.reply = reply(request, RESULT, "done")
-        history.motions, history.motion_count = [messages.past_motion_t()], 1
-        camac = messages.camac_reply_t()
-        camac.reply = reply(request, RESULT, "done")
-        camac.responses, camac.response_count = [messages.camac_response_t(x=True, data=7)], 1
+        request = messages.request_t(client_id="me", number=1)
+        done = reply(request, RESULT, "done")
+        welcome = messages.welcome_t(client_id="me", nonce=7, session=1)
+        table = messages.table_answer_t(reply=done, tables=[messages.table_t(accel=[5, 4, 3])])
+        history = messages.history_answer_t(reply=done, motions=[messages.past_motion_t()])
+        camac = messages.camac_reply_t(reply=done, responses=[messages.camac_response_t(x=True, data=7)])
         program = messages.program_t(stage="runs", motors=[messages.program_motor_t(motor="m1")])
-        programs = messages.program_reply_t(reply=reply(request, RESULT, "done"), programs=[program])
-        health = messages.health_t()
-        health.mcus, health.mcu_count, health.parts = [messages.mcu_health_t()], 1, 1
-        described = messages.mcu_description_t()
-        described.motors, described.motor_count, described.parts = [messages.motor_description_t()], 1, 1
+        programs = messages.program_reply_t(reply=done, programs=[program])
+        health = messages.health_t(mcus=[messages.mcu_health_t()], parts=1)
+        described = messages.mcu_description_t(motors=[messages.motor_description_t()], parts=1)
         return {"REPLY": answer(request, RESULT, "reached", "there", motors=["m1", "m2"]), "STATE": state(),
                 "WELCOME": welcome.encode(), "TABLE_REPLY": table.encode(), "HISTORY_REPLY": history.encode(),
                 "CAMAC_REPLY": camac.encode(), "PROGRAM_REPLY": programs.encode(),

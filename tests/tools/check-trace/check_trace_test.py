@@ -2,25 +2,12 @@
 
 import itertools
 import json
-import pathlib
 import random
-import re
-import sqlite3
-import subprocess
-import sys
-import tempfile
 import unittest
 
 import synthetic
 from synthetic import SLOTS, TICK_NS
-
-TOP = pathlib.Path(__file__).resolve().parents[3]
-SLOT_NS = TICK_NS // SLOTS
-TABLE = {
-    "name": "test",
-    "time_unit_ns": 40_000,
-    "accel": [250, 172, 114, 92, 79, 70, 64, 59, 55, 52, 49, 47, 45, 43, 42, 40, 39, 30, 20, 20, 20, 15],
-}
+from trace_case import SLOT_NS, TABLE, CheckTraceTest, event
 
 
 def any_table(chance):
@@ -31,55 +18,14 @@ def any_table(chance):
     return table
 
 
-class CheckTraceTest(unittest.TestCase):
-    def setUp(self):
-        directory = tempfile.TemporaryDirectory()
-        self.addCleanup(directory.cleanup)
-        self.directory = pathlib.Path(directory.name)
-        self.table_file = str(self.directory / "test.toml")
-        self.write_table(TABLE)
-
-    def write_table(self, table):
-        with open(self.table_file, "w", encoding="utf-8") as file:
-            for key, value in table.items():
-                print(f"{key} = {json.dumps(value)}", file=file)
-
-    def scene(self, fine=True, moves=None):
-        """Two MCUs, four motors, both directions, a second move, one stopped in flight."""
-        scene = synthetic.Scene(TABLE, self.table_file, fine, moves)
-        scene.move("theta", 1, 0, 100, 300)
-        scene.move("phi", 1, 15, 100, -35)
-        scene.move("chi", 2, 0, 130, 1, move_id=2)
-        scene.move("omega", 2, 3, 131, 500, stop_tick=181, move_id=3)
-        scene.move("theta", 1, 0, 320, -200, move_id=4)
-        return scene
-
-    def check(self, scene, *more):
-        moves, trace = self.directory / "moves.jsonl", self.directory / "trace.vcd"
-        scene.write_moves(moves)
-        scene.write_trace(trace)
-        return self.run_tool("--moves", moves, "--trace", trace, *more)
-
-    def run_tool(self, *arguments):
-        command = [sys.executable, "-B", TOP / "tools" / "check-trace", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
-
-    def assert_right(self, scene, *more):
-        result = self.check(scene, *more)
-        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
-        return result
-
-    def assert_problem(self, scene, *parts):
-        """One line of output names all of `parts`."""
-        result = self.check(scene)
-        self.assertEqual(result.returncode, 1, result.stdout + result.stderr)
-        lines = [line for line in result.stdout.splitlines() if line.startswith("problem: ")]
-        self.assertTrue(any(all(part in line for part in parts) for line in lines), result.stdout)
-        self.assertNotIn("Traceback", result.stderr)
-        return lines
-
-
 class RightTraces(CheckTraceTest):
+    def positions(self, scene, **beside):
+        """A file of what the daemon says of its motors, some of them so many steps beside where they are."""
+        motors = [{"name": name, "position_steps": steps + beside.get(name, 0)} for name, steps in scene.steps.items()]
+        status = self.directory / "status.json"
+        status.write_text(json.dumps({"motors": motors}), encoding="utf-8")
+        return status
+
     def burst(self):
         """T_step 385 us: 39 slots. DIR setup 15 us: two slots of a shortened tick."""
         scene = synthetic.Scene(TABLE, self.table_file)
@@ -112,10 +58,7 @@ class RightTraces(CheckTraceTest):
 
     def test_homing_local_motion_and_limits_are_explained(self):
         scene = self.by_itself()
-        positions = self.directory / "status.json"
-        motors = [{"name": name, "position_steps": steps} for name, steps in scene.steps.items()]
-        positions.write_text(json.dumps({"motors": motors}), encoding="utf-8")
-        result = self.assert_right(scene, "--positions", positions)
+        result = self.assert_right(scene, "--positions", self.positions(scene))
         self.assertIn("72 steps of homing, of local inputs and of ramps at limit switches", result.stdout)
 
     def test_a_step_outside_of_local_motion(self):
@@ -130,7 +73,7 @@ class RightTraces(CheckTraceTest):
 
     def test_a_limit_that_is_counted_otherwise(self):
         scene = self.by_itself()
-        next(event for event in scene.events if event.get("result") == "limit")["position_steps"] += 1
+        event(scene, result="limit")["position_steps"] += 1
         self.assert_problem(scene, "theta", "steps until its limit, its edges are")
 
     def test_a_motor_that_goes_on_after_its_limit(self):
@@ -150,9 +93,7 @@ class RightTraces(CheckTraceTest):
     def test_other_emission_is_refused(self):
         scene = self.burst()
         scene.events[0]["emission"] = "thundering"
-        result = self.check(scene)
-        self.assertEqual(result.returncode, 2)
-        self.assertIn("move 1 is emitted thundering, which is not known here", result.stderr)
+        self.assertIn("move 1 is emitted thundering, which is not known here", self.assert_unusable(self.check(scene)))
 
     def test_every_edge_of_both_formats_is_explained(self):
         for fine, moves in itertools.product((True, False), (None, "stream", "table")):
@@ -276,13 +217,8 @@ class RightTraces(CheckTraceTest):
 
     def test_positions_of_the_daemon_are_compared(self):
         scene = self.scene()
-        status = self.directory / "status.json"
-        motors = [{"name": name, "position_steps": steps} for name, steps in scene.steps.items()]
-        status.write_text(json.dumps({"motors": motors}), encoding="utf-8")
-        self.assert_right(scene, "--positions", status)
-        motors[1]["position_steps"] += 1
-        status.write_text(json.dumps({"motors": motors}), encoding="utf-8")
-        result = self.check(scene, "--positions", status)
+        self.assert_right(scene, "--positions", self.positions(scene))
+        result = self.check(scene, "--positions", self.positions(scene, phi=1))
         self.assertEqual(result.returncode, 1)
         self.assertRegex(result.stdout, r"problem: phi .* at -34 steps, its edges lead to -35")
 
@@ -348,9 +284,9 @@ class WrongTraces(CheckTraceTest):
         for moves, said in (("table", "stream"), ("stream", "table")):
             with self.subTest(moves=moves):
                 scene = self.scene(moves=moves)
-                for event in scene.events:
-                    if event["event"] == "move":
-                        event["moves"] = said
+                for move in scene.events:
+                    if move["event"] == "move":
+                        move["moves"] = said
                 self.assert_problem(scene, "theta", "from its slot")
 
     def test_an_edge_one_slot_off_but_in_the_tick_before_or_after(self):
@@ -421,126 +357,6 @@ class WrongTraces(CheckTraceTest):
             edges.clear()
         for motor in ("theta", "phi", "chi", "omega"):
             self.assert_problem(scene, motor, "is missing")
-
-
-class WrongLogs(CheckTraceTest):
-    def test_a_result_that_the_table_denies(self):
-        scene = self.scene()
-        scene.events[-1]["position_steps"] += 1
-        self.assert_problem(scene, "theta", "ended at 101 steps, by the table it ends at 100")
-
-    def test_a_move_without_a_result(self):
-        scene = self.scene()
-        scene.events.pop()
-        self.assert_problem(scene, "theta", "move 4 has no result")
-
-    def test_a_move_with_two_results(self):
-        scene = self.scene()
-        scene.events.append(scene.events[-1])
-        self.assert_problem(scene, "theta", "more than one result")
-
-    def test_a_move_that_a_fault_ended(self):
-        scene = self.scene()
-        scene.events[-1]["result"] = "link"
-        self.assert_problem(scene, "theta", "ended as 'link'")
-
-    def test_a_stopped_move_that_is_called_reached(self):
-        scene = self.scene()
-        result = next(e for e in scene.events if e["event"] == "result" and e["motor"] == "omega")
-        result["result"] = "reached"
-        self.assert_problem(scene, "omega", "yet its result is 'reached'")
-
-    def test_another_target_than_the_motor_was_given(self):
-        scene = self.scene()
-        scene.move("chi", 2, 0, 400, 300, move_id=7)
-        scene.change("chi", "retarget", 430, 200)
-        scene.events[-2]["target_steps"] += 1
-        self.assert_problem(scene, "chi", "ended at 201 steps, by the table it ends at 202")
-
-    def test_a_position_lost_between_two_moves(self):
-        scene = self.scene()
-        move = next(e for e in scene.events if e["event"] == "move" and e["id"] == 4)
-        move["from_steps"] += 2
-        self.assert_problem(scene, "theta", "starts from 302 steps")
-
-    def test_a_position_that_was_set_between_two_moves(self):
-        scene = self.scene()
-        at = next(i for i, e in enumerate(scene.events) if e["event"] == "move" and e["id"] == 4)
-        move = scene.events[at]
-        result = next(e for e in scene.events if e["event"] == "result" and e["id"] == 4)
-        move["from_steps"] -= 1000
-        result["position_steps"] -= 1000
-        self.assert_problem(scene, "theta", "starts from -700 steps")
-        scene.events.insert(at, {"event": "set", "motor": "theta", "position_steps": move["from_steps"]})
-        self.assert_right(scene)
-
-    def test_a_move_that_starts_before_the_one_before_has_ended(self):
-        scene = self.scene()
-        move = next(e for e in scene.events if e["event"] == "move" and e["id"] == 4)
-        move["start_tick"] = 150
-        self.assert_problem(scene, "theta", "starts in tick 150")
-
-    def test_input_that_cannot_be_read_is_named(self):
-        scene = self.scene()
-        moves, trace = self.directory / "moves.jsonl", self.directory / "trace.vcd"
-        scene.write_moves(moves)
-        scene.write_trace(trace)
-        cases = []
-        bad_logs = {"cut.jsonl": '{"event":"mo', "odd.jsonl": '{"event":"dance"}\n', "empty.jsonl": ""}
-        for name, text in bad_logs.items():
-            (self.directory / name).write_text(text, encoding="utf-8")
-            cases.append((self.directory / name, trace, name))
-        other = trace.read_text(encoding="ascii").replace("1 ns", "10 ps", 1)
-        for name, text in {"no.vcd": "hello\n", "none.vcd": "", "unit.vcd": other}.items():
-            (self.directory / name).write_text(text, encoding="ascii")
-            cases.append((moves, self.directory / name, name))
-        cases.append((self.directory / "missing.jsonl", trace, "missing.jsonl"))
-        for moves_file, trace_file, name in cases:
-            with self.subTest(name=name):
-                result = self.run_tool("--moves", moves_file, "--trace", trace_file)
-                self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
-                self.assertTrue(re.match(rf"check-trace: .*{re.escape(name)}", result.stderr), result.stderr)
-                self.assertNotIn("Traceback", result.stderr)
-
-    def test_a_table_that_is_missing_is_named(self):
-        scene = self.scene()
-        pathlib.Path(self.table_file).unlink()
-        result = self.check(scene)
-        self.assertEqual(result.returncode, 2)
-        self.assertIn("test.toml", result.stderr)
-
-    def test_a_table_that_has_changed_since_is_found_in_its_history(self):
-        scene = self.scene()
-        before = pathlib.Path(self.table_file).read_text(encoding="utf-8")
-        self.write_table({"time_unit_ns": 40_000, "accel": [200, 100]})
-        with sqlite3.connect(self.directory / ".history.sqlite") as history:
-            history.execute("CREATE TABLE revision (name TEXT, number INTEGER, text TEXT)")
-            history.execute("INSERT INTO revision VALUES ('other', 9, 'no table')")
-        result = self.check(scene)
-        self.assertEqual(result.returncode, 2)
-        self.assertIn(synthetic.sha256_of(TABLE), result.stderr)
-        with sqlite3.connect(self.directory / ".history.sqlite") as history:
-            history.execute("INSERT INTO revision VALUES ('test', 1, ?)", [before])
-        result = self.check(scene)
-        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
-
-
-class OutputTest(unittest.TestCase):
-    def run_to(self, output, *arguments):
-        command = [sys.executable, "-B", TOP / "tools" / "check-trace", *arguments]
-        return subprocess.run(command, stdout=output, stderr=subprocess.PIPE, text=True, check=False)
-
-    def test_a_full_disk_is_an_error_that_is_told(self):
-        for arguments in (["--help"], ["--version"]):
-            with open("/dev/full", "wb") as full:
-                ran = self.run_to(full, *arguments)
-            self.assertEqual(ran.returncode, 1)
-            self.assertIn("cannot write to standard output: No space left on device", ran.stderr)
-
-    def test_names_do_not_steer_the_terminal(self):
-        ran = self.run_to(subprocess.PIPE, "--moves", "a\x1b[31m\u202e", "--trace", "b")
-        self.assertEqual(ran.returncode, 2)
-        self.assertIn("a\\x1b[31m\\u202e: No such file", ran.stderr)
 
 
 if __name__ == "__main__":

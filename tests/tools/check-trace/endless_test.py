@@ -10,8 +10,8 @@ import unittest
 from unittest import mock
 
 import synthetic
-from check_trace_test import TABLE, TOP, CheckTraceTest
 from synthetic import TICK_NS
+from trace_case import TABLE, TOP, CheckTraceTest
 
 sys.path.insert(0, str(TOP / "tools"))
 from check_trace import clock, motion, trajectories
@@ -37,9 +37,7 @@ class WithoutEnd(CheckTraceTest):
 
     def work_of(self, scene, *more):
         """Exit code and output of a check in this process, and how many delays or rows it has looked up."""
-        moves, trace = self.directory / "moves.jsonl", self.directory / "trace.vcd"
-        scene.write_moves(moves)
-        scene.write_trace(trace)
+        self.write(scene)
         looked = itertools.count()
         most = 200 * sum(map(len, scene.edges.values()))
 
@@ -54,7 +52,7 @@ class WithoutEnd(CheckTraceTest):
         with contextlib.ExitStack() as patches:
             for owner, name in ((motion.Table, "delay_from_start"), (motion.Table, "delay_before_end"), (trajectories.Trajectory, "at")):
                 patches.enter_context(mock.patch.object(owner, name, counted(getattr(owner, name))))
-            patches.enter_context(mock.patch.object(sys, "argv", ["check-trace", "--moves", str(moves), "--trace", str(trace), *more]))
+            patches.enter_context(mock.patch.object(sys, "argv", ["check-trace", "--moves", str(self.moves), "--trace", str(self.trace), *more]))
             patches.enter_context(contextlib.redirect_stdout(said))
             code = CHECK_TRACE.main()
         return code, said.getvalue().splitlines()
