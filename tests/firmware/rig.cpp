@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "engine/payload.h"
 #include "sim/disabled_capabilities.h"
 
 namespace bushd::test {
@@ -12,11 +13,15 @@ namespace {
 
 constexpr std::uint32_t kTimeInTickNs = 1000;
 
-template <class Encode>
-Bytes payload_of(Encode&& encode) {
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(encode(payload.data()));
-  return payload;
+template <class Message>
+Message decoded(const std::optional<Answer>& answer,
+                bushd_status (*decode)(const std::uint8_t*, std::size_t, Message*)) {
+  Message message{};
+  EXPECT_TRUE(answer);
+  if (answer) {
+    EXPECT_EQ(decode(answer->payload.data(), answer->payload.size(), &message), BUSHD_OK);
+  }
+  return message;
 }
 
 }  // namespace
@@ -228,32 +233,21 @@ std::optional<Answer> Rig::answer() {
 bushd_status Rig::request(std::uint8_t type, const Bytes& payload) {
   frame(type, payload);
   const auto got = answer();
-  bushd_acknowledgement acknowledgement{0xFF};
   EXPECT_TRUE(got) << "no answer to " << int{type};
   if (!got) return BUSHD_E_UNKNOWN_MESSAGE;
   EXPECT_EQ(got->type, type);
-  EXPECT_EQ(
-      bushd_decode_acknowledgement(got->payload.data(), got->payload.size(), &acknowledgement),
-      BUSHD_OK);
-  return static_cast<bushd_status>(acknowledgement.status);
+  return static_cast<bushd_status>(decoded(got, bushd_decode_acknowledgement).status);
 }
 
 bushd_identity Rig::identify() {
   frame(BUSHD_MSG_IDENTIFY, {0, 0, 1, 0, 0});
-  const auto got = answer();
-  bushd_identity identity{};
-  EXPECT_TRUE(got);
-  if (!got) return identity;
-  EXPECT_EQ(bushd_decode_identity(got->payload.data(), got->payload.size(), &identity), BUSHD_OK);
-  return identity;
+  return decoded(answer(), bushd_decode_identity);
 }
 
 bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns,
                             std::uint16_t comm_timeout_ticks) {
   const bushd_configure message = {tick_ns, format, comm_timeout_ticks};
-  const bushd_status status =
-      request(BUSHD_MSG_CONFIGURE,
-              payload_of([&](std::uint8_t* p) { return bushd_encode_configure(&message, p); }));
+  const auto status = request(BUSHD_MSG_CONFIGURE, payload_of(message, bushd_encode_configure));
   if (status == BUSHD_OK) format_ = format;
   return status;
 }
@@ -268,37 +262,27 @@ bushd_status Rig::set_inputs(const InputSettings& settings) {
                                     .emergency = settings.emergency,
                                     .overcurrent = settings.overcurrent,
                                     .enable_after_watchdog = settings.enable_after_watchdog};
-  return request(BUSHD_MSG_INPUTS,
-                 payload_of([&](std::uint8_t* p) { return bushd_encode_set_inputs(&message, p); }));
+  return request(BUSHD_MSG_INPUTS, payload_of(message, bushd_encode_set_inputs));
 }
 
 bushd_status Rig::motor_inputs(const bushd_motor_inputs& message) {
-  return request(BUSHD_MSG_MOTOR_INPUTS, payload_of([&](std::uint8_t* p) {
-                   return bushd_encode_motor_inputs(&message, p);
-                 }));
+  return request(BUSHD_MSG_MOTOR_INPUTS, payload_of(message, bushd_encode_motor_inputs));
 }
 
 bushd_status Rig::outputs(const bushd_set_outputs& message) {
-  return request(BUSHD_MSG_OUTPUTS, payload_of([&](std::uint8_t* p) {
-                   return bushd_encode_set_outputs(&message, p);
-                 }));
+  return request(BUSHD_MSG_OUTPUTS, payload_of(message, bushd_encode_set_outputs));
 }
 
 bushd_status Rig::currents(const bushd_currents& message) {
-  Bytes payload(8);
-  bushd_encode_currents(&message, payload.data());
-  return request(BUSHD_MSG_CURRENTS, payload);
+  return request(BUSHD_MSG_CURRENTS, payload_of(message, bushd_encode_currents));
 }
 
 bushd_status Rig::velocity(const bushd_set_velocity& message) {
-  return request(BUSHD_MSG_VELOCITY, payload_of([&](std::uint8_t* p) {
-                   return bushd_encode_set_velocity(&message, p);
-                 }));
+  return request(BUSHD_MSG_VELOCITY, payload_of(message, bushd_encode_set_velocity));
 }
 
 bushd_status Rig::home(const bushd_home& message) {
-  return request(BUSHD_MSG_HOME,
-                 payload_of([&](std::uint8_t* p) { return bushd_encode_home(&message, p); }));
+  return request(BUSHD_MSG_HOME, payload_of(message, bushd_encode_home));
 }
 
 std::string Rig::keypad_display() {
@@ -311,13 +295,11 @@ std::string Rig::keypad_display() {
 
 bushd_status Rig::local(std::uint16_t motors, std::uint16_t keypad, std::uint16_t keypad_ticks) {
   const bushd_local message = {motors, keypad, keypad_ticks};
-  return request(BUSHD_MSG_LOCAL,
-                 payload_of([&](std::uint8_t* p) { return bushd_encode_local(&message, p); }));
+  return request(BUSHD_MSG_LOCAL, payload_of(message, bushd_encode_local));
 }
 
 void Rig::sync(const bushd_sync& message) {
-  frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
-        payload_of([&](std::uint8_t* p) { return bushd_encode_sync(&message, p); }));
+  frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, payload_of(message, bushd_encode_sync));
   EXPECT_FALSE(answer()) << "SYNC is not answered";
 }
 
@@ -337,15 +319,9 @@ bushd_status Rig::begin(std::uint8_t bank, const Law& law, bool symmetric, std::
       .cruise = law.cruise,
       .time_unit_ns = law.unit_ns,
       .revision = revision};
-  Bytes head(10);
-  bushd_put_u16(&head[0], message.accel_count);
-  bushd_put_u16(&head[2], message.decel_count);
-  bushd_put_u16(&head[4], message.cruise);
-  bushd_put_u32(&head[6], message.time_unit_ns);
-  table_head_[bank] = head;
-  return request(BUSHD_MSG_TABLE_BEGIN, payload_of([&](std::uint8_t* p) {
-                   return bushd_encode_table_begin(&message, p);
-                 }));
+  const Bytes payload = payload_of(message, bushd_encode_table_begin);
+  table_head_[bank] = {payload.begin() + 1, payload.begin() + 11};  // no bank, no revision
+  return request(BUSHD_MSG_TABLE_BEGIN, payload);
 }
 
 bushd_status Rig::data(std::uint8_t bank, std::uint16_t offset,
@@ -363,8 +339,7 @@ bushd_status Rig::end(std::uint8_t bank, const std::vector<std::uint16_t>& codes
     bytes.push_back(static_cast<std::uint8_t>(code >> 8));
   }
   const bushd_table_end message = {bank, crc32(bytes)};
-  return request(BUSHD_MSG_TABLE_END,
-                 payload_of([&](std::uint8_t* p) { return bushd_encode_table_end(&message, p); }));
+  return request(BUSHD_MSG_TABLE_END, payload_of(message, bushd_encode_table_end));
 }
 
 bushd_status Rig::upload(std::uint8_t bank, const Law& law) {
@@ -386,12 +361,7 @@ bushd_status Rig::assign(std::uint8_t motor, std::uint8_t bank) {
 
 bushd_tables Rig::tables() {
   frame(BUSHD_MSG_TABLES, {});
-  const auto got = answer();
-  bushd_tables tables{};
-  EXPECT_TRUE(got);
-  if (!got) return tables;
-  EXPECT_EQ(bushd_decode_tables(got->payload.data(), got->payload.size(), &tables), BUSHD_OK);
-  return tables;
+  return decoded(answer(), bushd_decode_tables);
 }
 
 bushd_status Rig::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
@@ -403,9 +373,7 @@ bushd_status Rig::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_
 }
 
 bushd_status Rig::position_compare(const bushd_position_compare& message) {
-  return request(BUSHD_MSG_POSITION_COMPARE, payload_of([&](std::uint8_t* p) {
-                   return bushd_encode_position_compare(&message, p);
-                 }));
+  return request(BUSHD_MSG_POSITION_COMPARE, payload_of(message, bushd_encode_position_compare));
 }
 
 void Rig::emergency(bushd_stop_mode mode, std::uint8_t address) {
@@ -422,15 +390,12 @@ bushd_status Rig::clear(std::uint8_t faults) {
 }
 
 bushd_status Rig::emission(const bushd_emission& message) {
-  return request(BUSHD_MSG_EMISSION,
-                 payload_of([&](std::uint8_t* p) { return bushd_encode_emission(&message, p); }));
+  return request(BUSHD_MSG_EMISSION, payload_of(message, bushd_encode_emission));
 }
 
 bushd_status Rig::set_position(std::uint8_t motor, std::int32_t position_steps) {
   const bushd_set_position message = {motor, position_steps};
-  return request(BUSHD_MSG_SET_POSITION, payload_of([&](std::uint8_t* p) {
-                   return bushd_encode_set_position(&message, p);
-                 }));
+  return request(BUSHD_MSG_SET_POSITION, payload_of(message, bushd_encode_set_position));
 }
 
 void Rig::make_ready(const Law& law, bushd_format format, std::uint32_t tick) {

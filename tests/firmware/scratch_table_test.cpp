@@ -11,7 +11,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, ScratchTable,
                          testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
 
 constexpr std::uint8_t kScratch = BUSHD_SCRATCH_BANK;
-const std::vector<LineMotor> kMotors = {{0, 333}, {1, -118}, {3, 332}};
+const std::vector<LineMotor> kLineMotors = {{0, 333}, {1, -118}, {3, 332}};
 
 // Slower than the motors' own, and with unequal sides.
 Law envelope_law() {
@@ -28,11 +28,11 @@ TEST_P(ScratchTable, LinesGoByItExactToASlot) {
     slower.cruise = static_cast<std::uint16_t>(slower.cruise + i);
     ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
     const Frame line{
-        .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch};
+        .first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch};
     ASSERT_EQ(start(rig, line), BUSHD_OK);
     expect_slots(rig, Reference::move(slower, 333), line);
   }
-  const Frame line{.first = rig.first_open() + 3, .motors = kMotors, .longest = 333};
+  const Frame line{.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333};
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   expect_slots(rig, Reference::move(law, 333), line);
 }
@@ -52,7 +52,8 @@ TEST_P(ScratchTable, NoLineGoesByOneThatHasNotComeWhole) {
   const Law slower = envelope_law();
   const auto refused = [&] {
     return start(
-        rig, {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch});
+        rig,
+        {.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch});
   };
   EXPECT_EQ(refused(), BUSHD_E_NO_TABLE);
   EXPECT_EQ(rig.data(kScratch, 0, slower.accel), BUSHD_E_STATE);
@@ -75,17 +76,18 @@ TEST_P(ScratchTable, MakesRoomForTablesThatAreKept) {
   ASSERT_EQ(rig.upload(1, kept), BUSHD_OK);
   EXPECT_GT(rig.mcu().tables.codes_used, used);
   ASSERT_EQ(rig.assign(0, 1), BUSHD_OK);
-  Frame line{.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch};
+  Frame line{
+      .first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch};
   EXPECT_EQ(start(rig, line), BUSHD_E_NO_TABLE) << "discarded";
   ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
   line.first = rig.first_open() + 3;
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   expect_slots(rig, Reference::move(slower, 333), line);
   // And both others are what they were.
-  line = {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = 1};
+  line = {.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = 1};
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   expect_slots(rig, Reference::move(kept, 333), line);
-  line = {.first = rig.first_open() + 3, .motors = kMotors, .longest = 333};
+  line = {.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333};
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   expect_slots(rig, Reference::move(law, 333), line);
 }
@@ -105,7 +107,7 @@ TEST_P(ScratchTable, IsTakenAtRestOnly) {
   const Law slower = envelope_law();
   ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
   const Frame line{
-      .first = rig.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch};
+      .first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch};
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   for (const std::uint8_t bank : {kScratch, std::uint8_t{0}, std::uint8_t{5}}) {
     EXPECT_EQ(rig.begin(bank, slower), BUSHD_E_STATE) << int{bank};
@@ -162,10 +164,11 @@ TEST_P(ScratchTable, IsNoBankOfAnMcuWithoutIt) {
   EXPECT_EQ(none.begin(kScratch, law), BUSHD_E_FORMAT);
   EXPECT_EQ(none.data(kScratch, 0, law.accel), BUSHD_E_FORMAT);
   EXPECT_EQ(none.end(kScratch, codes_of(law)), BUSHD_E_FORMAT);
-  EXPECT_EQ(
-      start(none,
-            {.first = none.first_open() + 3, .motors = kMotors, .longest = 333, .bank = kScratch}),
-      BUSHD_E_NO_TABLE);
+  EXPECT_EQ(start(none, {.first = none.first_open() + 3,
+                         .motors = kLineMotors,
+                         .longest = 333,
+                         .bank = kScratch}),
+            BUSHD_E_NO_TABLE);
   EXPECT_NE(rig.identify().capabilities & BUSHD_CAN_SCRATCH, 0u);
 }
 

@@ -4,12 +4,25 @@
 #include <set>
 
 #include "bus/rs485/slave.h"
+#include "engine/payload.h"
 
 namespace bushd::test {
 namespace {
 
 using link::McuPhase;
 using testing::HasSubstr;
+
+// The codes of the table that all motors have.
+std::vector<std::uint16_t> both_sides(const FakeBus& bus) {
+  std::vector<std::uint16_t> codes = bus.codes;
+  codes.insert(codes.end(), bus.codes.begin() + 50, bus.codes.end());
+  return codes;
+}
+
+void reopen_port(FakeBus& bus) {
+  bus.master->port_lost(bus.now_us, "unplugged");
+  bus.master->port_opened(bus.now_us);
+}
 
 TEST(Connect, FindsConfiguresSyncsAndEnables) {
   FakeBus bus(1, 3);
@@ -28,9 +41,7 @@ TEST(Connect, FindsConfiguresSyncsAndEnables) {
       BUSHD_MSG_ASSIGN,     BUSHD_MSG_ASSIGN,     BUSHD_MSG_CONTROL};
   EXPECT_EQ(requests, expected);
   const Slave& slave = bus.slaves[0];
-  std::vector<std::uint16_t> codes = bus.codes;
-  codes.insert(codes.end(), bus.codes.begin() + 50, bus.codes.end());
-  EXPECT_EQ(slave.tables.at(0), codes) << "both sides, from slow to fast";
+  EXPECT_EQ(slave.tables.at(0), both_sides(bus)) << "from slow to fast";
   EXPECT_EQ(slave.flags, 15);
   const Bytes control = bus.heard_of(BUSHD_MSG_CONTROL).back().payload;
   EXPECT_EQ(control, (Bytes{BUSHD_CONTROL_ENABLE | BUSHD_CONTROL_CLEAR_FAULTS}));
@@ -68,112 +79,6 @@ TEST(Connect, ClearsTheFaultsThatItHasReadOf) {
       EXPECT_EQ(bus.heard_of(BUSHD_MSG_CONTROL).back().payload, expected);
       EXPECT_EQ(slave.faults, 0);
     }
-  }
-}
-
-// A switch may have gone from the configuration since the last time.
-TEST(Connect, SettingsOfInputsAreToldEveryTime) {
-  FakeBus bus(1, 2);
-  bus.connect();
-  link::McuSetup setup = bus.setup.mcus[0];
-  setup.inputs.limit_positive = 0x8001;
-  setup.inputs.overcurrent = 900;
-  bus.master->reconfigure(McuIndex{0}, setup);
-  bus.connect();
-  const auto told = bus.heard_of(BUSHD_MSG_INPUTS);
-  ASSERT_EQ(told.size(), 2u);
-  bushd_set_inputs inputs{};
-  ASSERT_EQ(bushd_decode_set_inputs(told[0].payload.data(), told[0].payload.size(), &inputs),
-            BUSHD_OK);
-  EXPECT_EQ(inputs.limit_positive, 0);
-  ASSERT_EQ(bushd_decode_set_inputs(told[1].payload.data(), told[1].payload.size(), &inputs),
-            BUSHD_OK);
-  EXPECT_EQ(inputs.limit_positive, 0x8001);
-  EXPECT_EQ(inputs.overcurrent, 900);
-}
-
-TEST(Connect, SwitchesAtOtherInputsAreToldAfterTheSettings) {
-  FakeBus bus(1, 2);
-  bus.slaves[0].identity.capabilities |= BUSHD_CAN_MOTOR_INPUTS;
-  bus.slaves[0].identity.motors = 16;
-  bus.connect();
-  EXPECT_TRUE(bus.heard_of(BUSHD_MSG_MOTOR_INPUTS).empty()) << "those of INPUTS will do";
-  link::McuSetup setup = bus.setup.mcus[0];
-  setup.motor_inputs = {{0, 9, 14, 3}, {1, 1, 1, 15}};
-  bus.master->reconfigure(McuIndex{0}, setup);
-  bus.heard.clear();
-  bus.connect();
-  const auto told = bus.heard_of(BUSHD_MSG_MOTOR_INPUTS);
-  ASSERT_EQ(told.size(), 2u);
-  EXPECT_EQ(told[0].payload, (std::vector<std::uint8_t>{0, 9, 14, 3}));
-  EXPECT_EQ(told[1].payload, (std::vector<std::uint8_t>{1, 1, 1, 15}));
-}
-
-TEST(Connect, CurrentsAreToldToAnMcuThatControlsThem) {
-  for (const bool controls : {false, true}) {
-    FakeBus bus(1, 2);
-    if (controls) bus.slaves[0].identity.capabilities |= BUSHD_CAN_CURRENTS;
-    bus.connect();
-    link::McuSetup setup = bus.setup.mcus[0];
-    setup.currents = {{0, BUSHD_DECAY_FAST, static_cast<std::uint16_t>(controls ? 1500 : 0),
-                       static_cast<std::uint16_t>(controls ? 1000 : 0),
-                       static_cast<std::uint16_t>(controls ? 300 : 0)},
-                      {1, BUSHD_DECAY_SLOW, 0, 0, 0}};
-    bus.master->reconfigure(McuIndex{0}, setup);
-    bus.heard.clear();
-    bus.connect();
-    const auto told = bus.heard_of(BUSHD_MSG_CURRENTS);
-    ASSERT_EQ(told.size(), controls ? 2u : 0u);
-    if (!controls) continue;
-    EXPECT_EQ(told[0].payload, (std::vector<std::uint8_t>{0, 1, 0xDC, 5, 0xE8, 3, 0x2C, 1}));
-    EXPECT_EQ(told[1].payload, (std::vector<std::uint8_t>{1, 0, 0, 0, 0, 0, 0, 0}));
-  }
-}
-
-TEST(Connect, VelocitiesAreToldToAnMcuThatHasTheLoop) {
-  for (const bool has : {false, true}) {
-    FakeBus bus(1, 2);
-    if (has) bus.slaves[0].identity.capabilities |= BUSHD_CAN_VELOCITY;
-    bus.connect();
-    link::McuSetup setup = bus.setup.mcus[0];
-    setup.velocities = {{0, 0, 0, 0}};
-    if (has) setup.velocities.push_back({1, 6400, 96000, 500});
-    bus.master->reconfigure(McuIndex{0}, setup);
-    bus.heard.clear();
-    bus.connect();
-    const auto told = bus.heard_of(BUSHD_MSG_VELOCITY);
-    ASSERT_EQ(told.size(), has ? 2u : 0u);
-    if (!has) continue;
-    EXPECT_EQ(told[0].payload, std::vector<std::uint8_t>(13, 0)) << "it may have kept others";
-    EXPECT_EQ(told[1].payload,
-              (std::vector<std::uint8_t>{1, 0, 0x19, 0, 0, 0, 0x77, 1, 0, 0xF4, 1, 0, 0}));
-  }
-}
-
-// EN of drivers that are enabled by a low level must not be raised and lowered by another one
-// first.
-TEST(Connect, LevelsOfOutputsAreToldBeforeTheDriversAreEnabled) {
-  for (const bool phases : {false, true}) {
-    FakeBus bus(1, 2);
-    bus.slaves[0].identity.capabilities |= BUSHD_CAN_OUTPUTS | BUSHD_CAN_PHASES;
-    bus.connect();
-    link::McuSetup setup = bus.setup.mcus[0];
-    setup.outputs = {.step_low = 0x0102, .direction_low = 0x8000, .enabled = BUSHD_ENABLED_LOW};
-    if (phases) setup.emission.settings.mode = BUSHD_EMISSION_PHASES;
-    bus.master->reconfigure(McuIndex{0}, setup);
-    bus.heard.clear();
-    bus.connect();
-    std::vector<int> requests;
-    for (const Heard& heard : bus.heard) {
-      if (heard.type == BUSHD_MSG_OUTPUTS || heard.type == BUSHD_MSG_EMISSION ||
-          heard.type == BUSHD_MSG_CONTROL) {
-        requests.push_back(heard.type);
-      }
-    }
-    const std::vector<int> pulses{BUSHD_MSG_EMISSION, BUSHD_MSG_OUTPUTS, BUSHD_MSG_CONTROL};
-    const std::vector<int> windings{BUSHD_MSG_OUTPUTS, BUSHD_MSG_EMISSION, BUSHD_MSG_CONTROL};
-    EXPECT_EQ(requests, phases ? windings : pulses);
-    EXPECT_EQ(bus.heard_of(BUSHD_MSG_OUTPUTS)[0].payload, (Bytes{2, 1, 0, 0x80, 2}));
   }
 }
 
@@ -281,9 +186,7 @@ TEST(Connect, LostRequestsAndAnswersAreRepeated) {
   bus.slaves[0].loses = [&](const Heard&) { return ++n % 3 == 0; };
   bus.connect();
   EXPECT_GT(bus.master->health(McuIndex{0}).timeouts, 3u);
-  std::vector<std::uint16_t> codes = bus.codes;
-  codes.insert(codes.end(), bus.codes.begin() + 50, bus.codes.end());
-  EXPECT_EQ(bus.slaves[0].tables.at(0), codes);
+  EXPECT_EQ(bus.slaves[0].tables.at(0), both_sides(bus));
 }
 
 TEST(Connect, MissedRepliesMakeOfflineOnceAndAfterALimit) {
@@ -356,8 +259,7 @@ TEST(Connect, ABusIsHeardOnceAnMcuHasAnsweredSinceThePortWasOpened) {
   EXPECT_FALSE(bus.master->heard());
   bus.connect();
   EXPECT_TRUE(bus.master->heard());
-  bus.master->port_lost(bus.now_us, "unplugged");
-  bus.master->port_opened(bus.now_us);
+  reopen_port(bus);
   EXPECT_FALSE(bus.master->heard());
   bus.slaves.clear();
   bus.run_for(3'000'000);
@@ -414,8 +316,7 @@ TEST(Connect, TablesThatAreThereAreNotSentAgain) {
   FakeBus bus;
   bus.connect();
   const auto sent = bus.heard_of(BUSHD_MSG_TABLE_DATA).size();
-  bus.master->port_lost(bus.now_us, "unplugged");
-  bus.master->port_opened(bus.now_us);
+  reopen_port(bus);
   bus.connect();
   EXPECT_EQ(bus.heard_of(BUSHD_MSG_TABLE_DATA).size(), sent);
   // Another revision is another table.
@@ -443,18 +344,21 @@ TEST(Connect, TwoMcusWithOneAddressAreNamed) {
   ASSERT_TRUE(bus.run_until([&] { return bus.online(0); }));
 }
 
+void receive(FakeBus& bus, std::uint8_t address, std::uint8_t type, unsigned sequence,
+             const Bytes& payload) {
+  Bytes wire(BUSHD_FRAME_MAX_WIRE);
+  wire.resize(bushd_frame_encode(address, type, static_cast<std::uint8_t>(sequence), payload.data(),
+                                 payload.size(), wire.data()));
+  bus.master->receive(bus.now_us, wire);
+}
+
 TEST(Connect, AnotherMasterOnTheLineIsNoticedForSomeSeconds) {
   FakeBus bus;
   bus.connect();
   EXPECT_FALSE(bus.master->two_masters(bus.now_us));
   bushd_sync sync{};
   sync.master = 4711;
-  Bytes payload(32);
-  payload.resize(bushd_encode_sync(&sync, payload.data()));
-  Bytes wire(BUSHD_FRAME_MAX_WIRE);
-  wire.resize(
-      bushd_frame_encode(0, BUSHD_MSG_SYNC, 1, payload.data(), payload.size(), wire.data()));
-  bus.master->receive(bus.now_us, wire);
+  receive(bus, 0, BUSHD_MSG_SYNC, 1, payload_of(sync, bushd_encode_sync));
   EXPECT_TRUE(bus.master->two_masters(bus.now_us));
   bus.run_for(2'000'000);
   EXPECT_FALSE(bus.master->two_masters(bus.now_us));
@@ -510,14 +414,9 @@ TEST(Connect, AdapterLatencyIsMeasured) {
 
 // This report comes as the answer to a POLL, under each sequence number.
 void receive_under_each_number(FakeBus& bus, const bushd_report& report) {
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_report(&report, payload.data()));
+  const Bytes payload = payload_of(report, bushd_encode_report);
   for (unsigned sequence = 0; sequence < 256; ++sequence) {
-    Bytes wire(BUSHD_FRAME_MAX_WIRE);
-    wire.resize(bushd_frame_encode(1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY,
-                                   static_cast<std::uint8_t>(sequence), payload.data(),
-                                   payload.size(), wire.data()));
-    bus.master->receive(bus.now_us, wire);
+    receive(bus, 1, BUSHD_MSG_POLL | BUSHD_TYPE_REPLY, sequence, payload);
   }
 }
 

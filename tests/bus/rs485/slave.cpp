@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/payload.h"
+
 namespace bushd::test {
 
 namespace {
@@ -198,9 +200,7 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
       ASSERT_EQ(bushd_decode_identify(p.data(), p.size(), &identify), BUSHD_OK);
       const std::uint8_t window =
           bushd_identify_window(slave.identity.unique_id, identify.salt, identify.windows);
-      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-      payload.resize(bushd_encode_identity(&slave.identity, payload.data()));
-      return answer(slave, frame, sequence, payload,
+      return answer(slave, frame, sequence, payload_of(slave.identity, bushd_encode_identity),
                     std::int64_t{window} * identify.window_units * 10);
     }
     case BUSHD_MSG_POLL: {
@@ -245,15 +245,12 @@ void FakeBus::act(Slave& slave, const Heard& frame, std::uint8_t sequence) {
     case BUSHD_MSG_TABLES: {
       bushd_tables tables{};
       for (const auto& [bank, held] : slave.held) tables.bank[bank] = held;
-      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-      payload.resize(bushd_encode_tables(&tables, payload.data()));
-      return answer(slave, frame, sequence, payload);
+      return answer(slave, frame, sequence, payload_of(tables, bushd_encode_tables));
     }
     case BUSHD_MSG_PROGRAM_STATE: {
-      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       slave.program_state.tick = tick_of(slave);
-      payload.resize(bushd_encode_program_state(&slave.program_state, payload.data()));
-      return answer(slave, frame, sequence, status == 0 ? payload : Bytes{status});
+      const Bytes state = payload_of(slave.program_state, bushd_encode_program_state);
+      return answer(slave, frame, sequence, status == 0 ? state : Bytes{status});
     }
     case BUSHD_MSG_PROGRAM_PUT:
       return answer(slave, frame, sequence, {status != 0 ? status : put_program(slave, frame)});
@@ -476,9 +473,7 @@ Bytes FakeBus::report(Slave& slave, const bushd_poll_entry& entry) {
   r.motor_count = slave.identity.motors;
   slave.spoils(r);
   choose_news(slave.told, r, entry);
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_report(&r, payload.data()));
-  return payload;
+  return payload_of(r, bushd_encode_report);
 }
 
 void FakeBus::answer(const Slave& slave, const Heard& frame, std::uint8_t sequence,
