@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "daemon/camac_lab.h"
 #include "daemon/fronts/reception.h"
 #include "daemon/lab.h"
 
@@ -21,28 +20,52 @@ using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-class Client final : public api::Session {
+class Asking final : public api::Session {
  public:
-  explicit Client(std::string id) : Session(api::Transport::kSocket, std::move(id), true) {}
+  explicit Asking(std::string id) : Session(api::Transport::kSocket, std::move(id), true) {}
   void answer(std::int64_t number, const api::Reply& reply) override {
     answers[number].push_back(reply);
   }
   std::map<std::int64_t, std::vector<api::Reply>> answers;
 };
 
-// A lab behind the reception, as in the event loop.
-struct Desk {
-  explicit Desk(Lab& of) : lab(of) {}
+std::string toml_with_homes(const std::string& mcu_keys = "") {
+  std::string toml = hall(2, 3);
+  for (const char* motor : {"name = \"m01\"\n", "name = \"m02\"\n"}) {
+    toml.insert(toml.find(motor) + std::string(motor).size(),
+                "home = { direction = \"negative\", most_steps = 3000 }\n");
+  }
+  for (std::size_t at = toml.find("address = "); at != std::string::npos;
+       at = toml.find("address = ", at + 1)) {
+    toml.insert(toml.find('\n', at) + 1, mcu_keys);
+  }
+  return toml;
+}
 
-  std::int64_t take(const std::shared_ptr<Client>& from, const api::Request& request) {
+// A lab behind the reception, as in the event loop.
+struct Desk : Lab {
+  Desk() : Desk(toml_with_homes()) { connect(); }
+  explicit Desk(const std::string& toml, bool kept = false)
+      : Lab(toml), reception(stops_of_core(kept), [this](const auto& asker, const auto& request) {
+          core().request(now_us(), asker, request);
+        }) {}
+
+  std::int64_t take(const std::shared_ptr<Asking>& from, const api::Request& request) {
     reception.take({.session = from, .number = ++number}, request, 1);
     return number;
+  }
+  std::int64_t take(const api::Request& request) { return take(mover, request); }
+  // Taken, and begun as far as it can be.
+  void begin(const api::Request& request, double seconds = 0.05) {
+    take(request);
+    carry_out();
+    run_for(seconds);
   }
   void carry_out() {
     while (!reception.idle()) reception.carry_out_next();
   }
   // The word of its one result; "refused: WHY", "none", or that there are several.
-  std::string result_of(std::int64_t of, const std::shared_ptr<Client>& client) const {
+  std::string result_of(std::int64_t of, const std::shared_ptr<Asking>& client) const {
     std::string result = "none";
     for (const api::Reply& reply : client->answers[of]) {
       if (!api::is_final(reply)) continue;
@@ -59,26 +82,43 @@ struct Desk {
     std::map<std::string, std::int64_t> steps;
     for (int m = 1; m <= 6; ++m) {
       const std::string name = "m0" + std::to_string(m);
-      steps[name] = lab.shaft_steps(name);
+      steps[name] = shaft_steps(name);
     }
     return steps;
   }
 
-  Lab& lab;
+  // Everything moves again, and the disk knows that all rests.
+  void settle() {
+    wait(send(api::Release{}));
+    wait(send(Ask::kStop, {}));
+    wait(send(Ask::kClearFaults, {}));
+    run_for(1.5);
+  }
+
   std::int64_t number = 0;
-  std::shared_ptr<Client> mover = std::make_shared<Client>("mover");
-  std::shared_ptr<Client> panel = std::make_shared<Client>("panel");
-  daemon::Reception reception{lab.core().counted_stops(),
-                              [this](const api::Asker& asker, const api::Request& request) {
-                                lab.core().request(lab.now_us(), asker, request);
-                              }};
+  std::shared_ptr<Asking> mover = std::make_shared<Asking>("mover");
+  std::shared_ptr<Asking> panel = std::make_shared<Asking>("panel");
+  daemon::Reception reception;
+
+ private:
+  // A core that keeps positions is another one.
+  daemon::StopCount& stops_of_core(bool kept) {
+    if (kept) keep_positions();
+    return core().counted_stops();
+  }
 };
 
 // Requests for motors m01 and m02; the last of these begins the motion. `round`: trajectories have
 // numbers.
 struct Kind {
+  using Requests = std::function<std::vector<api::Request>(std::int64_t round)>;
+  Kind(const char* its_name, Requests of_round) : name(its_name), requests(std::move(of_round)) {}
+  Kind(const char* its_name, std::vector<api::Request> same)
+      : Kind(its_name, [same = std::move(same)](std::int64_t) { return same; }) {}
+  Kind(const char* its_name, const api::Request& one) : Kind(its_name, std::vector{one}) {}
+
   const char* name;
-  std::function<std::vector<api::Request>(std::int64_t round)> requests;
+  Requests requests;
 };
 
 std::vector<api::Request> path_in_parts(std::int32_t rows, std::int32_t rows_of_part) {
@@ -110,34 +150,16 @@ std::vector<api::Request> trajectory_in_parts(std::int64_t number, int parts) {
 }
 
 const std::vector<Kind> kKinds{
-    {"move",
-     [](std::int64_t) {
-       return std::vector<api::Request>{request_of(Ask::kMoveBy, {"m02", "m01"}, {300, 400})};
-     }},
-    {"line",
-     [](std::int64_t) {
-       return std::vector<api::Request>{
-           api::MoveLine{.motors = motor_steps({"m01", "m02"}, {400, 200})}};
-     }},
-    {"path", [](std::int64_t) { return path_in_parts(40, 40); }},
-    {"path in parts", [](std::int64_t) { return path_in_parts(60, 20); }},
+    {"move", request_of(Ask::kMoveBy, {"m02", "m01"}, {300, 400})},
+    {"line", api::MoveLine{.motors = motor_steps({"m01", "m02"}, {400, 200})}},
+    {"path", path_in_parts(40, 40)},
+    {"path in parts", path_in_parts(60, 20)},
     {"trajectory", [](std::int64_t round) { return trajectory_in_parts(round, 2); }},
-    {"arm",
-     [](std::int64_t) {
-       return std::vector<api::Request>{
-           api::Arm{.delay_us = 1000, .motors = motor_steps({"m01", "m02"}, {40, 50})}};
-     }},
+    {"arm", api::Arm{.delay_us = 1000, .motors = motor_steps({"m01", "m02"}, {40, 50})}},
     {"arm line",
-     [](std::int64_t) {
-       return std::vector<api::Request>{
-           api::ArmLine{.delay_us = 1000, .motors = motor_steps({"m01", "m02"}, {400, -400})}};
-     }},
-    {"jog",
-     [](std::int64_t) {
-       return std::vector<api::Request>{
-           api::Jog{.motor = "m01", .per_s = 200, .in_steps = true, .keepalive_ms = 10'000}};
-     }},
-    {"home", [](std::int64_t) { return std::vector<api::Request>{api::Home{{"m01"}}}; }},
+     api::ArmLine{.delay_us = 1000, .motors = motor_steps({"m01", "m02"}, {400, -400})}},
+    {"jog", api::Jog{.motor = "m01", .per_s = 200, .in_steps = true, .keepalive_ms = 10'000}},
+    {"home", api::Home{{"m01"}}},
 };
 
 const std::vector<api::Request> kStops{api::Stop{{"m01"}},
@@ -150,54 +172,34 @@ const std::vector<api::Request> kStops{api::Stop{{"m01"}},
                                        api::Jog{.motor = "m01"},
                                        api::Stop{{"m01", "m01", "nobody"}}};
 
-std::string toml_with_homes(const std::string& mcu_keys = "") {
-  std::string toml = hall(2, 3);
-  for (const char* motor : {"name = \"m01\"\n", "name = \"m02\"\n"}) {
-    toml.insert(toml.find(motor) + std::string(motor).size(),
-                "home = { direction = \"negative\", most_steps = 3000 }\n");
-  }
-  for (std::size_t at = toml.find("address = "); at != std::string::npos;
-       at = toml.find("address = ", at + 1)) {
-    toml.insert(toml.find('\n', at) + 1, mcu_keys);
-  }
-  return toml;
-}
-
-// Everything moves again, and the disk knows that all rests.
-void settle(Desk& desk) {
-  Lab& lab = desk.lab;
-  lab.wait(lab.send(api::Release{}));
-  lab.wait(lab.send(Ask::kStop, {}));
-  lab.wait(lab.send(Ask::kClearFaults, {}));
-  lab.run_for(1.5);
+auto is_stopped_by(std::int64_t command) {
+  return AllOf(HasSubstr("stopped: "),
+               HasSubstr("command " + std::to_string(command) + " of panel"));
 }
 
 class StopOrder : public testing::Test {
  protected:
   // `put` brings requests to where they wait, the first ones of these; the others come after the
   // stop. So many of them have their results before it.
-  void check(Desk& desk, const Kind& kind, const api::Request& stop,
-             const std::function<void(const std::vector<api::Request>&)>& put,
-             std::int64_t with_result = 0) {
+  void check(Desk& desk, const Kind& kind, const api::Request& stop, std::size_t with_result,
+             const std::function<void(const std::vector<api::Request>&)>& put) {
     SCOPED_TRACE(std::string(kind.name) + ", " + std::string(api::name_of(stop)));
     const std::vector<api::Request> requests = kind.requests(++round_);
     const std::int64_t first = desk.number + 1;
     put(requests);
     std::vector<std::int64_t> waiting;
-    for (std::int64_t n = first + with_result; n <= desk.number; ++n) {
+    for (auto n = first + static_cast<std::int64_t>(with_result); n <= desk.number; ++n) {
       ASSERT_EQ(desk.result_of(n), "none") << "request " << n - first + 1 << " is to wait";
       waiting.push_back(n);
     }
     const auto before = desk.shafts();
     auto next = static_cast<std::size_t>(desk.number + 1 - first);
     const auto stopped = desk.take(desk.panel, stop);
-    for (; next < requests.size(); ++next) waiting.push_back(desk.take(desk.mover, requests[next]));
+    for (; next < requests.size(); ++next) waiting.push_back(desk.take(requests[next]));
     desk.carry_out();
-    desk.lab.run_for(1.5);
-    const std::string who = "command " + std::to_string(stopped) + " of panel";
+    desk.run_for(1.5);
     for (const std::int64_t n : waiting) {
-      EXPECT_THAT(desk.result_of(n), AllOf(HasSubstr("stopped: "), HasSubstr(who)))
-          << "request " << n - first + 1;
+      EXPECT_THAT(desk.result_of(n), is_stopped_by(stopped)) << "request " << n - first + 1;
     }
     EXPECT_EQ(desk.shafts(), before) << "nothing moves";
     EXPECT_THAT(desk.result_of(stopped, desk.panel),
@@ -208,176 +210,136 @@ class StopOrder : public testing::Test {
 };
 
 TEST_F(StopOrder, OfWhatHasBeenReceivedAndNotTaken) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
+  Desk desk;
   for (const Kind& kind : kKinds) {
     for (const api::Request& stop : kStops) {
-      check(desk, kind, stop, [&](const auto& requests) {
-        for (const api::Request& request : requests) desk.take(desk.mover, request);
+      check(desk, kind, stop, 1, [&](const auto& requests) {
+        for (const api::Request& request : requests) desk.take(request);
       });
-      settle(desk);
+      desk.settle();
     }
   }
 }
 
 // The first part is taken; the others are received before the stop, or come after it.
 TEST_F(StopOrder, OfWhatComesInParts) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
+  Desk desk;
   for (const Kind& kind : kKinds) {
     if (kind.requests(0).size() == 1) continue;
     for (const std::size_t received : {1u, 2u}) {
       for (const api::Request& stop : kStops) {
-        check(
-            desk, kind, stop,
-            [&](const auto& requests) {
-              desk.take(desk.mover, requests.front());
-              desk.carry_out();
-              lab.run_for(0.05);
-              EXPECT_THAT(desk.result_of(desk.number), HasSubstr("done"));
-              for (std::size_t i = 1; i < received; ++i) desk.take(desk.mover, requests[i]);
-            },
-            1);
-        settle(desk);
+        check(desk, kind, stop, 1, [&](const auto& requests) {
+          desk.begin(requests.front());
+          EXPECT_THAT(desk.result_of(desk.number), HasSubstr("done"));
+          for (std::size_t n = 1; n < received; ++n) desk.take(requests[n]);
+        });
+        desk.settle();
       }
     }
   }
 }
 
 TEST_F(StopOrder, OfWhatWaitsForTheDisk) {
-  Lab lab(toml_with_homes());
-  lab.keep_positions();
-  lab.connect();
-  Desk desk(lab);
+  Desk desk(toml_with_homes(), true);
+  desk.connect();
   for (const Kind& kind : kKinds) {
     for (const api::Request& stop : kStops) {
-      lab.disk_us = 500;
-      settle(desk);
-      check(
-          desk, kind, stop,
-          [&](const auto& requests) {
-            for (const api::Request& request : requests) {
-              lab.disk_us = 200'000;
-              desk.take(desk.mover, request);
-              desk.carry_out();
-              lab.run_for(0.05);
-            }
-          },
-          kind.requests(0).size() - 1);
+      desk.disk_us = 500;
+      desk.settle();
+      check(desk, kind, stop, kind.requests(0).size() - 1, [&](const auto& requests) {
+        for (const api::Request& request : requests) {
+          desk.disk_us = 200'000;
+          desk.begin(request);
+        }
+      });
     }
   }
 }
 
 TEST_F(StopOrder, OfWhatWaitsForDrivers) {
-  Lab lab(toml_with_homes("idle_disable_s = 0.5\nenable_settle_ms = 250\n"));
-  lab.connect();
-  Desk desk(lab);
+  Desk desk(toml_with_homes("idle_disable_s = 0.5\nenable_settle_ms = 250\n"));
+  desk.connect();
   for (const Kind& kind : kKinds) {
     for (const api::Request& stop : kStops) {
-      settle(desk);
-      check(
-          desk, kind, stop,
-          [&](const auto& requests) {
-            for (const api::Request& request : requests) {
-              desk.take(desk.mover, request);
-              desk.carry_out();
-              lab.run_for(0.05);
-            }
-          },
-          kind.requests(0).size() - 1);
+      desk.settle();
+      check(desk, kind, stop, kind.requests(0).size() - 1, [&](const auto& requests) {
+        for (const api::Request& request : requests) desk.begin(request);
+      });
     }
   }
 }
 
 // 0.13 s of a PC; here it is work that is done only in slices.
 TEST_F(StopOrder, OfAPathThatIsBeingPlanned) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
-  const Kind path{"long path", [](std::int64_t) { return path_in_parts(6000, 2000); }};
+  Desk desk;
+  const Kind path{"long path", path_in_parts(6000, 2000)};
   for (const api::Request& stop : kStops) {
-    check(
-        desk, path, stop,
-        [&](const auto& requests) {
-          for (const api::Request& request : requests) {
-            desk.take(desk.mover, request);
-            desk.carry_out();
-          }
-          for (int slice = 0; slice < 10; ++slice) lab.core().work();
-          lab.core().keep_up(lab.now_us());
-        },
-        path.requests(0).size() - 1);
-    settle(desk);
+    check(desk, path, stop, path.requests(0).size() - 1, [&](const auto& requests) {
+      for (const api::Request& request : requests) {
+        desk.take(request);
+        desk.carry_out();
+      }
+      for (int slice = 0; slice < 10; ++slice) desk.core().work();
+      desk.core().keep_up(desk.now_us());
+    });
+    desk.settle();
   }
 }
 
 TEST_F(StopOrder, OfRowsThatAreBeingChecked) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
+  Desk desk;
   const Kind trajectory{"trajectory",
                         [](std::int64_t round) { return trajectory_in_parts(round, 1); }};
   for (const api::Request& stop : kStops) {
-    check(desk, trajectory, stop, [&](const auto& requests) {
-      desk.take(desk.mover, requests.front());
+    check(desk, trajectory, stop, 0, [&](const auto& requests) {
+      desk.take(requests.front());
       desk.carry_out();
     });
-    settle(desk);
+    desk.settle();
   }
 }
 
 TEST_F(StopOrder, OfALineWhoseTableIsBeingUploaded) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
-  const std::vector<std::int64_t> own_table{3000, -1201, 2998};
-  std::int64_t way = 0;
+  Desk desk;
+  std::int64_t way = 3000;  // each has a table of its own
   const auto line_of = [&](bool armed) -> std::vector<api::Request> {
-    const auto motors =
-        motor_steps({"m01", "m02", "m04"}, {own_table[0] + ++way, own_table[1], own_table[2]});
+    const auto motors = motor_steps({"m01", "m02", "m04"}, {++way, -1201, 2998});
     if (armed) return {api::ArmLine{.delay_us = 1000, .motors = motors}};
     return {api::MoveLine{.motors = motors}};
   };
   for (const bool armed : {false, true}) {
     const Kind line{armed ? "arm line" : "line", [&](std::int64_t) { return line_of(armed); }};
     for (const api::Request& stop : kStops) {
-      check(desk, line, stop, [&](const auto& requests) {
-        desk.take(desk.mover, requests.front());
-        desk.carry_out();
-        lab.run_for(0.01);
-      });
-      settle(desk);
+      check(desk, line, stop, 0, [&](const auto& requests) { desk.begin(requests.front(), 0.01); });
+      desk.settle();
     }
   }
 }
 
 // m01 waits until m02, of the same MCU, has been homed.
 TEST_F(StopOrder, OfAMotorThatWaitsForItsTurnToBeHomed) {
-  Lab lab(toml_with_homes());
+  Desk desk(toml_with_homes());
   for (std::size_t output : {0u, 1u}) {
-    lab.bus(0).mcu(0).attach_switch(output, {.at_steps = -300});
+    desk.bus(0).mcu(0).attach_switch(output, {.at_steps = -300});
   }
-  lab.connect();
-  Desk desk(lab);
+  desk.connect();
   for (const api::Request& stop : kStops) {
     SCOPED_TRACE(api::name_of(stop));
-    lab.wait(lab.send(Ask::kMoveTo, {"m02"}, {200}));
-    const auto first = desk.take(desk.mover, api::Home{{"m02"}});
-    const auto second = desk.take(desk.mover, api::Home{{"m01"}});
+    desk.wait(desk.send(Ask::kMoveTo, {"m02"}, {200}));
+    const auto first = desk.take(api::Home{{"m02"}});
+    const auto second = desk.take(api::Home{{"m01"}});
     desk.carry_out();
-    lab.run_for(0.1);
-    const std::int64_t at = lab.shaft_steps("m01");
+    desk.run_for(0.1);
+    const std::int64_t at = desk.shaft_steps("m01");
     const auto stopped = desk.take(desk.panel, stop);
-    lab.run_for(8);
+    desk.run_for(8);
     EXPECT_THAT(desk.result_of(second),
                 AllOf(HasSubstr("stopped: m01: stopped before it was its turn to be homed"),
-                      HasSubstr("command " + std::to_string(stopped) + " of panel")));
-    EXPECT_EQ(lab.shaft_steps("m01"), at);
+                      is_stopped_by(stopped)));
+    EXPECT_EQ(desk.shaft_steps("m01"), at);
     EXPECT_THAT(desk.result_of(first), AnyOf(HasSubstr("reached: "), HasSubstr("stopped: ")));
-    settle(desk);
-    lab.wait(lab.send(Ask::kSetPosition, {"m02"}, {lab.shaft_steps("m02")}));
+    desk.settle();
+    desk.wait(desk.send(Ask::kSetPosition, {"m02"}, {desk.shaft_steps("m02")}));
   }
 }
 
@@ -385,149 +347,131 @@ TEST_F(StopOrder, OfAMotorThatWaitsForItsTurnToBeHomed) {
 TEST_F(StopOrder, OfAMoveThatIsBegunInSlices) {
   for (const api::Request& stop : kStops) {
     SCOPED_TRACE(api::name_of(stop));
-    Lab lab(hall(3, 16, "coarse"));
-    lab.connect();
-    Desk desk(lab);
+    Desk desk(hall(3, 16, "coarse"));
+    desk.connect();
     api::Move move;
     for (int m = 48; m >= 1; --m) {
       move.motors.push_back({(m < 10 ? "m0" : "m") + std::to_string(m), 300});
     }
-    const auto number = desk.take(desk.mover, move);
+    const auto number = desk.take(move);
     desk.carry_out();
-    ASSERT_TRUE(lab.core().begins_moves());
-    lab.core().work();
-    ASSERT_TRUE(lab.core().begins_moves()) << "m01 has not begun";
+    ASSERT_TRUE(desk.core().begins_moves());
+    desk.core().work();
+    ASSERT_TRUE(desk.core().begins_moves()) << "m01 has not begun";
     const auto stopped = desk.take(desk.panel, stop);
-    lab.run_for(3);
-    EXPECT_EQ(lab.shaft_steps("m01"), 0);
-    if (std::holds_alternative<api::Pause>(stop)) lab.wait(lab.send(api::Resume{}));
-    lab.run_for(3);
-    EXPECT_THAT(desk.result_of(number),
-                AllOf(HasSubstr("stopped: "),
-                      HasSubstr("command " + std::to_string(stopped) + " of panel")));
-    EXPECT_EQ(lab.shaft_steps("m01"), 0);
+    desk.run_for(3);
+    EXPECT_EQ(desk.shaft_steps("m01"), 0);
+    if (std::holds_alternative<api::Pause>(stop)) desk.wait(desk.send(api::Resume{}));
+    desk.run_for(3);
+    EXPECT_THAT(desk.result_of(number), is_stopped_by(stopped));
+    EXPECT_EQ(desk.shaft_steps("m01"), 0);
   }
 }
 
 TEST_F(StopOrder, OfResume) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
-  const Kind resume{"resume",
-                    [](std::int64_t) { return std::vector<api::Request>{api::Resume{}}; }};
+  Desk desk;
+  const Kind resume{"resume", api::Resume{}};
   for (const api::Request& stop : kStops) {
-    const auto start = lab.shaft_steps("m01");
-    lab.send(Ask::kMoveBy, {"m01"}, {2000});
-    ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > start + 300; }));
-    lab.wait(lab.send(api::Pause{}));
-    check(desk, resume, stop,
-          [&](const auto& requests) { desk.take(desk.mover, requests.front()); });
-    settle(desk);
+    const auto start = desk.shaft_steps("m01");
+    desk.send(Ask::kMoveBy, {"m01"}, {2000});
+    ASSERT_TRUE(desk.run_until([&] { return desk.shaft_steps("m01") > start + 300; }));
+    desk.wait(desk.send(api::Pause{}));
+    check(desk, resume, stop, 0, [&](const auto& requests) { desk.take(requests.front()); });
+    desk.settle();
   }
 }
 
 // Its rest is planned anew before it goes on.
 TEST_F(StopOrder, OfAResumedPathWhoseRestIsBeingPlanned) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
+  Desk desk;
   for (const api::Request& stop :
        {api::Request(api::Stop{{"m01"}}), api::Request(api::EmergencyStop{}),
         api::Request(api::Pause{{"m01"}})}) {
     SCOPED_TRACE(api::name_of(stop));
     api::Move back = {.kind = api::Move::Kind::kAbsolute,
                       .motors = motor_steps({"m01", "m02"}, {0, 0})};
-    ASSERT_EQ(lab.wait(lab.send(back)).result, "reached");
+    ASSERT_EQ(desk.wait(desk.send(back)).result, "reached");
     std::int64_t path = 0;
-    for (const api::Request& part : path_in_parts(6000, 2000)) path = lab.send(part);
-    ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 200; }));
-    lab.wait(lab.send(api::Pause{}));
-    desk.take(desk.mover, api::Resume{});
+    for (const api::Request& part : path_in_parts(6000, 2000)) path = desk.send(part);
+    ASSERT_TRUE(desk.run_until([&] { return desk.shaft_steps("m01") > 200; }));
+    desk.wait(desk.send(api::Pause{}));
+    desk.take(api::Resume{});
     desk.carry_out();
-    lab.core().keep_up(lab.now_us());
+    desk.core().keep_up(desk.now_us());
     const auto before = desk.shafts();
     desk.take(desk.panel, stop);
-    lab.run_for(3);
+    desk.run_for(3);
     EXPECT_EQ(desk.shafts(), before);
-    EXPECT_EQ(lab.has_result(path), !std::holds_alternative<api::Pause>(stop));
-    settle(desk);
+    EXPECT_EQ(desk.has_result(path), !std::holds_alternative<api::Pause>(stop));
+    desk.settle();
   }
 }
 
 // What clears an emergency stop, or lets motors go, is undone by one that came after it.
 TEST_F(StopOrder, OfWhatUndoesAStop) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
-  const auto release = desk.take(desk.mover, api::Release{});
-  const auto clear = desk.take(desk.mover, api::ClearFaults{});
+  Desk desk;
+  const auto release = desk.take(api::Release{});
+  const auto clear = desk.take(api::ClearFaults{});
   desk.take(desk.panel, api::Hold{{"m01"}});
   const auto estop = desk.take(desk.panel, api::EmergencyStop{});
-  ASSERT_TRUE(lab.run_until([&] { return desk.result_of(estop, desk.panel) != "none"; }));
+  ASSERT_TRUE(desk.run_until([&] { return desk.result_of(estop, desk.panel) != "none"; }));
   desk.carry_out();
-  lab.run_for(0.5);
+  desk.run_for(0.5);
   EXPECT_THAT(desk.result_of(release), HasSubstr("stopped: m01: stopped by command"));
   EXPECT_THAT(desk.result_of(clear), HasSubstr("stopped: m01: stopped by command"));
-  EXPECT_TRUE(lab.motor("m01").held);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {10})).result, "refused");
+  EXPECT_TRUE(desk.motor("m01").held);
+  EXPECT_EQ(desk.wait(desk.send(Ask::kMoveBy, {"m02"}, {10})).result, "refused");
   // A stop has nothing against either.
-  const auto again = desk.take(desk.mover, api::Release{});
+  const auto again = desk.take(api::Release{});
   desk.take(desk.panel, api::Stop{});
   desk.carry_out();
   EXPECT_THAT(desk.result_of(again), HasSubstr("done: released"));
 }
 
 TEST_F(StopOrder, LeavesAloneWhatArrivesLaterOrIsOfOtherMotors) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
-  const auto ended = desk.take(desk.mover, request_of(Ask::kMoveBy, {"m01"}, {400}));
-  const auto other = desk.take(desk.mover, request_of(Ask::kMoveBy, {"m03"}, {30}));
-  const auto dry_run =
-      desk.take(desk.mover, api::Move{.motors = motor_steps({"m01"}, {40}), .dry_run = true});
-  const auto set = desk.take(desk.mover, request_of(Ask::kSetPosition, {"m02"}, {70}));
+  Desk desk;
+  const auto ended = desk.take(request_of(Ask::kMoveBy, {"m01"}, {400}));
+  const auto other = desk.take(request_of(Ask::kMoveBy, {"m03"}, {30}));
+  const auto dry_run = desk.take(api::Move{.motors = motor_steps({"m01"}, {40}), .dry_run = true});
+  const auto set = desk.take(request_of(Ask::kSetPosition, {"m02"}, {70}));
   desk.take(desk.panel, api::Stop{{"m01", "m02"}});
-  const auto later = desk.take(desk.mover, request_of(Ask::kMoveBy, {"m01"}, {20}));
+  const auto later = desk.take(request_of(Ask::kMoveBy, {"m01"}, {20}));
   desk.carry_out();
-  lab.run_for(2);
+  desk.run_for(2);
   EXPECT_THAT(desk.result_of(ended), HasSubstr("stopped: "));
   EXPECT_THAT(desk.result_of(other), HasSubstr("reached: "));
   EXPECT_THAT(desk.result_of(dry_run), HasSubstr("done: "));
   EXPECT_THAT(desk.result_of(set), HasSubstr("done: "));
   EXPECT_THAT(desk.result_of(later), HasSubstr("reached: "));
-  EXPECT_EQ(lab.shaft_steps("m01"), 20);
-  EXPECT_EQ(lab.motor("m02").position_steps, 70);
+  EXPECT_EQ(desk.shaft_steps("m01"), 20);
+  EXPECT_EQ(desk.motor("m02").position_steps, 70);
 }
 
 // The first parts of a path are ended: so is the path, and the next one is another.
 TEST_F(StopOrder, AnotherPathAfterwardsIsMade) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
+  Desk desk;
   const std::vector<api::Request> parts = path_in_parts(60, 20);
-  desk.take(desk.mover, parts[0]);
+  desk.take(parts[0]);
   desk.take(desk.panel, api::Stop{});
   std::int64_t last = 0;
-  for (const api::Request& part : parts) last = desk.take(desk.mover, part);
+  for (const api::Request& part : parts) last = desk.take(part);
   desk.carry_out();
-  ASSERT_TRUE(lab.run_until([&] { return desk.result_of(last) != "none"; }));
+  ASSERT_TRUE(desk.run_until([&] { return desk.result_of(last) != "none"; }));
   EXPECT_THAT(desk.result_of(last), HasSubstr("reached: "));
-  EXPECT_EQ(lab.shaft_steps("m01"), 120);
+  EXPECT_EQ(desk.shaft_steps("m01"), 120);
 }
 
 TEST_F(StopOrder, OfTheDaemonItself) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
+  Desk desk;
   std::vector<std::int64_t> waiting;
   for (const Kind& kind : kKinds) {
     for (const api::Request& request : kind.requests(++round_)) {
-      waiting.push_back(desk.take(desk.mover, request));
+      waiting.push_back(desk.take(request));
     }
   }
-  lab.core().shut_down(lab.now_us());
+  desk.core().shut_down(desk.now_us());
   desk.carry_out();
-  lab.run_for(2);
+  desk.run_for(2);
   for (const std::int64_t number : waiting) {
     EXPECT_THAT(desk.result_of(number), AnyOf(HasSubstr("stopped by the daemon, which ends"),
                                               HasSubstr("the daemon is shutting down")));
@@ -538,17 +482,15 @@ TEST_F(StopOrder, OfTheDaemonItself) {
 
 // The stop key of a keypad has the same way: its jog ends though too much waits.
 TEST_F(StopOrder, OfTwoStepsOfOneClientIsTheirOwnOrder) {
-  Lab lab(toml_with_homes());
-  lab.connect();
-  Desk desk(lab);
-  const auto jog = desk.take(desk.mover, api::Jog{.motor = "m01", .per_s = 200, .in_steps = true});
-  for (int i = 0; i < 100; ++i) desk.take(desk.mover, api::Enable{});
-  const auto end = desk.take(desk.mover, api::Jog{.motor = "m01"});
+  Desk desk;
+  const auto jog = desk.take(api::Jog{.motor = "m01", .per_s = 200, .in_steps = true});
+  for (int i = 0; i < 100; ++i) desk.take(api::Enable{});
+  const auto end = desk.take(api::Jog{.motor = "m01"});
   EXPECT_THAT(desk.result_of(end), HasSubstr("done: "));
   desk.carry_out();
-  lab.run_for(1);
+  desk.run_for(1);
   EXPECT_THAT(desk.result_of(jog), HasSubstr("stopped: "));
-  EXPECT_EQ(lab.shaft_steps("m01"), 0);
+  EXPECT_EQ(desk.shaft_steps("m01"), 0);
 }
 
 }  // namespace
