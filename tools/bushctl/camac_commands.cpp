@@ -12,6 +12,7 @@
 
 #include "base/json_text.h"
 #include "base/printable.h"
+#include "client/answer.h"
 #include "commands.h"
 #include "tables/table_text.h"
 
@@ -23,6 +24,7 @@ namespace camac = bushd::camac;
 using bushd::fail;
 using bushd::Result;
 using bushd::client::Client;
+using bushd::client::detail_of;
 using nlohmann::ordered_json;
 
 // The memory of a BUSHD-2 (docs/camac.md).
@@ -83,9 +85,7 @@ class Crate {
       exit_code_ = failure(client_, reply.error());
       return std::nullopt;
     }
-    const auto* completed = std::get_if<api::Completed>(&*reply);
-    const auto* result =
-        completed == nullptr ? nullptr : std::get_if<api::CamacResult>(&completed->detail);
+    const auto* result = detail_of<api::CamacResult>(reply);
     if (result == nullptr) {
       exit_code_ = refused(*reply);
       return std::nullopt;
@@ -203,9 +203,7 @@ Result<std::vector<std::uint32_t>> codes_of(Client& client, const std::string& n
   const auto reply = client.run(api::GetTable{name}, Client::Until::kResult);
   if (!reply) return fail(reply.error());
   if (const auto* none = std::get_if<api::Refused>(&*reply)) return fail(none->reason);
-  const auto* completed = std::get_if<api::Completed>(&*reply);
-  const auto* table =
-      completed == nullptr ? nullptr : std::get_if<api::TableFile>(&completed->detail);
+  const auto* table = detail_of<api::TableFile>(reply);
   if (table == nullptr) return fail("the daemon's answer brings no table");
   auto codes = codes_of(table->content);
   if (!codes) return fail("table " + name + " " + codes.error().message);

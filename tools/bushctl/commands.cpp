@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "base/printable.h"
+#include "client/answer.h"
 #include "progress.h"
 #include "render.h"
 
@@ -20,6 +21,7 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
+using bushd::client::detail_of;
 
 // `fd`: of a former call; -1: none.
 int block_signals(int fd, std::initializer_list<int> numbers) {
@@ -224,17 +226,19 @@ int show_plan(const Connection& connection, std::vector<api::MovePath> parts, bo
     if (const int code = bring(client, parts, wording); code != kDone) return code;
     const auto reply = client.run(parts.back(), Client::Until::kResult);
     if (!reply) return failure(client, reply.error());
-    const auto* completed = std::get_if<api::Completed>(&*reply);
-    const auto* plan =
-        completed == nullptr ? nullptr : std::get_if<api::MovePlan>(&completed->detail);
+    const auto* plan = detail_of<api::MovePlan>(reply);
     if (plan == nullptr) return refused(worded(*reply, wording));
-    if (as_json) {
-      fmt::print("{}\n", json(*plan));
-    } else {
-      for (const std::string& line : lines(*plan)) fmt::print("{}\n", line);
-    }
-    return static_cast<int>(kDone);
+    return print(*plan, as_json);
   });
+}
+
+int print(const api::MovePlan& plan, bool as_json) {
+  if (as_json) {
+    fmt::print("{}\n", json(plan));
+  } else {
+    for (const std::string& line : lines(plan)) fmt::print("{}\n", line);
+  }
+  return kDone;
 }
 
 std::chrono::milliseconds milliseconds(double seconds) {

@@ -105,6 +105,8 @@ int send_parts(const Connection& connection, const std::vector<bushd::api::MoveP
 int show_plan(const Connection& connection, std::vector<bushd::api::MovePath> parts, bool as_json,
               const Wording& wording);
 
+int print(const bushd::api::MovePlan& plan, bool as_json);
+
 // Says on stderr why, unless it was the user who broke off.
 int failure(const bushd::client::Client& client, const bushd::Error& error);
 // If something of what was shown did not arrive, stderr says so. kDone if nothing is missing.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <set>
 
+#include "client/answer.h"
 #include "commands.h"
 #include "config/setting.h"
 #include "tokens/token_file.h"
@@ -11,6 +12,7 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
+using bushd::client::detail_of;
 
 // Somebody waits for it with a hand on the keyboard.
 constexpr std::chrono::milliseconds kPatience{500};
@@ -18,9 +20,7 @@ constexpr std::chrono::milliseconds kPatience{500};
 std::set<std::string> tables(Client& client) {
   std::set<std::string> names;
   const auto reply = client.run(api::ListTables{}, Client::Until::kResult);
-  const auto* completed = reply ? std::get_if<api::Completed>(&*reply) : nullptr;
-  const auto* list =
-      completed == nullptr ? nullptr : std::get_if<api::TableList>(&completed->detail);
+  const auto* list = detail_of<api::TableList>(reply);
   if (list == nullptr) return names;
   for (const api::TableEntry& entry : list->entries) names.insert(entry.name);
   return names;
@@ -29,9 +29,7 @@ std::set<std::string> tables(Client& client) {
 std::set<std::string> programs(Client& client) {
   std::set<std::string> names;
   const auto reply = client.run(api::ListPrograms{}, Client::Until::kResult);
-  const auto* completed = reply ? std::get_if<api::Completed>(&*reply) : nullptr;
-  const auto* list =
-      completed == nullptr ? nullptr : std::get_if<api::ProgramList>(&completed->detail);
+  const auto* list = detail_of<api::ProgramList>(reply);
   if (list == nullptr) return names;
   for (const api::ProgramEntry& entry : list->programs) names.insert(entry.program);
   names.erase("");  // of an MCU without one

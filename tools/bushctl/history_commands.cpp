@@ -9,6 +9,7 @@
 #include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
+#include "client/answer.h"
 #include "commands.h"
 #include "grid.h"
 
@@ -17,6 +18,7 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
+using bushd::client::detail_of;
 using nlohmann::ordered_json;
 
 void print_json(const std::string& motor, const api::MotionHistory& history) {
@@ -56,9 +58,7 @@ int show_history(Client& client, const HistoryOptions& options) {
       api::GetHistory{.motor = options.motor, .most = static_cast<std::int32_t>(options.most)},
       Client::Until::kResult);
   if (!reply) return failure(client, reply.error());
-  const auto* completed = std::get_if<api::Completed>(&*reply);
-  const auto* history =
-      completed == nullptr ? nullptr : std::get_if<api::MotionHistory>(&completed->detail);
+  const auto* history = detail_of<api::MotionHistory>(reply);
   if (history == nullptr) return refused(*reply);
   if (options.json) {
     print_json(options.motor, *history);

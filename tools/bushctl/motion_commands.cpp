@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 
+#include "client/answer.h"
 #include "commands.h"
 #include "envelope_move.h"
 #include "move_arguments.h"
@@ -16,6 +17,7 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
+using bushd::client::detail_of;
 
 constexpr const char* kSpeed = "Not faster than this, in the motor's unit per second";
 constexpr const char* kSteps = "Numbers are steps, not the motors' units";
@@ -35,16 +37,9 @@ int show_plan(const Connection& connection, Move move, bool as_json) {
     move.dry_run = true;
     const auto reply = client.run(move, Client::Until::kResult);
     if (!reply) return failure(client, reply.error());
-    const auto* completed = std::get_if<api::Completed>(&*reply);
-    const auto* plan =
-        completed == nullptr ? nullptr : std::get_if<api::MovePlan>(&completed->detail);
+    const auto* plan = detail_of<api::MovePlan>(reply);
     if (plan == nullptr) return refused(*reply);
-    if (as_json) {
-      fmt::print("{}\n", json(*plan));
-    } else {
-      for (const std::string& line : lines(*plan)) fmt::print("{}\n", line);
-    }
-    return static_cast<int>(kDone);
+    return print(*plan, as_json);
   });
 }
 

@@ -11,6 +11,7 @@
 
 #include "base/fields_json.h"
 #include "base/json_text.h"
+#include "client/answer.h"
 #include "commands.h"
 #include "program_file.h"
 #include "program_text.h"
@@ -21,15 +22,11 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
+using bushd::client::detail_of;
 using bushd::client::Status;
 
 constexpr const char* kGroup = "program";
 constexpr std::chrono::milliseconds kStatusWithin{4000};
-
-const api::ProgramList* programs_of(const api::Reply& reply) {
-  const auto* completed = std::get_if<api::Completed>(&reply);
-  return completed == nullptr ? nullptr : std::get_if<api::ProgramList>(&completed->detail);
-}
 
 // A list that was asked for on a connection of its own, while the first one waits for an upload.
 class Upload {
@@ -44,7 +41,7 @@ class Upload {
   void show() {
     if (!client_) return;
     const auto reply = client_->run(api::ListPrograms{}, Client::Until::kResult);
-    const api::ProgramList* list = reply ? programs_of(*reply) : nullptr;
+    const auto* list = detail_of<api::ProgramList>(reply);
     const std::string text = list == nullptr ? std::string() : upload_text(*list, program_);
     if (text.empty()) return;
     fmt::print(stderr, "\r{:.{}}\x1b[K", text, columns_of_terminal(STDERR_FILENO));
@@ -101,7 +98,7 @@ int put(const Connection& connection, const PutOptions& options) {
     const auto reply = client.run(*request, Client::Until::kResult, meanwhile);
     upload.clear();
     if (!reply) return failure(client, reply.error());
-    const api::ProgramList* list = programs_of(*reply);
+    const auto* list = detail_of<api::ProgramList>(reply);
     const auto* completed = std::get_if<api::Completed>(&*reply);
     const bool done = completed != nullptr && completed->outcome == api::Outcome::kDone;
     if (list == nullptr || list->programs.empty() || !done) return refused(*reply);
@@ -112,7 +109,7 @@ int put(const Connection& connection, const PutOptions& options) {
 int list_programs(Client& client, bool as_json) {
   const auto reply = client.run(api::ListPrograms{}, Client::Until::kResult);
   if (!reply) return failure(client, reply.error());
-  const api::ProgramList* list = programs_of(*reply);
+  const auto* list = detail_of<api::ProgramList>(reply);
   if (list == nullptr) return refused(*reply);
   if (as_json) {
     fmt::print("{}\n", bushd::json_text(bushd::json_of(*list)));
@@ -139,7 +136,7 @@ int run_programs(Client& client, const std::vector<std::string>& programs, bool 
   if (wait) {
     const auto reply = client.run(api::ListPrograms{}, Client::Until::kResult);
     if (!reply) return failure(client, reply.error());
-    if (const api::ProgramList* list = programs_of(*reply)) {
+    if (const auto* list = detail_of<api::ProgramList>(reply)) {
       sending.motors = motors_of(*list, programs);
     }
   }

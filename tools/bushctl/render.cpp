@@ -10,6 +10,7 @@
 #include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
+#include "client/answer.h"
 #include "grid.h"
 #include "motor_cells.h"
 
@@ -194,10 +195,7 @@ std::vector<std::string> lines(const api::Reply& reply) {
 std::vector<std::string> rounding_lines(const api::Request& request, const api::Reply& reply) {
   const auto* move = std::get_if<api::Move>(&request);
   const auto* line = std::get_if<api::MoveLine>(&request);
-  const auto* completed = std::get_if<api::Completed>(&reply);
-  const auto* results = completed == nullptr
-                            ? nullptr
-                            : std::get_if<std::vector<api::MotorResult>>(&completed->detail);
+  const auto* results = bushd::client::detail_of<std::vector<api::MotorResult>>(reply);
   std::vector<std::string> out;
   if ((move == nullptr && line == nullptr) || results == nullptr) return out;
   if ((move != nullptr ? move->kind : line->kind) != api::Move::Kind::kAbsolute) return out;

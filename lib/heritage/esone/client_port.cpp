@@ -3,6 +3,7 @@
 #include <thread>
 #include <variant>
 
+#include "client/answer.h"
 #include "client/client.h"
 #include "heritage/esone/port.h"
 
@@ -26,9 +27,7 @@ class ClientPort final : public Port {
     if (const auto* refused = std::get_if<api::Refused>(&*reply)) {
       return no(kNoCrate, refused->reason);
     }
-    const auto* completed = std::get_if<api::Completed>(&*reply);
-    const auto* result =
-        completed == nullptr ? nullptr : std::get_if<api::CamacResult>(&completed->detail);
+    const auto* result = client::detail_of<api::CamacResult>(reply);
     if (result == nullptr) return no(kTransport, "the daemon's answer is none of a crate");
     return *result;
   }

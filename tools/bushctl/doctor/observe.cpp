@@ -15,6 +15,7 @@
 
 #include "../adapters.h"
 #include "../commands.h"
+#include "client/answer.h"
 #include "config/config.h"
 #include "control/path.h"
 #include "observe_files.h"
@@ -27,6 +28,7 @@ namespace {
 namespace api = bushd::api;
 namespace fs = std::filesystem;
 using bushd::client::Client;
+using bushd::client::detail_of;
 
 constexpr const char* kServiceUser = "bushd";
 constexpr const char* kSystemFolder = "/etc/bushd/";
@@ -142,9 +144,7 @@ std::vector<std::string> socket_paths(const bushd::client::ClientOptions& option
 // What it has read, and as what.
 void ask_for_configuration(Client& client, DaemonSeen& seen) {
   const auto reply = client.run(api::Configure{}, Client::Until::kResult);
-  const auto* completed = reply ? std::get_if<api::Completed>(&*reply) : nullptr;
-  const auto* configuration =
-      completed == nullptr ? nullptr : std::get_if<api::Configuration>(&completed->detail);
+  const auto* configuration = detail_of<api::Configuration>(reply);
   if (configuration == nullptr) return;
   seen.config_path = configuration->path;
   seen.config_sha256 = configuration->sha256;
