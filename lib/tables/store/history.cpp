@@ -118,11 +118,12 @@ void History::roll_back() {
   (void)run("ROLLBACK");
 }
 
-Result<void> History::add(const std::string& table, const Revision& revision,
-                          const std::string& text) {
-  Statement insert(database_.get(),
-                   "INSERT INTO revision (name, number, time, note, content_hash, text)"
-                   " VALUES (?, ?, strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?, ?, ?)");
+Result<void> History::insert(const std::string& into, const std::string& table,
+                             const Revision& revision, const std::string& text) {
+  const std::string sql = into +
+                          " (name, number, time, note, content_hash, text)"
+                          " VALUES (?, ?, strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?, ?, ?)";
+  Statement insert(database_.get(), sql.c_str());
   insert.bind(table)
       .bind(revision.number)
       .bind(revision.note)
@@ -130,6 +131,11 @@ Result<void> History::add(const std::string& table, const Revision& revision,
       .bind(text);
   if (insert.step() != SQLITE_DONE) return failed();
   return {};
+}
+
+Result<void> History::add(const std::string& table, const Revision& revision,
+                          const std::string& text) {
+  return insert("INSERT INTO revision", table, revision, text);
 }
 
 Result<std::uint32_t> History::last(const std::string& table) const {
@@ -175,16 +181,7 @@ Result<std::vector<Revision>> History::log(const std::string& table) const {
 
 Result<void> History::announce(const std::string& table, const Revision& revision,
                                const std::string& text) {
-  Statement insert(database_.get(),
-                   "INSERT OR REPLACE INTO pending (name, number, time, note, content_hash, text)"
-                   " VALUES (?, ?, strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?, ?, ?)");
-  insert.bind(table)
-      .bind(revision.number)
-      .bind(revision.note)
-      .bind(revision.content_hash)
-      .bind(text);
-  if (insert.step() != SQLITE_DONE) return failed();
-  return {};
+  return insert("INSERT OR REPLACE INTO pending", table, revision, text);
 }
 
 Result<std::optional<History::Pending>> History::announced(const std::string& table) const {

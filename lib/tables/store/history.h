@@ -65,6 +65,8 @@ class History {
   explicit History(std::unique_ptr<sqlite3, Close> database, std::string path)
       : database_(std::move(database)), path_(std::move(path)) {}
   Result<void> run(const char* sql);
+  Result<void> insert(const std::string& into, const std::string& table, const Revision& revision,
+                      const std::string& text);
   tl::unexpected<Error> failed() const;
 
   std::unique_ptr<sqlite3, Close> database_;
