@@ -14,17 +14,14 @@ constexpr Numbers kUser = Numbers::kUser;
 constexpr Numbers kSteps = Numbers::kSteps;
 
 TEST(MoveArguments, PairsAreRelative) {
-  const auto move = parse_move({"theta", "-400", "chi", "+20"}, kUser);
-  ASSERT_TRUE(move);
-  EXPECT_EQ(move->kind, api::Move::Kind::kRelative);
-  EXPECT_EQ(move->motors, (Motors{{"theta", User{-400}}, {"chi", User{20}}}));
+  EXPECT_TRUE(parse_move({"theta", "-400", "chi", "+20"}, kUser) ==
+              (api::Move{.motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
 }
 
 TEST(MoveArguments, ToIsAbsolute) {
-  const auto move = parse_move({"theta", "--to", "-400", "chi", "--to=20"}, kUser);
-  ASSERT_TRUE(move);
-  EXPECT_EQ(move->kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(move->motors, (Motors{{"theta", User{-400}}, {"chi", User{20}}}));
+  EXPECT_TRUE(parse_move({"theta", "--to", "-400", "chi", "--to=20"}, kUser) ==
+              (api::Move{.kind = api::Move::Kind::kAbsolute,
+                         .motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
 }
 
 TEST(MoveArguments, AMixtureIsRefusedAndSaysWhichMotor) {
@@ -43,21 +40,18 @@ TEST(MoveArguments, InUnitsOrInSteps) {
 }
 
 TEST(MoveArguments, AlongALineAreThoseOfAMove) {
-  const auto line = parse_move_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, {});
-  ASSERT_TRUE(line) << line.error().message;
-  EXPECT_EQ(line->kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(line->motors, (Motors{{"a", User{10}}, {"b", User{-3.5}}}));
-  EXPECT_FALSE(line->duration_s);
+  EXPECT_TRUE(parse_move_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, {}) ==
+              (api::MoveLine{.kind = api::Move::Kind::kAbsolute,
+                             .motors = {{"a", User{10}}, {"b", User{-3.5}}}}));
   EXPECT_EQ(parse_move_line({"a", "4"}, kUser, {.duration = "12.5"})->duration_s, 12.5);
   for (const char* wrong : {"0", "-1", "soon", "inf"}) {
     EXPECT_FALSE(parse_move_line({"a", "4"}, kUser, {.duration = wrong})) << wrong;
   }
   EXPECT_FALSE(parse_move_line({}, kUser, {}));
-  EXPECT_EQ(line->law, api::MoveLine::Law::kLeading);
-  EXPECT_FALSE(line->feed);
-  const auto elementary = parse_move_line({"a", "4"}, kSteps, {.law = "elementary", .feed = "2.5"});
-  EXPECT_EQ(elementary->law, api::MoveLine::Law::kElementary);
-  EXPECT_EQ(elementary->feed, (api::Speed{.per_s = 2.5, .in_steps = true}));
+  EXPECT_TRUE(parse_move_line({"a", "4"}, kSteps, {.law = "elementary", .feed = "2.5"}) ==
+              (api::MoveLine{.motors = {{"a", 4}},
+                             .law = api::MoveLine::Law::kElementary,
+                             .feed = api::Speed{.per_s = 2.5, .in_steps = true}}));
   EXPECT_EQ(parse_move_line({"a", "4"}, kUser, {.feed = "0"}).error().message,
             "--feed: \"0\" is not a number above 0");
 }
@@ -82,11 +76,10 @@ TEST(MoveArguments, WhatIsMissingIsNamed) {
 }
 
 TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
-  const auto arm = parse_arm({"theta", "-400", "chi", "20"}, kUser, "falling", 1500);
-  ASSERT_TRUE(arm);
-  EXPECT_EQ(arm->motors, (Motors{{"theta", User{-400}}, {"chi", User{20}}}));
-  EXPECT_EQ(arm->edge, api::Edge::kFalling);
-  EXPECT_EQ(arm->delay_us, 1500);
+  EXPECT_TRUE(parse_arm({"theta", "-400", "chi", "20"}, kUser, "falling", 1500) ==
+              (api::Arm{.edge = api::Edge::kFalling,
+                        .delay_us = 1500,
+                        .motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
   EXPECT_EQ(parse_arm({"theta", "1"}, kUser, "rising", 50)->edge, api::Edge::kRising);
   EXPECT_THAT(parse_arm({"theta", "--to", "5"}, kUser, "rising", 50).error().text(),
               HasSubstr("by a distance"));
@@ -94,28 +87,25 @@ TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
 }
 
 TEST(ArmArguments, OfALineAreThoseOfALineAndATrigger) {
-  const auto line =
-      parse_arm_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, "falling", 1500, "2.5");
-  ASSERT_TRUE(line) << line.error().message;
-  EXPECT_EQ(line->kind, api::Move::Kind::kAbsolute);
-  EXPECT_EQ(line->motors, (Motors{{"a", User{10}}, {"b", User{-3.5}}}));
-  EXPECT_EQ(line->edge, api::Edge::kFalling);
-  EXPECT_EQ(line->delay_us, 1500);
-  EXPECT_EQ(line->duration_s, 2.5);
+  EXPECT_TRUE(parse_arm_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, "falling", 1500,
+                             "2.5") == (api::ArmLine{.edge = api::Edge::kFalling,
+                                                     .delay_us = 1500,
+                                                     .kind = api::Move::Kind::kAbsolute,
+                                                     .motors = {{"a", User{10}}, {"b", User{-3.5}}},
+                                                     .duration_s = 2.5}));
   EXPECT_EQ(parse_arm_line({"a", "4"}, kUser, "rising", 50, "")->kind, api::Move::Kind::kRelative);
   EXPECT_FALSE(parse_arm_line({"a", "4"}, kUser, "rising", 50, "0"));
   EXPECT_FALSE(parse_arm_line({"a"}, kUser, "rising", 50, ""));
 }
 
 TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
-  const auto compare = parse_position_compare(
-      "theta", "-7", kUser, {.direction = "negative", .delay_us = 30, .width_us = 4});
-  ASSERT_TRUE(compare);
-  EXPECT_EQ(compare->motor, "theta");
-  EXPECT_EQ(compare->position, api::Amount(User{-7}));
-  EXPECT_EQ(compare->arrivals, api::Directions{.negative = true});
-  EXPECT_EQ(compare->delay_us, 30);
-  EXPECT_EQ(compare->width_us, 4);
+  EXPECT_TRUE(parse_position_compare("theta", "-7", kUser,
+                                     {.direction = "negative", .delay_us = 30, .width_us = 4}) ==
+              (api::PositionCompare{.motor = "theta",
+                                    .position = User{-7},
+                                    .arrivals = {.negative = true},
+                                    .delay_us = 30,
+                                    .width_us = 4}));
   EXPECT_EQ(parse_position_compare("theta", "5", kUser, {})->arrivals,
             (api::Directions{.positive = true, .negative = true}));
   EXPECT_EQ(parse_position_compare("theta", "5", kUser, {.direction = "positive"})->arrivals,
@@ -125,14 +115,10 @@ TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
 }
 
 TEST(SetArguments, NameOneMotorAndItsPosition) {
-  const auto set = parse_set("theta", "-7", kSteps, false);
-  ASSERT_TRUE(set);
-  EXPECT_EQ(set->motors, (Motors{{"theta", -7}}));
-  EXPECT_FALSE(set->dial);
-  const auto dial = parse_set("theta", "-7.5", kUser, true);
-  ASSERT_TRUE(dial);
-  EXPECT_EQ(dial->motors, (Motors{{"theta", User{-7.5}}}));
-  EXPECT_TRUE(dial->dial);
+  EXPECT_TRUE(parse_set("theta", "-7", kSteps, false) ==
+              (api::SetPosition{.motors = {{"theta", -7}}}));
+  EXPECT_TRUE(parse_set("theta", "-7.5", kUser, true) ==
+              (api::SetPosition{.motors = {{"theta", User{-7.5}}}, .dial = true}));
 }
 
 }  // namespace
