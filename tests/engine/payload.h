@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/frame.h"
+#include "engine/message_motion.h"
 
 namespace bushd::test {
 
@@ -21,6 +22,14 @@ template <class Message>
 std::vector<std::uint8_t> payload_of(const Message& message,
                                      std::size_t (*encode)(const Message*, std::uint8_t*)) {
   return payload_of([&](std::uint8_t* payload) { return encode(&message, payload); });
+}
+
+// TABLE_RUN of one motor.
+inline std::vector<std::uint8_t> table_run_payload(std::uint8_t epoch, std::uint32_t first_tick,
+                                                   const bushd_table_run_entry& entry) {
+  return payload_of([&](std::uint8_t* payload) {
+    return bushd_encode_table_run(epoch, first_tick, &entry, 1, payload);
+  });
 }
 
 }  // namespace bushd::test

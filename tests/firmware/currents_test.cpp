@@ -40,9 +40,7 @@ TEST_P(Currents, ATableRunHasThemInTheTicksOfItsSpeeds) {
   rig.pass(BUSHD_CURRENT_TICKS + 3);
   const std::uint32_t first = rig.first_open() + 3;
   const bushd_table_run_entry entry{0, 0, 1, 3000, 0};
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
-  ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, payload), BUSHD_OK);
+  ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, table_run_payload(0, first, entry)), BUSHD_OK);
   std::map<std::uint16_t, std::uint32_t> since;  // tick that was prepared when it was told
   std::size_t seen = rig.windings().size();
   for (int i = 0; i < 30'000 && since.size() < 4; ++i) {

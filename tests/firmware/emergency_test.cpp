@@ -29,10 +29,8 @@ class Emergency : public Streams {
     EXPECT_EQ(seen, expected);
   }
   static Bytes run_frame(std::uint32_t first, std::uint32_t steps, std::int8_t direction) {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
     const bushd_table_run_entry entry = {0, 0, direction, steps, 0};
-    payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
-    return payload;
+    return table_run_payload(0, first, entry);
   }
   // The delay of the step that runs at the end of the first `ticks` of a plan, as the MCU takes it:
   // from the last displacement, or in the coarse format from the steps of the two ticks before and

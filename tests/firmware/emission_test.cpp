@@ -237,9 +237,8 @@ TEST(Emission, TableRunsMakeTheSameStepsInEachTickInEveryMode) {
     expect_same_steps(format, [&](Rig& rig) {
       const bushd_table_run_entry entry = {
           .motor = 0, .bank = 0, .direction = -1, .steps = 90, .shortest_delay = 0};
-      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-      payload.resize(bushd_encode_table_run(0, rig.first_open(), &entry, 1, payload.data()));
-      ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, payload), BUSHD_OK);
+      ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, table_run_payload(0, rig.first_open(), entry)),
+                BUSHD_OK);
       rig.pass_until_rest();
     });
   }

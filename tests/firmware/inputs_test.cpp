@@ -13,10 +13,8 @@ constexpr bushd_inputs kNothing{0, 0};
 constexpr bushd_inputs kSwitch{1, 0};  // of motor 0
 
 Bytes table_run(std::uint32_t first, std::uint32_t steps, std::int8_t direction) {
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   const bushd_table_run_entry entry = {0, 0, direction, steps, 0};
-  payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
-  return payload;
+  return table_run_payload(0, first, entry);
 }
 
 class Inputs : public Streams {

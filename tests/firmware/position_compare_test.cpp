@@ -46,9 +46,7 @@ class PositionCompare : public Streams {
   bushd_status run(std::int32_t steps) {
     const bushd_table_run_entry entry = {0, 0, static_cast<std::int8_t>(steps < 0 ? -1 : 1),
                                          static_cast<std::uint32_t>(std::abs(steps)), 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_table_run(0, rig.first_open(), &entry, 1, payload.data()));
-    return rig.take(BUSHD_MSG_TABLE_RUN, payload);
+    return rig.take(BUSHD_MSG_TABLE_RUN, table_run_payload(0, rig.first_open(), entry));
   }
 
   std::vector<Pulse> pulses_;

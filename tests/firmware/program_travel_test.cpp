@@ -173,9 +173,7 @@ TEST_P(ProgramTravel, AnotherMotorsTravelIsNotBegunByARefusedOne) {
                                 .steps = 50,
                                 .delay_us = 100'000,
                                 .wait_us = 200'000};
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_travel(&message, payload.data()));
-  ASSERT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload), BUSHD_OK);
+  ASSERT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload_of(message, bushd_encode_travel)), BUSHD_OK);
   rig.trigger(0);
   ASSERT_EQ(rig.mcu().travel.stage, BUSHD_TRAVEL_DELAY);
   ASSERT_EQ(load(alone({travel(), kProgramEnd})), BUSHD_OK);

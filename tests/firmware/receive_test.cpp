@@ -17,8 +17,7 @@ Bytes wire_of(std::uint8_t address, std::uint8_t type, const Bytes& payload = {}
 // To all, so that nobody answers.
 Bytes set_position_wire(std::int32_t steps, std::uint8_t sequence) {
   const bushd_set_position message = {0, steps};
-  Bytes payload(8);
-  payload.resize(bushd_encode_set_position(&message, payload.data()));
+  const Bytes payload = payload_of(message, bushd_encode_set_position);
   return wire_of(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_POSITION, payload, sequence);
 }
 

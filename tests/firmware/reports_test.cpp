@@ -92,9 +92,8 @@ class Reports : public Streams {
   void run(std::uint8_t motor) {
     const bushd_table_run_entry entry = {motor, 0, static_cast<std::int8_t>(below(2) == 0 ? 1 : -1),
                                          1 + below(60), 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_table_run(rig.mcu().stream.epoch, rig.first_open() + below(9),
-                                          &entry, 1, payload.data()));
+    const Bytes payload =
+        table_run_payload(rig.mcu().stream.epoch, rig.first_open() + below(9), entry);
     rig.frame(BUSHD_MSG_TABLE_RUN, payload);
   }
   void limits_at_own_inputs() {

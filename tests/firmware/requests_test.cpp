@@ -16,9 +16,7 @@ Bytes poll_of(const std::vector<bushd_poll_entry>& entries) {
 
 Bytes identify_of(std::uint16_t salt, std::uint8_t windows, std::uint16_t units) {
   const bushd_identify message = {salt, windows, units};
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_identify(&message, payload.data()));
-  return payload;
+  return payload_of(message, bushd_encode_identify);
 }
 
 Bytes address_of(std::array<std::uint8_t, BUSHD_UNIQUE_ID_SIZE> id, std::uint8_t address) {

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <utility>
 
-#include "engine/payload.h"
 #include "sim/disabled_capabilities.h"
 
 namespace bushd::test {

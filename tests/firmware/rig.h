@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/payload.h"
 #include "engine/reference.h"
 #include "firmware/core/nvm.h"
 

@@ -38,9 +38,7 @@ class Travel : public Streams {
     ASSERT_EQ(rig.motor_inputs({kTraveller, 1, 2, 1}), BUSHD_OK);
   }
   bushd_status request(const bushd_travel& message) {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_travel(&message, payload.data()));
-    return rig.request(BUSHD_MSG_TRAVEL, payload);
+    return rig.request(BUSHD_MSG_TRAVEL, payload_of(message, bushd_encode_travel));
   }
   // From the left limit, with a delay of 20 ms before the return.
   bushd_travel once(std::uint32_t steps = kWay) {
@@ -378,10 +376,9 @@ TEST(TravelOfASmallMcu, IsUnknown) {
   Rig rig({.disabled_capabilities = BUSHD_CAN_TRAVEL});
   rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_TRAVEL, 0);
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
   const bushd_travel message = {1, BUSHD_TRAVEL_STEP, 0, 1, BUSHD_EDGE_NONE, 0, 1, 0, 50};
-  payload.resize(bushd_encode_travel(&message, payload.data()));
-  EXPECT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload), BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload_of(message, bushd_encode_travel)),
+            BUSHD_E_UNKNOWN_MESSAGE);
 }
 
 TEST_P(Travel, IsRefusedWhereItsStepsAreNotCounted) {

@@ -37,9 +37,7 @@ class Trigger : public Streams {
   }
   static Bytes run_frame(std::uint32_t first, std::uint8_t motor) {
     const bushd_table_run_entry entry = {motor, 0, 1, 5, 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_table_run(0, first, &entry, 1, payload.data()));
-    return payload;
+    return table_run_payload(0, first, entry);
   }
 };
 INSTANTIATE_TEST_SUITE_P(Formats, Trigger, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
