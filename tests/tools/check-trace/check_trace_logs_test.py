@@ -8,60 +8,51 @@ import sys
 import unittest
 
 import synthetic
-from trace_case import TABLE, TOP, CheckTraceTest, event
+from trace_case import TABLE, TOP, OneThingWrong, event
 
 
-class WrongLogs(CheckTraceTest):
+class WrongLogs(OneThingWrong):
     def test_a_result_that_the_table_denies(self):
-        scene = self.scene()
-        scene.events[-1]["position_steps"] += 1
-        self.assert_problem(scene, "theta", "ended at 101 steps, by the table it ends at 100")
+        self.usual.events[-1]["position_steps"] += 1
+        self.assert_problem(self.usual, "theta", "ended at 101 steps, by the table it ends at 100")
 
     def test_a_move_without_a_result(self):
-        scene = self.scene()
-        scene.events.pop()
-        self.assert_problem(scene, "theta", "move 4 has no result")
+        self.usual.events.pop()
+        self.assert_problem(self.usual, "theta", "move 4 has no result")
 
     def test_a_move_with_two_results(self):
-        scene = self.scene()
-        scene.events.append(scene.events[-1])
-        self.assert_problem(scene, "theta", "more than one result")
+        self.usual.events.append(self.usual.events[-1])
+        self.assert_problem(self.usual, "theta", "more than one result")
 
     def test_a_move_that_a_fault_ended(self):
-        scene = self.scene()
-        scene.events[-1]["result"] = "link"
-        self.assert_problem(scene, "theta", "ended as 'link'")
+        self.usual.events[-1]["result"] = "link"
+        self.assert_problem(self.usual, "theta", "ended as 'link'")
 
     def test_a_stopped_move_that_is_called_reached(self):
-        scene = self.scene()
-        event(scene, event="result", motor="omega")["result"] = "reached"
-        self.assert_problem(scene, "omega", "yet its result is 'reached'")
+        event(self.usual, event="result", motor="omega")["result"] = "reached"
+        self.assert_problem(self.usual, "omega", "yet its result is 'reached'")
 
     def test_another_target_than_the_motor_was_given(self):
-        scene = self.scene()
-        scene.move("chi", 2, 0, 400, 300, move_id=7)
-        scene.change("chi", "retarget", 430, 200)
-        scene.events[-2]["target_steps"] += 1
-        self.assert_problem(scene, "chi", "ended at 201 steps, by the table it ends at 202")
+        self.usual.move("chi", 2, 0, 400, 300, move_id=7)
+        self.usual.change("chi", "retarget", 430, 200)
+        self.usual.events[-2]["target_steps"] += 1
+        self.assert_problem(self.usual, "chi", "ended at 201 steps, by the table it ends at 202")
 
     def test_a_position_lost_between_two_moves(self):
-        scene = self.scene()
-        event(scene, event="move", id=4)["from_steps"] += 2
-        self.assert_problem(scene, "theta", "starts from 302 steps")
+        event(self.usual, event="move", id=4)["from_steps"] += 2
+        self.assert_problem(self.usual, "theta", "starts from 302 steps")
 
     def test_a_position_that_was_set_between_two_moves(self):
-        scene = self.scene()
-        move = event(scene, event="move", id=4)
+        move = event(self.usual, event="move", id=4)
         move["from_steps"] -= 1000
-        event(scene, event="result", id=4)["position_steps"] -= 1000
-        self.assert_problem(scene, "theta", "starts from -700 steps")
-        scene.events.insert(scene.events.index(move), {"event": "set", "motor": "theta", "position_steps": move["from_steps"]})
-        self.assert_right(scene)
+        event(self.usual, event="result", id=4)["position_steps"] -= 1000
+        self.assert_problem(self.usual, "theta", "starts from -700 steps")
+        self.usual.events.insert(self.usual.events.index(move), {"event": "set", "motor": "theta", "position_steps": move["from_steps"]})
+        self.assert_right(self.usual)
 
     def test_a_move_that_starts_before_the_one_before_has_ended(self):
-        scene = self.scene()
-        event(scene, event="move", id=4)["start_tick"] = 150
-        self.assert_problem(scene, "theta", "starts in tick 150")
+        event(self.usual, event="move", id=4)["start_tick"] = 150
+        self.assert_problem(self.usual, "theta", "starts in tick 150")
 
     def test_input_that_cannot_be_read_is_named(self):
         self.write(self.scene())
@@ -84,21 +75,19 @@ class WrongLogs(CheckTraceTest):
                 self.assertRegex(said, rf"^check-trace: .*{re.escape(name)}")
 
     def test_a_table_that_is_missing_is_named(self):
-        scene = self.scene()
         pathlib.Path(self.table_file).unlink()
-        self.assertIn("test.toml", self.assert_unusable(self.check(scene)))
+        self.assertIn("test.toml", self.assert_unusable(self.check(self.usual)))
 
     def test_a_table_that_has_changed_since_is_found_in_its_history(self):
-        scene = self.scene()
         before = pathlib.Path(self.table_file).read_text(encoding="utf-8")
         self.write_table({"time_unit_ns": 40_000, "accel": [200, 100]})
         with sqlite3.connect(self.directory / ".history.sqlite") as history:
             history.execute("CREATE TABLE revision (name TEXT, number INTEGER, text TEXT)")
             history.execute("INSERT INTO revision VALUES ('other', 9, 'no table')")
-        self.assertIn(synthetic.sha256_of(TABLE), self.assert_unusable(self.check(scene)))
+        self.assertIn(synthetic.sha256_of(TABLE), self.assert_unusable(self.check(self.usual)))
         with sqlite3.connect(self.directory / ".history.sqlite") as history:
             history.execute("INSERT INTO revision VALUES ('test', 1, ?)", [before])
-        self.assert_right(scene)
+        self.assert_right(self.usual)
 
 
 class OutputTest(unittest.TestCase):

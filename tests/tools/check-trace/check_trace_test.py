@@ -7,7 +7,7 @@ import unittest
 
 import synthetic
 from synthetic import SLOTS, TICK_NS
-from trace_case import SLOT_NS, TABLE, CheckTraceTest, event
+from trace_case import SLOT_NS, TABLE, CheckTraceTest, OneThingWrong, event
 
 
 def any_table(chance):
@@ -229,7 +229,7 @@ class RightTraces(CheckTraceTest):
         self.assertEqual([row["motor"] for row in report["per_motor"]], ["theta", "phi", "chi", "omega"])
 
 
-class WrongTraces(CheckTraceTest):
+class WrongTraces(OneThingWrong):
     def test_a_missing_edge(self):
         for index in (0, 150, 299, -1):  # first and last of a move, and within one
             with self.subTest(index=index):
@@ -248,37 +248,31 @@ class WrongTraces(CheckTraceTest):
                 self.assert_problem(scene, "lonely", f"step {index + 1} of 120", "is missing")
 
     def test_a_surplus_edge_within_a_move(self):
-        scene = self.scene()
-        scene.edges[2, 3].insert(41, [scene.edges[2, 3][40][0] + 3 * SLOT_NS, 1])
-        self.assertEqual(len(self.assert_problem(scene, "omega", "no move explains")), 1)
+        self.usual.edges[2, 3].insert(41, [self.usual.edges[2, 3][40][0] + 3 * SLOT_NS, 1])
+        self.assertEqual(len(self.assert_problem(self.usual, "omega", "no move explains")), 1)
 
     def test_a_surplus_edge_outside_of_all_moves(self):
-        scene = self.scene()
-        scene.edges[2, 0].append([700 * TICK_NS, 1])
-        self.assert_problem(scene, "chi", "no move explains")
+        self.usual.edges[2, 0].append([700 * TICK_NS, 1])
+        self.assert_problem(self.usual, "chi", "no move explains")
 
     def test_an_edge_of_an_output_without_a_motor(self):
-        scene = self.scene()
-        scene.edges[2, 9] = [[200 * TICK_NS, 1]]
-        self.assert_problem(scene, "output 9 of mcu2", "no move explains")
+        self.usual.edges[2, 9] = [[200 * TICK_NS, 1]]
+        self.assert_problem(self.usual, "output 9 of mcu2", "no move explains")
 
     def test_an_edge_two_ticks_late(self):
-        scene = self.scene()
-        scene.edges[1, 15][-1][0] += 2 * TICK_NS
-        self.assert_problem(scene, "phi", "step 35 of 35", "(+2.00 ticks) from its slot")
+        self.usual.edges[1, 15][-1][0] += 2 * TICK_NS
+        self.assert_problem(self.usual, "phi", "step 35 of 35", "(+2.00 ticks) from its slot")
 
     def test_an_edge_two_ticks_late_among_others(self):
-        scene = self.scene()
-        edges = scene.edges[1, 0]
+        edges = self.usual.edges[1, 0]
         edges[100][0] += 2 * TICK_NS + 2 * SLOT_NS
         edges.sort()
-        self.assert_problem(scene, "theta", "step 101 of 300", "is missing")
-        self.assert_problem(scene, "theta", "no move explains")
+        self.assert_problem(self.usual, "theta", "step 101 of 300", "is missing")
+        self.assert_problem(self.usual, "theta", "no move explains")
 
     def test_an_edge_two_slots_late(self):
-        scene = self.scene()
-        scene.edges[2, 3][20][0] += 2 * SLOT_NS
-        self.assert_problem(scene, "omega", "step 21 of", "+20.0 us")
+        self.usual.edges[2, 3][20][0] += 2 * SLOT_NS
+        self.assert_problem(self.usual, "omega", "step 21 of", "+20.0 us")
 
     def test_table_runs_and_streams_are_told_apart(self):
         for moves, said in (("table", "stream"), ("stream", "table")):
@@ -303,60 +297,51 @@ class WrongTraces(CheckTraceTest):
                 self.assert_problem(scene, "theta", f"step {at + 1} of 1500", "in tick")
 
     def test_the_wrong_direction(self):
-        scene = self.scene()
-        for edge in scene.edges[1, 15]:
+        for edge in self.usual.edges[1, 15]:
             edge[1] = 1
-        self.assert_problem(scene, "phi", "step 1 of 35", "DIR 1")
+        self.assert_problem(self.usual, "phi", "step 1 of 35", "DIR 1")
 
     def test_a_direction_that_changes_together_with_the_pulse(self):
-        scene = self.scene()
-        changes = scene.changes()
+        changes = self.usual.changes()
         first = next(time for time, _, address, wire, _ in changes if (address, wire) == (2, "step0"))
-        scene.raw = sorted((first, *c[1:]) if c[2:4] == (2, "dir0") else c for c in changes)
-        self.assert_problem(scene, "chi", "DIR changed only 0 ns before")
+        self.usual.raw = sorted((first, *c[1:]) if c[2:4] == (2, "dir0") else c for c in changes)
+        self.assert_problem(self.usual, "chi", "DIR changed only 0 ns before")
 
     def test_en_low_at_an_edge(self):
-        scene = self.scene()
-        at = scene.edges[2, 3][30][0]
-        scene.en_low_ns[2] = [(at - 1000, at + 1000)]
-        self.assertEqual(len(self.assert_problem(scene, "omega", "EN is low", "step 31")), 1)
+        at = self.usual.edges[2, 3][30][0]
+        self.usual.en_low_ns[2] = [(at - 1000, at + 1000)]
+        self.assertEqual(len(self.assert_problem(self.usual, "omega", "EN is low", "step 31")), 1)
 
     def test_time_that_goes_back(self):
-        scene = self.scene()
-        changes = scene.changes()
+        changes = self.usual.changes()
         at = next(i for i, c in enumerate(changes) if c[2:] == (2, "step3", 1))
         changes[at], changes[at + 60] = changes[at + 60], changes[at]
-        scene.raw = changes
-        self.assert_problem(scene, "omega", "after a later change")
+        self.usual.raw = changes
+        self.assert_problem(self.usual, "omega", "after a later change")
 
     def test_two_motors_swapped(self):
-        scene = self.scene()
-        scene.edges[1, 0], scene.edges[1, 15] = scene.edges[1, 15], scene.edges[1, 0]
-        self.assert_problem(scene, "theta")
-        self.assert_problem(scene, "phi")
+        self.usual.edges[1, 0], self.usual.edges[1, 15] = self.usual.edges[1, 15], self.usual.edges[1, 0]
+        self.assert_problem(self.usual, "theta")
+        self.assert_problem(self.usual, "phi")
 
     def test_mcus_30_us_apart(self):
-        scene = self.scene()
-        scene.offsets_ns[2] += 30_000
-        lines = self.assert_problem(scene, "hall:2", "chi, omega", "+30.0 us")
+        self.usual.offsets_ns[2] += 30_000
+        lines = self.assert_problem(self.usual, "hall:2", "chi, omega", "+30.0 us")
         self.assertEqual(len(lines), 1, lines)
 
     def test_mcus_19_us_apart_are_allowed(self):
-        scene = self.scene()
-        scene.offsets_ns[2] += 19_000
-        self.assert_right(scene)
+        self.usual.offsets_ns[2] += 19_000
+        self.assert_right(self.usual)
 
     def test_a_clock_worse_than_a_crystal(self):
-        scene = self.scene()
-        scene.rates = {1: 3000}
-        self.assertEqual(self.check(scene).returncode, 1)
+        self.usual.rates = {1: 3000}
+        self.assertEqual(self.check(self.usual).returncode, 1)
 
     def test_no_edges_at_all(self):
-        scene = self.scene()
-        for edges in scene.edges.values():
+        for edges in self.usual.edges.values():
             edges.clear()
         for motor in ("theta", "phi", "chi", "omega"):
-            self.assert_problem(scene, motor, "is missing")
+            self.assert_problem(self.usual, motor, "is missing")
 
 
 if __name__ == "__main__":

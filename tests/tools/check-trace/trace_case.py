@@ -79,3 +79,11 @@ class CheckTraceTest(unittest.TestCase):
         self.assertTrue(any(all(part in line for part in parts) for line in lines), result.stdout)
         self.assertNotIn("Traceback", result.stderr)
         return lines
+
+
+class OneThingWrong(CheckTraceTest):
+    """The usual trace and its log, of which each test changes one thing."""
+
+    def setUp(self):
+        super().setUp()
+        self.usual = self.scene()
