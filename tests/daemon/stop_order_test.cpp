@@ -89,6 +89,7 @@ struct Desk : Lab {
 
   // Everything moves again, and the disk knows that all rests.
   void settle() {
+    disk_us = 500;
     wait(send(api::Release{}));
     wait(send(Ask::kStop, {}));
     wait(send(Ask::kClearFaults, {}));
@@ -179,10 +180,11 @@ auto is_stopped_by(std::int64_t command) {
 
 class StopOrder : public testing::Test {
  protected:
+  using Put = std::function<void(const std::vector<api::Request>&)>;
   // `put` brings requests to where they wait, the first ones of these; the others come after the
   // stop. So many of them have their results before it.
   void check(Desk& desk, const Kind& kind, const api::Request& stop, std::size_t with_result,
-             const std::function<void(const std::vector<api::Request>&)>& put) {
+             const Put& put) {
     SCOPED_TRACE(std::string(kind.name) + ", " + std::string(api::name_of(stop)));
     const std::vector<api::Request> requests = kind.requests(++round_);
     const std::int64_t first = desk.number + 1;
@@ -206,19 +208,24 @@ class StopOrder : public testing::Test {
                 AnyOf(HasSubstr("done: "), HasSubstr("fault: ")));
   }
 
+  // The same of each of these kinds and each stop. `all_but_last`: these have their results.
+  void check_each(Desk& desk, const std::vector<Kind>& kinds, bool all_but_last, const Put& put) {
+    for (const Kind& kind : kinds) {
+      for (const api::Request& stop : kStops) {
+        desk.settle();
+        check(desk, kind, stop, all_but_last ? kind.requests(0).size() - 1 : 0, put);
+      }
+    }
+  }
+
   std::int64_t round_ = 0;
 };
 
 TEST_F(StopOrder, OfWhatHasBeenReceivedAndNotTaken) {
   Desk desk;
-  for (const Kind& kind : kKinds) {
-    for (const api::Request& stop : kStops) {
-      check(desk, kind, stop, 1, [&](const auto& requests) {
-        for (const api::Request& request : requests) desk.take(request);
-      });
-      desk.settle();
-    }
-  }
+  check_each(desk, kKinds, false, [&](const auto& requests) {
+    for (const api::Request& request : requests) desk.take(request);
+  });
 }
 
 // The first part is taken; the others are received before the stop, or come after it.
@@ -242,78 +249,50 @@ TEST_F(StopOrder, OfWhatComesInParts) {
 TEST_F(StopOrder, OfWhatWaitsForTheDisk) {
   Desk desk(toml_with_homes(), true);
   desk.connect();
-  for (const Kind& kind : kKinds) {
-    for (const api::Request& stop : kStops) {
-      desk.disk_us = 500;
-      desk.settle();
-      check(desk, kind, stop, kind.requests(0).size() - 1, [&](const auto& requests) {
-        for (const api::Request& request : requests) {
-          desk.disk_us = 200'000;
-          desk.begin(request);
-        }
-      });
-    }
-  }
+  check_each(desk, kKinds, true, [&](const auto& requests) {
+    desk.disk_us = 200'000;
+    for (const api::Request& request : requests) desk.begin(request);
+  });
 }
 
 TEST_F(StopOrder, OfWhatWaitsForDrivers) {
   Desk desk(toml_with_homes("idle_disable_s = 0.5\nenable_settle_ms = 250\n"));
   desk.connect();
-  for (const Kind& kind : kKinds) {
-    for (const api::Request& stop : kStops) {
-      desk.settle();
-      check(desk, kind, stop, kind.requests(0).size() - 1, [&](const auto& requests) {
-        for (const api::Request& request : requests) desk.begin(request);
-      });
-    }
-  }
+  check_each(desk, kKinds, true, [&](const auto& requests) {
+    for (const api::Request& request : requests) desk.begin(request);
+  });
 }
 
 // 0.13 s of a PC; here it is work that is done only in slices.
 TEST_F(StopOrder, OfAPathThatIsBeingPlanned) {
   Desk desk;
-  const Kind path{"long path", path_in_parts(6000, 2000)};
-  for (const api::Request& stop : kStops) {
-    check(desk, path, stop, path.requests(0).size() - 1, [&](const auto& requests) {
-      for (const api::Request& request : requests) {
-        desk.take(request);
-        desk.carry_out();
-      }
-      for (int slice = 0; slice < 10; ++slice) desk.core().work();
-      desk.core().keep_up(desk.now_us());
-    });
-    desk.settle();
-  }
+  check_each(desk, {{"long path", path_in_parts(6000, 2000)}}, true, [&](const auto& requests) {
+    for (const api::Request& request : requests) desk.begin(request, 0);
+    for (int slice = 0; slice < 10; ++slice) desk.core().work();
+    desk.core().keep_up(desk.now_us());
+  });
 }
 
 TEST_F(StopOrder, OfRowsThatAreBeingChecked) {
   Desk desk;
   const Kind trajectory{"trajectory",
                         [](std::int64_t round) { return trajectory_in_parts(round, 1); }};
-  for (const api::Request& stop : kStops) {
-    check(desk, trajectory, stop, 0, [&](const auto& requests) {
-      desk.take(requests.front());
-      desk.carry_out();
-    });
-    desk.settle();
-  }
+  check_each(desk, {trajectory}, false,
+             [&](const auto& requests) { desk.begin(requests.front(), 0); });
 }
 
 TEST_F(StopOrder, OfALineWhoseTableIsBeingUploaded) {
   Desk desk;
   std::int64_t way = 3000;  // each has a table of its own
-  const auto line_of = [&](bool armed) -> std::vector<api::Request> {
-    const auto motors = motor_steps({"m01", "m02", "m04"}, {++way, -1201, 2998});
-    if (armed) return {api::ArmLine{.delay_us = 1000, .motors = motors}};
-    return {api::MoveLine{.motors = motors}};
-  };
-  for (const bool armed : {false, true}) {
-    const Kind line{armed ? "arm line" : "line", [&](std::int64_t) { return line_of(armed); }};
-    for (const api::Request& stop : kStops) {
-      check(desk, line, stop, 0, [&](const auto& requests) { desk.begin(requests.front(), 0.01); });
-      desk.settle();
-    }
-  }
+  const auto motors = [&way] { return motor_steps({"m01", "m02", "m04"}, {++way, -1201, 2998}); };
+  const std::vector<Kind> kinds{{"line",
+                                 [&](std::int64_t) -> std::vector<api::Request> {
+                                   return {api::MoveLine{.motors = motors()}};
+                                 }},
+                                {"arm line", [&](std::int64_t) -> std::vector<api::Request> {
+                                   return {api::ArmLine{.delay_us = 1000, .motors = motors()}};
+                                 }}};
+  check_each(desk, kinds, false, [&](const auto& requests) { desk.begin(requests.front(), 0.01); });
 }
 
 // m01 waits until m02, of the same MCU, has been homed.
