@@ -13,6 +13,8 @@ namespace {
 // somewhere between, and a home switch that is active from a place on, over some width.
 class Stage : public Switches {
  protected:
+  Stage() { wire(); }
+
   static constexpr std::int64_t kEnd = 2000;
 
   // `at` is the edge that is met in `direction`.
@@ -94,7 +96,6 @@ INSTANTIATE_TEST_SUITE_P(Formats, Stage, testing::Values(BUSHD_FORMAT_FINE, BUSH
                          format_name);
 
 TEST_P(Stage, TheHomeSwitchIsNoLimit) {
-  wire();
   put(0, {.at = 700, .direction = 1, .width = 50});
   const auto way = home(command(1));
   expect_home_at(700);
@@ -130,7 +131,6 @@ TEST_P(Stage, ALimitBeforeTheSwitchTurnsTheMotor) {
 }
 
 TEST_P(Stage, AtTheLimitItBeginsTheOtherWay) {
-  wire();
   put(kEnd + 5, {.at = 100, .direction = 1, .width = 300});
   rig.pass(3);
   const auto way = home(command(1));
@@ -144,7 +144,6 @@ TEST_P(Stage, AtTheLimitItBeginsTheOtherWay) {
 
 TEST_P(Stage, FromAnywhereItIsTheSameToOneStep) {
   std::mt19937 random(17);
-  wire();
   for (int n = 0; n < 40; ++n) {
     const int direction = random() % 2 == 0 ? 1 : -1;
     const auto stands = static_cast<std::int64_t>(random() % 4000) - 2000;
@@ -161,7 +160,6 @@ TEST_P(Stage, FromAnywhereItIsTheSameToOneStep) {
 }
 
 TEST_P(Stage, NoSwitchBetweenTheLimits) {
-  wire();
   put(500, {.at = 50'000, .direction = 1});
   const auto way = home(command(1));
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_NOT_FOUND);
@@ -173,7 +171,6 @@ TEST_P(Stage, NoSwitchBetweenTheLimits) {
 }
 
 TEST_P(Stage, NoSwitchWithinTheStepsOfEitherWay) {
-  wire();
   put(1900, {.at = -1500, .direction = 1, .width = 100});
   const auto way = home(command(1, 600));
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_NOT_FOUND);
@@ -214,7 +211,6 @@ TEST_P(Stage, AShortLeverBarsTheWayWhereverTheOtherLimitIs) {
 
 // Home is marked behind the limit: the slow approach would go into it.
 TEST_P(Stage, ALimitEndsTheSlowStages) {
-  wire();
   put(1500, {.at = kEnd + 4, .direction = 1});
   const auto way = home(command(1));
   EXPECT_EQ(rig.poll().homing, BUSHD_HOMING_LIMIT);
@@ -227,7 +223,6 @@ TEST_P(Stage, ALimitEndsTheSlowStages) {
 }
 
 TEST_P(Stage, OnItsSwitchAtTheOtherLimitItCannotBackOff) {
-  wire();
   put(-kEnd, {.at = -kEnd - 50, .direction = 1});
   rig.pass(3);
   EXPECT_EQ(rig.home(command(1)), BUSHD_E_FORBIDDEN);
@@ -259,7 +254,6 @@ TEST_P(Stage, BetweenTwoActiveLimitsItDoesNotTurn) {
 }
 
 TEST_P(Stage, CanBeGivenUpOnTheWayBack) {
-  wire();
   put(1900, {.at = -1500, .direction = 1, .width = 100});
   ASSERT_EQ(rig.home(command(1)), BUSHD_OK);
   while (place() < kEnd) rig.pass();
