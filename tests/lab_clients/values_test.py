@@ -47,6 +47,15 @@ class Values(unittest.TestCase):
         self.assertEqual([values.ready(channel, name) for name in ("DOUBLE", "CTRL_DOUBLE", "TIME_LONG", "TIME_STRING")], [None] * 4)
         self.assertIsNone(values.ready(channels.make(channels.Kind.ENUM, 1, ("a", "b"), None, "bo"), "TIME_ENUM"))
 
+    def test_numbers_in_an_array_are_left_to_caproto_and_told(self):
+        channel = channels.make(channels.Kind.WAVEFORM, (1.0, 2.5), (), None, "waveform")
+        self.assertIsNone(values.ready(channel, "TIME_DOUBLE"))
+        told = asyncio.Queue()
+        channel._queues[told][None]["TIME_DOUBLE"].add("spec")
+        channel.show((3.0, 4.0, 5.0))
+        update = told.get_nowait()
+        self.assertEqual((update.sub_specs, list(update.values)), (("spec",), [3.0, 4.0, 5.0]))
+
 
 class Queue(unittest.IsolatedAsyncioTestCase):
     async def asyncSetUp(self):

@@ -43,9 +43,9 @@ class Event:
 
 
 def ready(channel: Any, asked_for: str) -> Ready | None:
-    """What this channel is now, in the form of that name; None: caproto is to make it."""
+    """What this channel is now, in the form of that name; None: caproto is to make it, as all arrays."""
     layout = LAYOUTS.get((channel.data_type, asked_for))
-    if layout is None:
+    if layout is None or channel.max_length > 1:
         return None
     alarm, data = channel.alarm, channel._data
     stamp, value = data["timestamp"], data["value"]
