@@ -24,6 +24,7 @@ constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 // Turns begin at multiples of this, so that many buses have theirs at once, and one wake of the
 // program serves them all.
 constexpr std::int64_t kTurnUs = 5'000;
+constexpr std::int64_t kSpread = 6;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
 // A poll of one MCU takes about as long. Who has news by then is waited for: asked apart it would
 // have to wait until that poll is over, and for as long again.
@@ -258,11 +259,21 @@ void Poller::ended(std::int64_t now_us) {
   extra_from_us_ = std::min(extra_from_us_, now_us + (kExtraShare - 1) * took_us);
 }
 
+// Noise with a period, as a drive makes it, would meet each answer if those came with a period,
+// too. So each is asked for later than the one before, by a part of what it takes to tell all:
+// where bursts are 1.8 to 10 times as far apart as that, one of ten answers comes between two,
+// whatever their phase.
+std::int64_t Poller::spread_us(McuIndex mcu) const {
+  const std::int64_t all_us = reply_us(BUSHD_REPORT_SIZE(mcus_[mcu].view.identity.motors));
+  return all_us * polled_[mcu].missed_replies / kSpread;
+}
+
 bool Poller::missed(std::int64_t now_us, McuIndex mcu, std::uint8_t type) {
   ++mcus_[mcu].health.timeouts;
-  if (++polled_[mcu].missed_replies >= kMaxMissedReplies) return true;
+  Polled& polled = polled_[mcu];
+  if (++polled.missed_replies >= kMaxMissedReplies) return true;
   // Sooner than usual; but a dead MCU must not starve the others.
-  if (type == BUSHD_MSG_POLL) polled_[mcu].routine_us = now_us + kPollAgainUs;
+  if (type == BUSHD_MSG_POLL) polled.routine_us = now_us + kPollAgainUs + spread_us(mcu);
   return false;
 }
 

@@ -83,6 +83,7 @@ class Poller {
   std::int64_t routine_due_us(McuIndex mcu) const;
   std::uint8_t room(McuIndex mcu, std::uint16_t to_move, bool rests) const;
   std::int64_t reply_us(std::size_t payload) const;
+  std::int64_t spread_us(McuIndex mcu) const;
 
   PerMcu<McuRecord>& mcus_;
   Transactions& transactions_;
