@@ -86,12 +86,15 @@ class DaemonEnds(EndToEndTest):
         self.bring_up(bus_lines=bus_lines)
         steps = {name: 3000 if steps > 0 else -3000 for name, steps in OUTWARD.items()}
         move = self.start_move(*[word for pair in steps.items() for word in pair])
+        away_s = []
         for travelled in (600, 1200, 1800):
             self.wait_until_travelled(travelled, *OUTWARD)
             self.bushd.send(signal.SIGSTOP)
+            stopped_s = time.monotonic()
             time.sleep(0.1)  # so long it is away: well within the queue
             self.bushd.send(signal.SIGCONT)
-        self.assertEqual(move.process.wait(), 0, move.said())
+            away_s.append(round(time.monotonic() - stopped_s, 3))
+        self.assertEqual(move.process.wait(), 0, f"{move.said()}; bushd was stopped for {away_s} s, and queues hold 0.25 s")
         self.assertEqual({name: self.positions()[name] for name in steps}, steps)
         self.command("move", "--wait", *[word for name in OUTWARD for word in (name, "--to", "0")])
         status = self.status()

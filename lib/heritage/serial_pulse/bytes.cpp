@@ -49,12 +49,12 @@ void SerialPulseMaster::follow_queue() {
 // What the driver has no more it may have passed on just now, all at once, however long ago it was
 // written: a driver may have stood since it was asked last.
 void SerialPulseMaster::follow_passed_on() {
-  const std::size_t queued = std::min(status_->queued, recent_.size());
-  for (std::size_t i = 0; i < recent_.size() - queued; ++i) {
-    Sent& byte = recent_[i];
-    if (byte.passed_free_ns) continue;
-    passed_free_ns_ = std::max(passed_free_ns_, status_us_ * 1000) + byte.takes_ns;
-    byte.passed_free_ns = passed_free_ns_;
+  const std::size_t end = recent_.size() - std::min(status_->queued, recent_.size());
+  std::size_t i = end;
+  while (i > 0 && !recent_[i - 1].passed_free_ns) --i;
+  for (; i < end; ++i) {
+    passed_free_ns_ = std::max(passed_free_ns_, status_us_ * 1000) + recent_[i].takes_ns;
+    recent_[i].passed_free_ns = passed_free_ns_;
   }
 }
 
