@@ -13,7 +13,7 @@ LITERAL = re.compile(r'f?"((?:[^"\\\n]|\\.)*)"')
 ADJACENT = re.compile(r'"\s*\n?\s*f?"')
 QUOTED = re.compile(rf"'((?:{PROGRAMS})\b[^']*)")
 CALL = re.compile(r'\bremedy\("([a-z]+)"|\bset_remedy\(')
-HELP = re.compile(r"\.(?:footer|flag|flag_with|option|option_with|words|number|number<.*?>|choice|file|add|add_group)\(|another = |kNameAnother =")
+HELP = re.compile(r"\.(?:footer|flag|flag_with|option|option_with|words|number|number<.*?>|choice|file|add|add_group)\(|another = |kNameAnother =|\badd<.*?>\(")
 
 
 @dataclasses.dataclass(frozen=True)
