@@ -164,7 +164,7 @@ Result<void> ComingPaths::add_points(Incoming& incoming, const api::MovePath& re
       };
       const auto steps = motor.scale().steps_of_position(api::UserUnits{request.positions[at + m]});
       if (!steps) return wrong(steps.error().message);
-      if (std::abs(*steps) > motion::Motor::kMaxPosition)
+      if (*steps < -motion::Motor::kMaxPosition || *steps > motion::Motor::kMaxPosition)
         return wrong(fmt::format("it is beyond +-{} steps", motion::Motor::kMaxPosition));
       point[m] = *steps;
       if (*steps < incoming.low[m].steps) incoming.low[m] = {row, *steps};

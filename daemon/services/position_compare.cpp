@@ -1,6 +1,5 @@
 #include "daemon/services/position_compare.h"
 
-#include <cstdlib>
 #include <string>
 
 #include "daemon/services/allowed.h"
@@ -48,7 +47,7 @@ Result<MotorId> PositionCompare::check(const api::PositionCompare& request) cons
   if (!request.arrivals.any()) return id;
   const auto position = installation_[*id].scale().steps_of_position(request.position);
   if (!position) return fail(request.motor + ": " + position.error().message);
-  if (std::abs(*position) > motion::Motor::kMaxPosition) {
+  if (*position < -motion::Motor::kMaxPosition || *position > motion::Motor::kMaxPosition) {
     return fail(request.motor + ": positions lie within +-" +
                 std::to_string(motion::Motor::kMaxPosition));
   }

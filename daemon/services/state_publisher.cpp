@@ -17,14 +17,13 @@ bool same_positions(const bushd_report& a, const bushd_report& b) {
   return true;
 }
 
-// All that a snapshot tells of a report of motors at rest. Times, SYNCs and counters go on.
+// All that a snapshot tells of a report besides positions. Times, SYNCs and counters go on.
 bool tell_the_same(const bushd_report& a, const bushd_report& b) {
   return a.state == b.state && a.faults == b.faults && a.flags == b.flags &&
          a.boot_number == b.boot_number && a.moving == b.moving && a.inputs == b.inputs &&
          a.forbidden_positive == b.forbidden_positive &&
          a.forbidden_negative == b.forbidden_negative && a.system_inputs == b.system_inputs &&
-         a.autonomous == b.autonomous && a.homed == b.homed && a.armed == b.armed &&
-         same_positions(a, b);
+         a.autonomous == b.autonomous && a.homed == b.homed && a.armed == b.armed;
 }
 
 api::McuState state_word(const link::McuView& view) {
@@ -108,12 +107,14 @@ void show_inputs(const link::McuView& view, const config::MotorInputs& inputs,
 }  // namespace
 
 StatePublisher::StatePublisher(Installation& installation, const PseudoAxes& pseudo_axes,
-                               const OpenMoves& open_moves, ProgramOf program_of, Outputs& outputs)
+                               const OpenMoves& open_moves, ProgramOf program_of, Outputs& outputs,
+                               std::size_t most_in_motion)
     : installation_(installation),
       pseudo_axes_(pseudo_axes),
       open_moves_(open_moves),
       program_of_(std::move(program_of)),
-      outputs_(outputs) {
+      outputs_(outputs),
+      most_in_motion_(most_in_motion) {
   for (std::size_t i = 0; i < installation.config().state_parts(); ++i) described_.add();
   for ([[maybe_unused]] const McuId id : installation.mcus()) told_.add();
 }
@@ -148,14 +149,20 @@ void StatePublisher::publish_due(std::int64_t now_us) {
 }
 
 void StatePublisher::publish_moving(std::int64_t now_us) {
-  if (anew_ || moving_.size() <= kMostInMotion) {
-    for (const McuId id : moving_) publish(now_us, id);
-    return;
-  }
+  const bool all = anew_ || moving_.size() <= most_in_motion_;
+  std::erase_if(moving_, [&](McuId id) {
+    const link::McuView& view = installation_[id].view();
+    const Told& told = told_[id];
+    const bool at_once = all || !tell_the_same(view.report, told.report) || view.note != told.note;
+    if (at_once) publish(now_us, id);
+    return at_once;
+  });
+  if (moving_.empty()) return;
   const auto from = std::ranges::lower_bound(moving_, first_moving_);
   std::ranges::rotate(moving_, from == moving_.end() ? moving_.begin() : from);
-  for (std::size_t i = 0; i < kMostInMotion; ++i) publish(now_us, moving_[i]);
-  first_moving_ = moving_[kMostInMotion];
+  const std::size_t count = std::min(most_in_motion_, moving_.size());
+  for (std::size_t i = 0; i < count; ++i) publish(now_us, moving_[i]);
+  first_moving_ = moving_[count % moving_.size()];
 }
 
 // A snapshot is long, and most MCUs rest. Precondition: this one does.
@@ -163,8 +170,8 @@ bool StatePublisher::is_as_told(std::int64_t now_us, const Mcu& mcu) const {
   const Told& told = told_[mcu.id];
   const link::McuView& view = mcu.view();
   return now_us < told.due_us && mcu.online() && view.outdated_us == 0 &&
-         tell_the_same(view.report, told.report) && view.note == told.note &&
-         program_of_(mcu.id).empty();
+         tell_the_same(view.report, told.report) && same_positions(view.report, told.report) &&
+         view.note == told.note && program_of_(mcu.id).empty();
 }
 
 void StatePublisher::publish(std::int64_t now_us, McuId id) {

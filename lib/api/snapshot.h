@@ -130,8 +130,9 @@ struct StateSnapshot {
   static constexpr std::string_view kName = "mcu state";
   static constexpr std::string_view kMeaning =
       "One message per MCU, so that each fits one datagram: at once on change, 20 times a second "
-      "while a motor moves (with more than 128 such MCUs these are told in turns, 2560 a second in "
-      "all), else twice. The newest ones of the parts 0 .. parts-1 together are the "
+      "while a motor moves (with more than 128 such MCUs positions come in turns, of 128 each "
+      "time), "
+      "else twice. The newest ones of the parts 0 .. parts-1 together are the "
       "whole. Of axes that are computed from motors positions are those of people, and steps count "
       "the last decimal that these are shown.";
   static void fields(auto& self, auto& visit) {

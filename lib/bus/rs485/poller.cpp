@@ -24,6 +24,8 @@ constexpr std::int64_t kPollAgainUs = kPollPeriodUs * 2 / 5;
 // Turns begin at multiples of this, so that many buses have theirs at once, and one wake of the
 // program serves them all.
 constexpr std::int64_t kTurnUs = 5'000;
+// Each repetition to an MCU that has not answered is later by one part of so many of its longest
+// answer (spread_us).
 constexpr std::int64_t kSpread = 6;
 constexpr std::int64_t kExtraShare = 2;  // extra polls take one part of so many
 // A poll of one MCU takes about as long. Who has news by then is waited for: asked apart it would

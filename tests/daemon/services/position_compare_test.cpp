@@ -47,6 +47,8 @@ TEST(PositionCompareService, WhatNoMcuCanDoIsRefusedWithItsFigure) {
   api::PositionCompare bad = good;
   bad.position = motion::Motor::kMaxPosition + 1;
   EXPECT_THAT(refusal(bad), HasSubstr("positions lie within +-2147483647"));
+  bad.position = INT64_MIN;
+  EXPECT_THAT(refusal(bad), HasSubstr("positions lie within +-2147483647"));
   bad = good;
   bad.delay_us = 1'500'001;
   EXPECT_THAT(refusal(bad), HasSubstr("1500000"));

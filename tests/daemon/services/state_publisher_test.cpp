@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "daemon/bench.h"
 #include "daemon/live_bench.h"
@@ -42,48 +43,60 @@ TEST(StatePublisher, PublishesOnChangeButNotMoreOftenThanItMay) {
   EXPECT_EQ(bench.states.back().program, "scan runs");
 }
 
-// So many MCUs of one motor, 26 on a bus.
-std::string very_many(int mcus) {
-  std::string toml = "[[group]]\nname = \"g\"\ntable = \"bushd2-constant\"\n";
-  for (int i = 0; i < mcus; ++i) {
-    const std::string bus = "b" + std::to_string(i / 26);
-    const std::string address = std::to_string(i % 26 + 1);
-    if (i % 26 == 0) {
-      toml += "[[bus]]\nname = \"" + bus + "\"\nport = \"/dev/" + bus +
-              "\"\nbaud = 4000000\ntick_us = 2560\nformat = \"fine\"\nmoves = \"table\"\n";
-    }
-    toml += "[[mcu]]\nbus = \"" + bus + "\"\naddress = " + address + "\n[[motor]]\nname = \"m" +
-            std::to_string(i) + "\"\nmcu = \"" + bus + ":" + address +
-            "\"\noutput = 0\ngroup = \"g\"\n";
-  }
-  return toml;
-}
-
-// 130 MCUs that move: 128 each time, those that were left out first.
+// Three MCUs that move, of which two are told of each time: those that were left out first.
 TEST(StatePublisher, TellsOfVeryManyThatMoveInTurns) {
-  constexpr int kMcus = 130;
-  Bench bench(very_many(kMcus));
+  Bench bench(test::hall(3, 1));
   const PseudoAxes none(bench.installation);
   const OpenMoves nobody(bench.installation);
-  StatePublisher publisher(bench.installation, none, nobody, [](McuId) { return ""; }, bench);
+  StatePublisher publisher(bench.installation, none, nobody, [](McuId) { return ""; }, bench, 2);
   publisher.step(0);
-  ASSERT_EQ(bench.states.size(), std::size_t{kMcus});
-  for (int i = 0; i < kMcus; ++i) {
-    bench.installation[MotorId{static_cast<std::size_t>(i)}].enter_program();
+  ASSERT_EQ(bench.states.size(), 3u);
+  const std::vector<MotorId> all = *bench.installation.find_or_all({});
+  for (const MotorId motor : all) {
+    bench.installation[motor].enter_program();
   }
   std::map<std::string, int> told;
-  for (int turn = 1; turn <= 65; ++turn) {
+  for (int turn = 1; turn <= 30; ++turn) {
     bench.states.clear();
     publisher.step(turn * StatePublisher::kPeriodUs);
-    EXPECT_EQ(bench.states.size(), 128u);
+    EXPECT_EQ(bench.states.size(), 2u);
     for (const api::StateSnapshot& state : bench.states) ++told[state.mcu];
   }
-  ASSERT_EQ(told.size(), std::size_t{kMcus});
-  for (const auto& [mcu, times] : told) EXPECT_EQ(times, 64) << mcu << ", of 65 * 128 / 130";
+  ASSERT_EQ(told.size(), 3u);
+  for (const auto& [mcu, times] : told) EXPECT_EQ(times, 20) << mcu << ", of 30 * 2 / 3";
   bench.installation.changed = true;
   bench.states.clear();
-  publisher.step(66 * StatePublisher::kPeriodUs);
-  EXPECT_EQ(bench.states.size(), std::size_t{kMcus}) << "a change is told of all at once";
+  publisher.step(31 * StatePublisher::kPeriodUs);
+  EXPECT_EQ(bench.states.size(), 3u) << "what a request has changed is told of all at once";
+}
+
+// Eight MCUs that move, one each time: a turn comes every 400 ms.
+TEST(StatePublisher, TellsOfThoseThatMoveOutOfTurnWhenMoreThanPositionsChanges) {
+  test::LiveBench bench(test::hall(8, 1));
+  Service service;
+  bench.connect(service);
+  const PseudoAxes none(bench.installation);
+  StatePublisher publisher(
+      bench.installation, none, bench.open_moves, [](McuId) { return ""; }, bench, 1);
+  for (int m = 1; m <= 8; ++m) bench.move(m, "m0" + std::to_string(m), 20'000);
+  bench.run_for(1);
+  const auto turn = [&] {
+    bench.installation.changed = false;
+    bench.states.clear();
+    bench.run_for(0.05);
+    publisher.step(bench.now_us());
+  };
+  turn();  // all, the first time
+  turn();
+  ASSERT_EQ(bench.states.size(), 1u);
+  bench.installation[test::LiveBench::kBus].master.emergency_stop(BUSHD_STOP_RAMP);
+  int turns = 0;
+  do {
+    turn();
+    ++turns;
+  } while (turns < 8 && bench.states.size() == 1);
+  EXPECT_LE(turns, 3) << "a poll, its answers, and a time to tell";
+  EXPECT_EQ(bench.states.size(), 8u);
 }
 
 class RestingMcu : public testing::Test {
