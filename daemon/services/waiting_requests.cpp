@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/overloaded.h"
+#include "motion/report_words.h"
 
 namespace bushd::daemon {
 namespace {
@@ -11,6 +12,13 @@ namespace {
 bool has_common(const std::vector<MotorId>& a, const std::vector<MotorId>& b) {
   return std::ranges::any_of(a,
                              [&](MotorId motor) { return std::ranges::find(b, motor) != b.end(); });
+}
+
+// Longer than an MCU has ticks ahead.
+constexpr std::int64_t kMostTicksUs = 1'000'000;
+
+bool waits_for_trigger(const api::Request& request) {
+  return std::holds_alternative<api::Arm>(request) || std::holds_alternative<api::ArmLine>(request);
 }
 
 }  // namespace
@@ -71,10 +79,21 @@ bool WaitingRequests::is_refused_anyway(const api::Request& request,
   return !any_held(motors) && std::ranges::none_of(motors, changes) && !would_take_(request);
 }
 
+// It has ticks of the motor that are to pass, though by plan the motor stands: its MCU would not
+// arm it yet.
+bool WaitingRequests::has_ticks(MotorId id) const {
+  const Mcu& mcu = installation_.mcu_of(id);
+  return mcu.online() && motion::has_bit(mcu.report().moving, installation_[id].output().value);
+}
+
 Result<bool> WaitingRequests::make_ready(std::int64_t now_us, Held& held) {
   const auto room = line_room_.has_room(held.request, held.motors);
   if (!room || !*room) return room;
-  bool ready = true;
+  const bool may_have_ticks =
+      waits_for_trigger(held.request) && now_us < held.since_us + kMostTicksUs;
+  bool ready = !may_have_ticks || std::ranges::none_of(held.motors, [this](MotorId motor) {
+    return has_ticks(motor);
+  });
   const bool moves = !std::holds_alternative<api::SetPosition>(held.request);
   for (const MotorId motor : held.motors) {
     const McuId mcu = installation_.config()[motor].mcu;
@@ -90,7 +109,7 @@ Result<bool> WaitingRequests::make_ready(std::int64_t now_us, Held& held) {
 bool WaitingRequests::hold(std::int64_t now_us, const api::Asker& asker,
                            const api::Request& request) {
   const bool may_wait = kept_.keeps() || !idle_drivers_.none() || LineTables::concerns(request) ||
-                        line_room_.concerns_any();
+                        line_room_.concerns_any() || waits_for_trigger(request);
   if (!may_wait && held_.empty()) return false;
   auto motors = motors_of(request);
   if (!motors || is_refused_anyway(request, *motors)) return false;

@@ -2,8 +2,8 @@
 //
 // A request waits until the disk knows that its motors are no longer at rest, until their positions
 // are restored, and until their drivers are enabled. A line also waits until its MCUs have the
-// table, and what is streamed may wait for room on the line. Most requests wait a millisecond or
-// two, many not at all.
+// table, what is armed until they have no ticks of its motors any more, and what is streamed may
+// wait for room on the line. Most requests wait a millisecond or two, many not at all.
 #pragma once
 
 #include <cstdint>
@@ -69,6 +69,7 @@ class WaitingRequests final : public Service {
   // Whatever the disk says: its target is beyond a limit, or its speed beyond its table. Not while
   // something that comes before it may change that.
   bool is_refused_anyway(const api::Request& request, const std::vector<MotorId>& motors) const;
+  bool has_ticks(MotorId motor) const;
   Result<bool> make_ready(std::int64_t now_us, Held& held);
   void waits_no_more(Held& held);
   void refuse(Held& held, const std::string& reason);

@@ -336,6 +336,23 @@ TEST_P(Triggered, ArmingIsRefusedWithAReason) {
   EXPECT_EQ(lab.wait(move).result, "reached");
 }
 
+// Whenever the stop comes, also when the MCU has ticks of before.
+TEST_P(Triggered, MayBeArmedAsSoonAsAStopIsDone) {
+  for (int wait_ms = 0; wait_ms <= 120; wait_ms += 4) {
+    lab.send(Ask::kMoveBy, {"m01"}, {4000});
+    lab.run_for(0.5);
+    ASSERT_EQ(lab.wait(lab.send(api::Pause{{"m01"}})).result, "done");
+    ASSERT_EQ(lab.wait(lab.send(api::Resume{{"m01"}})).result, "done");
+    lab.run_for(wait_ms * 1e-3);
+    ASSERT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+    const auto move = lab.send(armed({"m01", "m02"}, {4, 4}));
+    lab.run_for(0.5);
+    EXPECT_FALSE(lab.has_result(move))
+        << wait_ms << " ms after resume: " << lab.last_reply(move).reason;
+    lab.wait(lab.send(Ask::kStop, {}));
+  }
+}
+
 TEST_P(Triggered, AnEmergencyStopEndsThem) {
   lab.connect();
   const auto move = arm({"m01"}, {50});
