@@ -45,8 +45,13 @@ inline void names_fields(auto& self, auto& visit, const fields::Field& names = "
                          const fields::Field& count = "motor_count") {
   visit.list(count, names, self.motors);
 }
-inline constexpr fields::Field kMotorsOrAll{"motors", "none: all"};
-inline constexpr fields::Field kMotorsOrGroups{"motors", "or groups; none: all"};
+// Where no name means all. A type that takes groups, too, says so by kNamesGroups.
+inline void names_or_all_fields(auto& self, auto& visit) {
+  constexpr bool kGroups = requires { self.kNamesGroups; };
+  names_fields(
+      self, visit,
+      {"motors", kGroups ? "motors or groups; none named: all" : "motors; none named: all"});
+}
 inline constexpr fields::Field kOneMotorOrMore{"motor_count", "at least 1, none twice"};
 // 0 a second is none.
 inline void speed_fields(

@@ -38,7 +38,7 @@ struct Stop {
       "done, once they stand; fault where a name is unknown, link where an MCU is not online";
   static constexpr Motion motion() { return Motion::kEndsOnLines; }
   static constexpr bool is_repeatable() { return true; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Stop&, const Stop&) = default;
 };
 
@@ -65,7 +65,7 @@ struct Enable {
       "done; of all: where an MCU is online, the reason names the others. Of some motors of an MCU "
       "the reason names its other ones";
   static constexpr Motion motion() { return Motion::kNone; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Enable&, const Enable&) = default;
 };
 
@@ -75,9 +75,9 @@ struct Disable {
   static constexpr std::string_view kName = "disable";
   static constexpr std::string_view kMeaning =
       "Disables the drivers of the MCUs of these motors. Refused while one of them moves.";
-  static constexpr std::string_view kResult = "as of enable_t";
+  static constexpr std::string_view kResult = "as for enable_t";
   static constexpr Motion motion() { return Motion::kNone; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Disable&, const Disable&) = default;
 };
 
@@ -105,9 +105,9 @@ struct ClearFaults {
   static constexpr std::string_view kName = "clear faults";
   static constexpr std::string_view kMeaning =
       "Clears latched faults of the MCUs of these motors. Refused while one moves.";
-  static constexpr std::string_view kResult = "as of enable_t";
+  static constexpr std::string_view kResult = "as for enable_t";
   static constexpr Motion motion() { return Motion::kLiftsEmergencyStop; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const ClearFaults&, const ClearFaults&) = default;
 };
 
@@ -201,7 +201,7 @@ struct Disarm {
       "These motors, and all that were armed with them, wait for the trigger no more.";
   static constexpr std::string_view kResult = "done, when they no longer wait";
   static constexpr Motion motion() { return Motion::kEnds; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrAll); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Disarm&, const Disarm&) = default;
 };
 
@@ -346,7 +346,7 @@ struct Jog {
   static constexpr std::string_view kResult =
       "when the jog ends: done by its client, limit at the soft limit, else stopped; of further "
       "requests and renewals at once";
-  Motion motion() const {
+  constexpr Motion motion() const {
     if (renew) return Motion::kNone;
     return per_s == 0 ? Motion::kEnds : Motion::kBegins;
   }
@@ -379,7 +379,7 @@ struct Pause {
   static constexpr std::string_view kResult = "done, once they stand";
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kEndsOnLines; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Pause&, const Pause&) = default;
 };
 
@@ -393,7 +393,7 @@ struct Resume {
   static constexpr std::string_view kResult = "done";
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kBegins; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Resume&, const Resume&) = default;
 };
 
@@ -407,7 +407,7 @@ struct Hold {
   static constexpr std::string_view kResult = "done";
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kEnds; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Hold&, const Hold&) = default;
 };
 
@@ -419,7 +419,7 @@ struct Release {
   static constexpr std::string_view kResult = "done";
   static constexpr bool kNamesGroups = true;
   static constexpr Motion motion() { return Motion::kLiftsHold; }
-  static void fields(auto& self, auto& visit) { names_fields(self, visit, kMotorsOrGroups); }
+  static void fields(auto& self, auto& visit) { names_or_all_fields(self, visit); }
   friend bool operator==(const Release&, const Release&) = default;
 };
 

@@ -155,6 +155,11 @@ class Requests(unittest.TestCase):
             with self.subTest(channel):
                 self.assertEqual(asked(call), [(channel, fields)])
 
+    def test_help_says_of_which_motors(self):
+        self.assertIn("names: at least 1\n", Asks.confirm.__doc__)
+        self.assertIn("names: motors; none named: all\n", Asks.enable.__doc__)
+        self.assertIn("names: motors or groups; none named: all\n", Asks.hold.__doc__)
+
     def test_rows_and_the_run_of_an_array(self):
         kind, motors = messages.follow_t, {"motors": ["m"], "array": 1, "stretch": 2.0, "cubic": True}
         self.assertEqual(asked(lambda c: c.follow(["m"], [0, 1], [[0], [4]], cubic=True, stretch=2)), [
