@@ -1,6 +1,8 @@
 #include "daemon/core/core.h"
 
 #include <algorithm>
+#include <concepts>
+#include <type_traits>
 
 #include "daemon/model/name_patterns.h"
 
@@ -27,9 +29,21 @@ void give(Taker& taker, std::int64_t now_us, const api::Asker& asker, const Aske
   }
 }
 
+// What services are asked about before; so none is left out because its function cannot be called.
+template <class Asked>
+concept IsAskedBefore = std::is_same_v<Asked, api::Move> || std::is_same_v<Asked, api::MoveLine> ||
+                        std::is_same_v<Asked, api::Arm> ||
+                        std::is_same_v<Asked, api::SetPosition> || std::is_same_v<Asked, api::Jog>;
 template <class Taker, class Asked>
-bool may_take(const Taker& taker, const Asked& asked) {
-  if constexpr (requires { taker.would_take(asked); }) return taker.would_take(asked);
+concept WouldTake = requires(Taker& taker, const Asked& asked) {
+  { taker.would_take(asked) } -> std::same_as<bool>;
+};
+
+template <class Taker, class Asked>
+bool may_take(Taker& taker, const Asked& asked) {
+  static_assert(WouldTake<Taker, Asked> == (IsAskedBefore<Asked> && (TakesInTime<Taker, Asked> ||
+                                                                     TakesAnytime<Taker, Asked>)));
+  if constexpr (WouldTake<Taker, Asked>) return taker.would_take(asked);
   return true;
 }
 

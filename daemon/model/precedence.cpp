@@ -7,7 +7,8 @@ namespace bushd::daemon {
 namespace {
 
 // None named: all.
-std::vector<MotorId> motors_of(const Installation& installation, const auto& asked) {
+template <class Asked>
+std::vector<MotorId> motors_of(const Installation& installation, const Asked& asked) {
   api::MotorNames names;
   if constexpr (requires { asked.motors.front().amount; }) {
     if (asked.motors.empty()) return {};
@@ -16,6 +17,11 @@ std::vector<MotorId> motors_of(const Installation& installation, const auto& ask
     names = asked.motors;
   } else if constexpr (requires { asked.motor; }) {
     names = {asked.motor};
+  } else if constexpr (!std::is_same_v<Asked, api::EmergencyStop>) {
+    static_assert(
+        Asked::motion() == api::Motion::kNone || Asked::motion() == api::Motion::kBeginsByService,
+        "its motors are asked for: name them, or say here which they are");
+    return {};
   }
   return installation.find_known(names, requires { asked.kNamesGroups; }).motors;
 }

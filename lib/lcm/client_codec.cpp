@@ -36,6 +36,9 @@ std::optional<ClientMessage> decode_subscription(Payload payload) {
   return ClientMessage{.id = {}, .content = *message};
 }
 
+// A channel is urgent by what a request without values does: of jogs, that is their end.
+static_assert(api::ends(api::Jog{}.motion()), "ends of jogs are urgent");
+
 // Requests first, in the order of api::Request.
 struct Channels {
   std::vector<std::string> names{};
