@@ -271,6 +271,7 @@ constexpr std::string_view kNoPhases =
 
 // All about a key but what takes it up.
 struct Row {
+  SettingKey key;
   std::string_view name;     // as in bushd.toml
   std::string_view allowed;  // for errors
   std::string_view help;     // behind the name: an example, or what it is
@@ -282,9 +283,9 @@ struct Row {
   Result<Settings> (*with)(Settings, std::string_view text);
 };
 
-// In the order of SettingKey.
 constexpr std::array<Row, kSettingKeys.size()> kRows{{
-    {.name = "offset",
+    {.key = SettingKey::kOffset,
+     .name = "offset",
      .allowed = "a number of user units",
      .help = "12.5",
      .applies = has_unit,
@@ -295,9 +296,10 @@ constexpr std::array<Row, kSettingKeys.size()> kRows{{
            return fmt::format("{}", offset == 0 ? 0.0 : offset);
          },
      .with = with_offset},
-    {.name = "direction",
+    {.key = SettingKey::kDirection,
+     .name = "direction",
      .allowed = "negative, positive",
-     .help = "negative, positive",
+     .help = "negative or positive",
      .is_word = true,
      .applies = has_unit,
      .why_not = kNoUnit,
@@ -306,14 +308,16 @@ constexpr std::array<Row, kSettingKeys.size()> kRows{{
            return std::string(now.coordinates.scale().negative ? "negative" : "positive");
          },
      .with = with_direction},
-    {.name = "soft_limits",
+    {.key = SettingKey::kSoftLimits,
+     .name = "soft_limits",
      .allowed = "[LOWEST, HIGHEST] dial position, or none",
-     .help = "-5,30 (on the dial), none",
+     .help = "-5,30 (on the dial), or none",
      .text = [](const Settings& now) { return text_of(now.soft_limits); },
      .with = with_soft_limits},
-    {.name = "input_active",
+    {.key = SettingKey::kInputActive,
+     .name = "input_active",
      .allowed = "closed, open",
-     .help = "closed, open: its one input",
+     .help = "closed or open: its one input",
      .is_word = true,
      .applies = [](const Settings& now) { return now.has_one_input; },
      .why_not = "it needs a motor without `inputs`, and no other motor may use the input that has "
@@ -322,55 +326,62 @@ constexpr std::array<Row, kSettingKeys.size()> kRows{{
      .text =
          [](const Settings& now) { return std::string(now.drive.input_open ? "open" : "closed"); },
      .with = with_input_level},
-    {.name = "local",
+    {.key = SettingKey::kLocal,
+     .name = "local",
      .allowed = "true, false",
-     .help = "true, false: local inputs of its MCU move it",
+     .help = "true or false: local inputs of its MCU move it",
      .applies = has_mcu,
      .why_not = kNoPeople,
      .is_reported = [](const Settings& now) { return now.drive.local; },
      .text = [](const Settings& now) { return fmt::format("{}", now.drive.local); },
      .with = with_people<SettingKey::kLocal, &Drive::local>},
-    {.name = "keypad",
+    {.key = SettingKey::kKeypad,
+     .name = "keypad",
      .allowed = "true, false",
-     .help = "true, false: the keypad of its MCU moves it",
+     .help = "true or false: the keypad of its MCU moves it",
      .applies = has_mcu,
      .why_not = kNoPeople,
      .is_reported = [](const Settings& now) { return now.drive.keypad; },
      .text = [](const Settings& now) { return fmt::format("{}", now.drive.keypad); },
      .with = with_people<SettingKey::kKeypad, &Drive::keypad>},
-    {.name = "velocity",
+    {.key = SettingKey::kVelocity,
+     .name = "velocity",
      .allowed = "MIN,MAX,ACCELERATION, whole numbers of 1..40000 steps/s, MIN to 40000 steps/s and "
                 "1..8388607 steps/s^2, or none",
-     .help = "MIN,MAX,ACCELERATION of local inputs, in steps/s and steps/s^2",
+     .help = "MIN,MAX,ACCELERATION of local inputs, in steps/s and steps/s^2, or none",
      .applies = [](const Settings& now) { return now.drive.moved_by_people(); },
      .why_not = "no local inputs move it; set local=true or keypad=true first",
      .text = [](const Settings& now) { return text_of(now.drive.velocity); },
      .with = with_velocity},
-    {.name = "currents",
+    {.key = SettingKey::kCurrents,
+     .name = "currents",
      .allowed = "RAMP,CRUISE,HOLD, whole numbers of 1..5110 mA, with slow or fast behind them, or "
                 "none",
-     .help = "RAMP,CRUISE,HOLD in mA, with slow or fast behind them",
+     .help = "RAMP,CRUISE,HOLD in mA, with slow or fast behind them, or none",
      .applies = has_phases,
      .why_not = kNoPhases,
      .text = [](const Settings& now) { return text_of(now.drive.currents); },
      .with = with_currents},
-    {.name = "max_speed",
+    {.key = SettingKey::kMaxSpeed,
+     .name = "max_speed",
      .allowed = "a number above 0, of units per second (of steps per second without a unit), or "
                 "none",
-     .help = "2.5 in units a second, none",
+     .help = "2.5 in units a second, or none",
      .is_reported = [](const Settings& now) { return now.max_speed.has_value(); },
      .text =
          [](const Settings& now) {
            return now.max_speed ? fmt::format("{}", *now.max_speed) : std::string(kNone);
          },
      .with = with_max_speed},
-    {.name = "acceleration",
+    {.key = SettingKey::kAcceleration,
+     .name = "acceleration",
      .allowed = "a number above 0 and at most 1, of the acceleration of its table",
      .help = "0.5 of that of its table",
      .is_reported = [](const Settings& now) { return now.drive.acceleration != 1; },
      .text = [](const Settings& now) { return fmt::format("{}", now.drive.acceleration); },
      .with = with_acceleration},
-    {.name = "phase_sequence",
+    {.key = SettingKey::kPhaseSequence,
+     .name = "phase_sequence",
      .allowed = "wave, full, half; three-phase is for other windings",
      .help = "wave, full or half, of all motors of its MCU",
      .is_word = true,
@@ -383,9 +394,12 @@ constexpr std::array<Row, kSettingKeys.size()> kRows{{
      .with = with_phase_sequence},
 }};
 
-const Row& row_of(SettingKey key) {
+constexpr const Row& row_of(SettingKey key) {
   return kRows.at(static_cast<std::size_t>(key));
 }
+static_assert(std::ranges::all_of(kSettingKeys, [](SettingKey key) {
+  return row_of(key).key == key && row_of(key).text != nullptr && row_of(key).with != nullptr;
+}));
 
 tl::unexpected<Error> refuse(SettingKey key, std::string_view text, std::string_view why) {
   const Row& row = row_of(key);

@@ -72,6 +72,15 @@ TEST(Setting, VelocityAndCurrentsHaveOneTextAndReadBack) {
   }
 }
 
+TEST(Setting, HelpSaysWhatMayBeNone) {
+  Settings settings = unipolar();
+  settings.has_one_input = true;
+  for (const SettingKey key : kSettingKeys) {
+    const bool says = help_of(key).ends_with(", or none");
+    EXPECT_EQ(says, with(settings, key, "none").has_value()) << name_of(key);
+  }
+}
+
 TEST(Setting, TheLevelOfAnInputIsAWord) {
   Settings settings = blade();
   EXPECT_THAT(with(settings, SettingKey::kInputActive, "open").error().message,
