@@ -20,12 +20,14 @@ enum Exit : int {
 
 // status, where, watch, health
 void add_view_commands(CommandLine& commands);
-// move, arm, stop, estop, home, set, compare
+// move, arm, disarm, compare, stop, estop, home, set
 void add_motion_commands(CommandLine& commands);
 // follow
 void add_follow_command(CommandLine& commands);
-// disarm, pause, resume, hold, release, enable, disable, clear, confirm
+// pause, resume, hold, release, enable, disable, clear, confirm
 void add_plain_commands(CommandLine& commands);
+// disarm
+void add_disarm_command(CommandLine& commands);
 // history
 void add_history_commands(CommandLine& commands);
 // path

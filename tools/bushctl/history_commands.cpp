@@ -32,7 +32,7 @@ std::string position(const std::string& text, std::int64_t steps) {
   return text.empty() ? fmt::format("{} steps", steps) : bushd::printable(text);
 }
 
-void print(const api::MotionHistory& history) {
+void print_history(const api::MotionHistory& history) {
   using enum Align;
   Grid grid({kLeft, kLeft, kRight, kRight, kRight, kLeft, kLeft, kLeft});
   grid.row({"TIME", "WHAT", "FROM", "TO", "STEPS", "RESULT", "BY", ""});
@@ -63,7 +63,7 @@ int show_history(Client& client, const HistoryOptions& options) {
   if (options.json) {
     print_json(options.motor, *history);
   } else {
-    print(*history);
+    print_history(*history);
   }
   return kDone;
 }

@@ -327,6 +327,7 @@ void add_set(CommandLine& commands) {
 void add_motion_commands(CommandLine& commands) {
   add_move(commands);
   add_arm(commands);
+  add_disarm_command(commands);
   add_compare(commands);
   add_stop(commands);
   add_estop(commands);

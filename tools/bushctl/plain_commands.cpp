@@ -25,9 +25,12 @@ void add(CommandLine& commands, const char* name, const char* text, const char* 
 
 }  // namespace
 
-void add_plain_commands(CommandLine& commands) {
+void add_disarm_command(CommandLine& commands) {
   add<api::Disarm>(commands, "disarm", "Cancel moves that wait for the trigger",
                    "What waits for the same trigger, or was armed together, is disarmed together.");
+}
+
+void add_plain_commands(CommandLine& commands) {
   add<api::Pause>(commands, "pause", "Ramp motors down, and keep their targets",
                   "Their moves stay open until 'resume', 'stop' or a new target. Jogs end.");
   add<api::Resume>(commands, "resume", "Let paused motors go on to their targets",
