@@ -143,7 +143,9 @@ TEST_F(ClientTest, ARefusalOfWhatWasAcceptedIsNoResult) {
     reply(api::Accepted{});
     reply(api::Refused{"who are you"});
   };
-  EXPECT_THAT(end_of(move()), HasSubstr("who are you"));
+  const auto ended = move();
+  ASSERT_FALSE(ended) << end_of(ended);
+  EXPECT_THAT(ended.error().text(), HasSubstr("who are you"));
   EXPECT_EQ(heard_, (std::vector<std::size_t>{0})) << "not accepted and refused both";
 }
 

@@ -56,7 +56,7 @@ struct SettingsLab : Lab {
   void expect_reached(const Answer& answer) {
     EXPECT_EQ(answer.result, "reached") << answer.reason;
   }
-  // At a place on the dial.
+  // To a dial position, in steps.
   void move_to(const std::string& motor, std::int64_t steps) {
     expect_reached(wait(send(Ask::kMoveTo, {motor}, {steps})));
   }

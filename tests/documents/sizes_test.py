@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A source has at most 500 lines, so that it can be read at one sitting. What programs write is none.
+"""A source has at most 500 lines, so that it can be read at one sitting. Files that programs write do not count.
 
 $BUSHD_SOURCE_DIR is the source tree."""
 

@@ -274,11 +274,12 @@ Message decoded_by(bushd_status (*)(const uint8_t*, size_t, Message*));
 
 template <auto kDecode>
 bushd_status read(const bushd_frame& frame, Fields* fields) {
-  decltype(decoded_by(kDecode)) message{};
+  using Message = decltype(decoded_by(kDecode));
+  Message message{};
   // One report alone does not say which motors there are.
-  if constexpr (requires { message.motor_count; }) message.motor_count = BUSHD_MOTORS_PER_MCU;
+  if constexpr (std::is_same_v<Message, bushd_report>) message.motor_count = BUSHD_MOTORS_PER_MCU;
   const bushd_status status = kDecode(frame.payload, frame.payload_size, &message);
-  if (status == BUSHD_OK) put(message, *fields);
+  if (status == BUSHD_OK && fields != nullptr) put(message, *fields);
   return status;
 }
 
@@ -289,7 +290,7 @@ bushd_status read_nothing(const bushd_frame& frame, Fields* /*fields*/) {
 struct Row {
   uint8_t type;
   const char* name;
-  bushd_status (*read)(const bushd_frame& frame, Fields* fields);
+  bushd_status (*read)(const bushd_frame& frame, Fields* fields);  // fields: null if not wanted
 };
 constexpr Row kAcknowledgement = {BUSHD_TYPE_REPLY, "acknowledgement",
                                   read<bushd_decode_acknowledgement>};
@@ -352,8 +353,7 @@ std::string message_text(const bushd_frame& frame) {
 
 bool is_message(const bushd_frame& frame) {
   const Row* row = row_of(frame);
-  Fields fields;
-  return row != nullptr && row->read(frame, &fields) == BUSHD_OK;
+  return row != nullptr && row->read(frame, nullptr) == BUSHD_OK;
 }
 
 std::set<std::string> message_names() {

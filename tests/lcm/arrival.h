@@ -3,21 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
 #include <variant>
 
-#include "base/fields_json.h"
-#include "base/json_text.h"
+#include "api/printed.h"
 #include "lcm/codec.h"
 
 namespace bushd::test {
 
 inline const lcm::RequestId kId{.session = -7, .client_id = "scan-hall-4711", .number = 1};
-
-inline std::string text_of(const api::Request& request) {
-  return std::visit([](const auto& content) { return json_text(json_of(content)); },
-                    static_cast<const api::Request::variant&>(request));
-}
 
 // Encoded and decoded it is the same, and encoded again too.
 inline void expect_arrives(const api::Request& request) {
@@ -26,9 +19,11 @@ inline void expect_arrives(const api::Request& request) {
   const auto message = lcm::decode_client_message(packet->channel, packet->payload);
   ASSERT_TRUE(message) << packet->channel;
   EXPECT_EQ(message->id, kId);
+  ASSERT_TRUE(std::holds_alternative<api::Request>(message->content)) << packet->channel;
   const auto& arrived = std::get<api::Request>(message->content);
-  EXPECT_TRUE(arrived == request) << text_of(request) << ", arrived " << text_of(arrived);
+  EXPECT_EQ(arrived, request);
   const auto again = lcm::encode(12, message->id, arrived);
+  ASSERT_TRUE(again) << again.error().text();
   EXPECT_EQ(again->payload, packet->payload);
   EXPECT_EQ(again->channel, packet->channel);
 }

@@ -9,7 +9,11 @@
 #include <cctype>
 #include <cstdlib>
 #include <random>
+#include <set>
 #include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
 
 #include "daemon/matrix/requests.h"
 #include "daemon/matrix/states.h"
@@ -88,6 +92,21 @@ TEST_P(Matrix, EveryRequestIsAccountedFor) {
   }
   if (state.moves && share() == 1) {
     EXPECT_GT(rows_in_motion, rows / 2) << "of " << rows << " rows it has moved in few";
+  }
+}
+
+template <class... Asked>
+std::vector<std::string_view> names_of(const std::variant<Asked...>* /*requests*/) {
+  return {Asked::kName...};
+}
+
+TEST(MatrixOfRequests, HasARowOfEachType) {
+  std::mt19937 random(1);
+  std::set<std::size_t> types;
+  for (const Row& row : requests()) types.insert(row.of("a", "b", random).index());
+  const auto names = names_of(static_cast<const api::Request::variant*>(nullptr));
+  for (std::size_t type = 0; type < names.size(); ++type) {
+    EXPECT_TRUE(types.contains(type)) << names[type] << " says more than names: give it a row";
   }
 }
 

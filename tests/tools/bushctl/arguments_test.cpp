@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "api/printed.h"
 #include "tools/bushctl/move_arguments.h"
 
 namespace bushctl {
@@ -14,14 +15,14 @@ constexpr Numbers kUser = Numbers::kUser;
 constexpr Numbers kSteps = Numbers::kSteps;
 
 TEST(MoveArguments, PairsAreRelative) {
-  EXPECT_TRUE(parse_move({"theta", "-400", "chi", "+20"}, kUser) ==
-              (api::Move{.motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
+  EXPECT_EQ(parse_move({"theta", "-400", "chi", "+20"}, kUser),
+            (api::Move{.motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
 }
 
 TEST(MoveArguments, ToIsAbsolute) {
-  EXPECT_TRUE(parse_move({"theta", "--to", "-400", "chi", "--to=20"}, kUser) ==
-              (api::Move{.kind = api::Move::Kind::kAbsolute,
-                         .motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
+  EXPECT_EQ(parse_move({"theta", "--to", "-400", "chi", "--to=20"}, kUser),
+            (api::Move{.kind = api::Move::Kind::kAbsolute,
+                       .motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
 }
 
 TEST(MoveArguments, AMixtureIsRefusedAndSaysWhichMotor) {
@@ -40,18 +41,18 @@ TEST(MoveArguments, InUnitsOrInSteps) {
 }
 
 TEST(MoveArguments, AlongALineAreThoseOfAMove) {
-  EXPECT_TRUE(parse_move_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, {}) ==
-              (api::MoveLine{.kind = api::Move::Kind::kAbsolute,
-                             .motors = {{"a", User{10}}, {"b", User{-3.5}}}}));
+  EXPECT_EQ(parse_move_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, {}),
+            (api::MoveLine{.kind = api::Move::Kind::kAbsolute,
+                           .motors = {{"a", User{10}}, {"b", User{-3.5}}}}));
   EXPECT_EQ(parse_move_line({"a", "4"}, kUser, {.duration = "12.5"})->duration_s, 12.5);
   for (const char* wrong : {"0", "-1", "soon", "inf"}) {
     EXPECT_FALSE(parse_move_line({"a", "4"}, kUser, {.duration = wrong})) << wrong;
   }
   EXPECT_FALSE(parse_move_line({}, kUser, {}));
-  EXPECT_TRUE(parse_move_line({"a", "4"}, kSteps, {.law = "elementary", .feed = "2.5"}) ==
-              (api::MoveLine{.motors = {{"a", 4}},
-                             .law = api::MoveLine::Law::kElementary,
-                             .feed = api::Speed{.per_s = 2.5, .in_steps = true}}));
+  EXPECT_EQ(parse_move_line({"a", "4"}, kSteps, {.law = "elementary", .feed = "2.5"}),
+            (api::MoveLine{.motors = {{"a", 4}},
+                           .law = api::MoveLine::Law::kElementary,
+                           .feed = api::Speed{.per_s = 2.5, .in_steps = true}}));
   EXPECT_EQ(parse_move_line({"a", "4"}, kUser, {.feed = "0"}).error().message,
             "--feed: \"0\" is not a number above 0");
 }
@@ -76,10 +77,10 @@ TEST(MoveArguments, WhatIsMissingIsNamed) {
 }
 
 TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
-  EXPECT_TRUE(parse_arm({"theta", "-400", "chi", "20"}, kUser, "falling", 1500) ==
-              (api::Arm{.edge = api::Edge::kFalling,
-                        .delay_us = 1500,
-                        .motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
+  EXPECT_EQ(parse_arm({"theta", "-400", "chi", "20"}, kUser, "falling", 1500),
+            (api::Arm{.edge = api::Edge::kFalling,
+                      .delay_us = 1500,
+                      .motors = {{"theta", User{-400}}, {"chi", User{20}}}}));
   EXPECT_EQ(parse_arm({"theta", "1"}, kUser, "rising", 50)->edge, api::Edge::kRising);
   EXPECT_THAT(parse_arm({"theta", "--to", "5"}, kUser, "rising", 50).error().text(),
               HasSubstr("by a distance"));
@@ -87,25 +88,25 @@ TEST(ArmArguments, ArePairsWithAnEdgeAndADelay) {
 }
 
 TEST(ArmArguments, OfALineAreThoseOfALineAndATrigger) {
-  EXPECT_TRUE(parse_arm_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, "falling", 1500,
-                             "2.5") == (api::ArmLine{.edge = api::Edge::kFalling,
-                                                     .delay_us = 1500,
-                                                     .kind = api::Move::Kind::kAbsolute,
-                                                     .motors = {{"a", User{10}}, {"b", User{-3.5}}},
-                                                     .duration_s = 2.5}));
+  EXPECT_EQ(parse_arm_line({"a", "--to", "10", "b", "--to=-3.5"}, kUser, "falling", 1500, "2.5"),
+            (api::ArmLine{.edge = api::Edge::kFalling,
+                          .delay_us = 1500,
+                          .kind = api::Move::Kind::kAbsolute,
+                          .motors = {{"a", User{10}}, {"b", User{-3.5}}},
+                          .duration_s = 2.5}));
   EXPECT_EQ(parse_arm_line({"a", "4"}, kUser, "rising", 50, "")->kind, api::Move::Kind::kRelative);
   EXPECT_FALSE(parse_arm_line({"a", "4"}, kUser, "rising", 50, "0"));
   EXPECT_FALSE(parse_arm_line({"a"}, kUser, "rising", 50, ""));
 }
 
 TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
-  EXPECT_TRUE(parse_position_compare("theta", "-7", kUser,
-                                     {.direction = "negative", .delay_us = 30, .width_us = 4}) ==
-              (api::PositionCompare{.motor = "theta",
-                                    .position = User{-7},
-                                    .arrivals = {.negative = true},
-                                    .delay_us = 30,
-                                    .width_us = 4}));
+  EXPECT_EQ(parse_position_compare("theta", "-7", kUser,
+                                   {.direction = "negative", .delay_us = 30, .width_us = 4}),
+            (api::PositionCompare{.motor = "theta",
+                                  .position = User{-7},
+                                  .arrivals = {.negative = true},
+                                  .delay_us = 30,
+                                  .width_us = 4}));
   EXPECT_EQ(parse_position_compare("theta", "5", kUser, {})->arrivals,
             (api::Directions{.positive = true, .negative = true}));
   EXPECT_EQ(parse_position_compare("theta", "5", kUser, {.direction = "positive"})->arrivals,
@@ -115,10 +116,9 @@ TEST(ReferenceArguments, NameAMotorAndWhereItPulses) {
 }
 
 TEST(SetArguments, NameOneMotorAndItsPosition) {
-  EXPECT_TRUE(parse_set("theta", "-7", kSteps, false) ==
-              (api::SetPosition{.motors = {{"theta", -7}}}));
-  EXPECT_TRUE(parse_set("theta", "-7.5", kUser, true) ==
-              (api::SetPosition{.motors = {{"theta", User{-7.5}}}, .dial = true}));
+  EXPECT_EQ(parse_set("theta", "-7", kSteps, false), (api::SetPosition{.motors = {{"theta", -7}}}));
+  EXPECT_EQ(parse_set("theta", "-7.5", kUser, true),
+            (api::SetPosition{.motors = {{"theta", User{-7.5}}}, .dial = true}));
 }
 
 }  // namespace
