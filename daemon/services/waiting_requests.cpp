@@ -83,7 +83,8 @@ bool WaitingRequests::is_refused_anyway(const api::Request& request,
 // arm it yet.
 bool WaitingRequests::has_ticks(MotorId id) const {
   const Mcu& mcu = installation_.mcu_of(id);
-  return mcu.online() && motion::has_bit(mcu.report().moving, installation_[id].output().value);
+  return mcu.online() && installation_[id].is<motion::Resting>() &&
+         motion::has_bit(mcu.report().moving, installation_[id].output().value);
 }
 
 Result<bool> WaitingRequests::make_ready(std::int64_t now_us, Held& held) {
