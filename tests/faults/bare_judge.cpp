@@ -100,7 +100,10 @@ void BareJudge::step(TimeNs time_ns, Motor& motor) {
       motor.excused_ns < motor.run.back()) {
     judge_run(motor);
   }
-  if (motor.run.empty()) motor.cut = motor.changed = false;
+  if (motor.run.empty()) {
+    motor.cut = motor.gone_ns && time_ns - *motor.gone_ns <= motor.rest_ns;
+    motor.changed = false;
+  }
   motor.run.push_back(time_ns);
   motor.position += motor.positive ? 1 : -1;
   motor.path.push_back({time_ns, motor.position});
@@ -201,6 +204,7 @@ void BareJudge::daemon_gone(TimeNs now_ns) {
   open_.clear();
   for (Motor& motor : motors_) {
     motor.cut = true;
+    motor.gone_ns = now_ns;
     motor.keys_ns = std::min(motor.keys_ns, now_ns);
     motor.trusted = motor.resting = false;
   }
@@ -210,7 +214,9 @@ void BareJudge::begin(TimeNs, Open& open, const std::string& name,
                       std::optional<std::int64_t> target) {
   const Motor* motor = find(name);
   if (motor == nullptr) return;
-  open.motors.push_back(static_cast<std::size_t>(motor - motors_.data()));
+  const auto index = static_cast<std::size_t>(motor - motors_.data());
+  motors_[index].gone_ns.reset();
+  open.motors.push_back(index);
   open.target.push_back(target);
 }
 

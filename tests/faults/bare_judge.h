@@ -111,6 +111,8 @@ class BareJudge final : public bushd::sim::EdgeSink {
     std::deque<At> path{};
     std::vector<TimeNs> run{};
     bool cut = false;
+    // Its daemon had gone before a request's first step was made: what was under way is cut off.
+    std::optional<TimeNs> gone_ns{};
     bool changed = false;
     bool homes = false;
     TimeNs excused_ns = 0;
