@@ -140,12 +140,11 @@ void StatePublisher::publish_due(std::int64_t now_us) {
       publish(now_us, id);
     }
   }
-  all_rest_ = moving_.empty();
   publish_moving(now_us);
   publish_axes(now_us);
   installation_.changed = anew_ = false;
   sent_us_ = now_us;
-  due_us_ = now_us + kPeriodUs;
+  due_us_ = now_us + kPeriodUs - kReportJitterUs;
 }
 
 void StatePublisher::publish_moving(std::int64_t now_us) {
@@ -195,7 +194,7 @@ void StatePublisher::publish_axes(std::int64_t now_us) {
 
 std::int64_t StatePublisher::next_wake_us() const {
   if (installation_.changed) return std::min(due_us_, sent_us_ + kMinPeriodUs);
-  return all_rest_ ? due_us_ + kRestingSlackUs : due_us_;
+  return due_us_ + kSlackUs;
 }
 
 // A description changes with what is marked as changed, and is long.

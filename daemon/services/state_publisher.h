@@ -25,9 +25,11 @@ class StatePublisher {
   // Clients are told half a second after the state before at the latest: that must be there by
   // then.
   static constexpr std::int64_t kRestingPeriodUs = 200'000;
-  // While all rest, what has come is told this much later at most: reports come as often, and with
-  // them the time to tell of them, so nothing is woken for that alone.
-  static constexpr std::int64_t kRestingSlackUs = 5'000;
+  // What has come is told this much later at most: reports come as often, and with them the time to
+  // tell of them, so nothing is woken for that alone.
+  static constexpr std::int64_t kSlackUs = 5'000;
+  // Reports come exactly as often, give or take this: it is time to tell of one when it is there.
+  static constexpr std::int64_t kReportJitterUs = 2'000;
   // "At once on change", but not more often than this: a client that sends many requests must not
   // make the daemon flood the network.
   static constexpr std::int64_t kMinPeriodUs = 5'000;
@@ -82,7 +84,6 @@ class StatePublisher {
   bool anew_ = true;
   std::vector<McuId> moving_;
   McuId first_moving_{0};  // or the next one that moves
-  bool all_rest_ = false;  // all MCUs, when they were published last
   std::int64_t due_us_ = 0;
   std::int64_t sent_us_ = INT64_MIN / 2;
 };

@@ -158,7 +158,7 @@ TEST_F(RestingMcu, IsPublishedWhenAnythingElseMayHaveChanged) {
   publisher.look_anew();
   EXPECT_EQ(publish_for(StatePublisher::kPeriodUs + 5'000), bench.installation.mcus().size());
   EXPECT_LE(publisher.next_wake_us() - bench.now_us(),
-            StatePublisher::kPeriodUs + StatePublisher::kRestingSlackUs);
+            StatePublisher::kPeriodUs + StatePublisher::kSlackUs);
   program = "scan runs, frame 3";
   EXPECT_GE(publish_for(5 * StatePublisher::kPeriodUs), 4 * bench.installation.mcus().size())
       << "a program goes on without a report that tells of it";
