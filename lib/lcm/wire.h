@@ -313,6 +313,14 @@ Result<std::vector<std::uint8_t>> encode(std::string_view channel, const T& mess
   return checked(channel, std::move(bytes), good);
 }
 
+// The fingerprint is read.
+template <class T>
+bool begins(wire::Reader& reader) {
+  std::uint64_t told = 0;
+  reader("fingerprint", told);
+  return reader.good() && told == fingerprint<T>();
+}
+
 // Nothing for a payload that is not exactly one message of type T: other fingerprint, truncated,
 // bytes left over, a length beyond the end, a text without its NUL at the end or with one before, a
 // value that means nothing. Memory needed is a small multiple of the payload. Throws nothing but
@@ -321,9 +329,7 @@ template <class T>
 std::optional<T> decode(std::span<const std::uint8_t> payload) {
   if (payload.size() > kMaxMessageBytes) return std::nullopt;
   wire::Reader reader(payload);
-  std::uint64_t told = 0;
-  reader("fingerprint", told);
-  if (!reader.good() || told != fingerprint<T>()) return std::nullopt;
+  if (!begins<T>(reader)) return std::nullopt;
   T message{};
   T::fields(message, reader);
   if (!reader.good() || !reader.at_end()) return std::nullopt;
@@ -334,9 +340,7 @@ std::optional<T> decode(std::span<const std::uint8_t> payload) {
 template <class T, class First>
 std::optional<First> decode_first(std::span<const std::uint8_t> payload) {
   wire::Reader reader(payload);
-  std::uint64_t told = 0;
-  reader("fingerprint", told);
-  if (!reader.good() || told != fingerprint<T>()) return std::nullopt;
+  if (!begins<T>(reader)) return std::nullopt;
   First first{};
   First::fields(first, reader);
   return reader.good() ? std::optional(first) : std::nullopt;

@@ -101,6 +101,7 @@ void BareJudge::step(TimeNs time_ns, Motor& motor) {
     judge_run(motor);
   }
   if (motor.run.empty()) {
+    // What a daemon has handed over leaves within two of the longest delays and the port's silence.
     motor.cut = motor.gone_ns && time_ns - *motor.gone_ns <= motor.rest_ns;
     motor.changed = false;
   }
