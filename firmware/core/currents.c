@@ -52,7 +52,7 @@ void bushd_mcu_choose_currents(bushd_mcu* mcu) {
   for (uint8_t m = 0; m < mcu->config.current_motors; ++m) choose(mcu, m);
 }
 
-bushd_status bushd_mcu_set_currents(bushd_mcu* mcu, const bushd_currents* message) {
+bushd_status bushd_mcu_take_currents(bushd_mcu* mcu, const bushd_currents* message) {
   if (message->motor >= mcu->config.current_motors) {
     const bool none = message->ramp_ma == 0 && bushd_mcu_has_output(mcu, message->motor);
     return none ? BUSHD_OK : BUSHD_E_FORMAT;

@@ -21,7 +21,6 @@ typedef struct bushd_mcu_currents {
   uint8_t steady_ticks;     // since; saturates
 } bushd_mcu_currents;
 
-bushd_status bushd_mcu_set_currents(bushd_mcu* mcu, const bushd_currents* message);
 // Chooses the currents for the slot buffer that is complete, before its tick. O(motors with current
 // control).
 void bushd_mcu_choose_currents(bushd_mcu* mcu);

@@ -30,7 +30,6 @@ typedef struct bushd_mcu_emission {
   } of;
 } bushd_mcu_emission;
 
-bushd_status bushd_mcu_take_emission(bushd_mcu* mcu, const bushd_emission* message);
 void bushd_mcu_default_emission(bushd_mcu* mcu);
 void bushd_mcu_restore_emission(bushd_mcu* mcu);
 // The slot_buffer is complete but for what the emission makes of it.

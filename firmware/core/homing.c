@@ -238,7 +238,7 @@ static bushd_status check(bushd_mcu* mcu, const bushd_home* message) {
   return slow_enough(mcu, message) && is_counted(mcu, message) ? BUSHD_OK : BUSHD_E_FORMAT;
 }
 
-bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message) {
+bushd_status bushd_mcu_take_home(bushd_mcu* mcu, const bushd_home* message) {
   bushd_mcu_homing* homing = &mcu->homing;
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
   if (!bushd_mcu_runs_so_slowly(mcu, message->shortest_delay) ||

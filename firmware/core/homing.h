@@ -28,7 +28,6 @@ typedef struct bushd_mcu_homing {
 #endif
 } bushd_mcu_homing;
 
-bushd_status bushd_mcu_home(bushd_mcu* mcu, const bushd_home* message);
 void bushd_mcu_go_home(bushd_mcu* mcu, uint16_t active_inputs);  // before every tick is prepared
 // A motor homes, or still makes a step of the slow stages.
 bool bushd_mcu_homing_in_use(const bushd_mcu* mcu);

@@ -87,7 +87,7 @@ void bushd_mcu_clear_faults(bushd_mcu* mcu, uint8_t faults) {
   watch_current(mcu, bushd_mcu_first_open(mcu));
 }
 
-bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message) {
+bushd_status bushd_mcu_take_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message) {
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   const uint16_t limits = message->limit_positive | message->limit_negative;
   if ((limits & ~bushd_mcu_own_motors(mcu)) != 0) return BUSHD_E_FORMAT;
@@ -109,7 +109,7 @@ void bushd_mcu_begin_inputs(bushd_mcu* mcu) {
   bushd_mcu_drive_enable(mcu);
 }
 
-bushd_status bushd_mcu_set_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message) {
+bushd_status bushd_mcu_take_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message) {
   const uint8_t count = mcu->config.motors;
   if (message->motor >= count || message->positive >= count || message->negative >= count ||
       message->home >= count) {

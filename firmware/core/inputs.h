@@ -7,8 +7,6 @@
 typedef struct bushd_mcu bushd_mcu;
 
 void bushd_mcu_watch_inputs(bushd_mcu* mcu);  // before every tick is prepared
-bushd_status bushd_mcu_set_inputs(bushd_mcu* mcu, const bushd_set_inputs* message);
-bushd_status bushd_mcu_set_motor_inputs(bushd_mcu* mcu, const bushd_motor_inputs* message);
 void bushd_mcu_begin_inputs(bushd_mcu* mcu);  // after the settings were restored
 // What the port has latched counts before EN is written anew.
 void bushd_mcu_watch_emergency_input(bushd_mcu* mcu);

@@ -28,7 +28,6 @@ typedef struct bushd_mcu_line {
 #endif
 } bushd_mcu_line;
 
-bushd_status bushd_mcu_take_line_run(bushd_mcu* mcu, const bushd_line_run* message);
 // The same, but for what ticks and epochs ask of a master's frame: of a program, whose motors rest.
 // `motors` are those of its entries. False: another line is under way, or it would take too long.
 bool bushd_mcu_begin_line(bushd_mcu* mcu, const bushd_line_run* message, uint16_t motors);

@@ -164,7 +164,7 @@ static void take_away(bushd_mcu* mcu, uint16_t motors) {
   }
 }
 
-bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message) {
+bushd_status bushd_mcu_take_local(bushd_mcu* mcu, const bushd_local* message) {
   bushd_local* settings = &mcu->local.settings;
   if (((message->motors | message->keypad) & ~bushd_mcu_own_motors(mcu)) != 0) {
     return BUSHD_E_FORMAT;

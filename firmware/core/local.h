@@ -22,7 +22,6 @@ typedef struct bushd_mcu_local {
   bushd_mcu_keypad pad;
 } bushd_mcu_local;
 
-bushd_status bushd_mcu_set_local(bushd_mcu* mcu, const bushd_local* message);
 // A master configures: what is to move, by which switches and how is not all there before LOCAL.
 // If it never comes, as to an MCU that does not know it, nothing moves, and what is kept stays.
 void bushd_mcu_wait_for_local(bushd_mcu* mcu);

@@ -22,7 +22,6 @@
 #include "firmware/core/trigger.h"
 
 #define STALE_SEQUENCES 128u
-#define LAST_IN_ORDER 0x1Fu
 #define STALE_NS 100000000u  // no line or adapter keeps a frame back for so long
 
 // The engine against known answers: a wrong compiler, a broken flash cell or bad RAM shows here
@@ -147,10 +146,10 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
 // What a line or an adapter has kept back, or made twice, must not undo what was asked later: a
 // position, drivers that were switched off, a start that was planned anew. Emergency stops always
 // count, SYNCs have ids of their own, and questions change nothing.
+#define OR_IT_IS(type_of, number, kind, needs) || type == BUSHD_MSG_##type_of
 static bool counts_in_order_only(uint8_t type) {
-  return (type >= BUSHD_MSG_CONFIGURE && type <= BUSHD_MSG_SET_POSITION) ||
-         (type >= BUSHD_MSG_TICKS && type <= BUSHD_MSG_TABLE_RUN) ||
-         type == BUSHD_MSG_SET_ADDRESS || (type >= BUSHD_MSG_INPUTS && type <= LAST_IN_ORDER);
+  return type == BUSHD_MSG_SET_ADDRESS BUSHD_ACKNOWLEDGED(OR_IT_IS)
+                     BUSHD_ACKNOWLEDGED_OF_PROGRAMS(OR_IT_IS) BUSHD_STREAMED(OR_IT_IS);
 }
 
 // The master counts its frames in their sequences. So one whose sequence is the newest or one of

@@ -27,7 +27,6 @@ typedef struct bushd_mcu_position_compare {
   bushd_mcu_slots next;  // until then, from the beginning of the tick to be prepared
 } bushd_mcu_position_compare;
 
-bushd_status bushd_mcu_take_position_compare(bushd_mcu* mcu, const bushd_position_compare* message);
 // A pulse of a program, from the beginning of the tick that is prepared on. It takes the output: no
 // motor's arrival makes one afterwards. False: another one is not over.
 bool bushd_mcu_pulse_now(bushd_mcu* mcu, uint32_t width_us);

@@ -54,7 +54,7 @@ void bushd_mcu_program_compared(bushd_mcu* mcu, bool same) {
   p->stored = same && p->scans_before == 0;
 }
 
-bushd_status bushd_mcu_put_program(bushd_mcu* mcu, const bushd_program_put* message) {
+bushd_status bushd_mcu_take_program_put(bushd_mcu* mcu, const bushd_program_put* message) {
   bushd_mcu_program* p = mcu->config.program;
   if (has_motors(p)) return BUSHD_E_STATE;
   if (message->total > p->memory) return BUSHD_E_CAPACITY;
@@ -261,7 +261,7 @@ static bushd_status resume(bushd_mcu* mcu) {
   return BUSHD_OK;
 }
 
-bushd_status bushd_mcu_control_program(bushd_mcu* mcu, const bushd_program_control* message) {
+bushd_status bushd_mcu_take_program_control(bushd_mcu* mcu, const bushd_program_control* message) {
   bushd_mcu_program* p = mcu->config.program;
   switch (message->action) {
     case BUSHD_PROGRAM_COMMIT:

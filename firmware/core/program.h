@@ -70,8 +70,6 @@ void bushd_mcu_boot_program(bushd_mcu* mcu);
 void bushd_mcu_restore_program(bushd_mcu* mcu);
 // All that is kept has been compared with what would be there after a reset.
 void bushd_mcu_program_compared(bushd_mcu* mcu, bool same);
-bushd_status bushd_mcu_put_program(bushd_mcu* mcu, const bushd_program_put* message);
-bushd_status bushd_mcu_control_program(bushd_mcu* mcu, const bushd_program_control* message);
 bushd_program_state bushd_mcu_state_of_program(const bushd_mcu* mcu);
 
 #endif

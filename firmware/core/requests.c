@@ -5,25 +5,18 @@
 
 #include "firmware/core/access.h"
 #include "firmware/core/assertion.h"
-#include "firmware/core/currents.h"
 #include "firmware/core/drivers.h"
 #include "firmware/core/emission.h"
-#include "firmware/core/homing.h"
 #include "firmware/core/inputs.h"
-#include "firmware/core/line_run.h"
 #include "firmware/core/local.h"
 #include "firmware/core/owner.h"
-#include "firmware/core/position_compare.h"
 #include "firmware/core/program.h"
 #include "firmware/core/report.h"
 #include "firmware/core/state.h"
 #include "firmware/core/stop.h"
 #include "firmware/core/stream.h"
 #include "firmware/core/sync.h"
-#include "firmware/core/table_run.h"
 #include "firmware/core/tables.h"
-#include "firmware/core/travel.h"
-#include "firmware/core/trigger.h"
 #include "firmware/core/velocity.h"
 
 static uint32_t capabilities_of(const bushd_mcu* mcu) {
@@ -60,7 +53,7 @@ static size_t encode_identity(const bushd_mcu* mcu, uint8_t* payload) {
   return bushd_encode_identity(&identity, payload);
 }
 
-static bushd_status configure(bushd_mcu* mcu, const bushd_configure* message) {
+bushd_status bushd_mcu_take_configure(bushd_mcu* mcu, const bushd_configure* message) {
   const bool same = (mcu->flags & BUSHD_FLAG_CONFIGURED) != 0 && mcu->tick_ns == message->tick_ns &&
                     mcu->format == message->format;
   if (!same && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
@@ -104,12 +97,12 @@ static uint8_t actions_at_rest_only(const bushd_mcu* mcu, uint8_t faults) {
 }
 
 // EN falls and may rise, so a press that nobody has seen yet is looked at first.
-static bushd_status set_outputs(bushd_mcu* mcu, const bushd_set_outputs* message) {
+bushd_status bushd_mcu_take_set_outputs(bushd_mcu* mcu, const bushd_set_outputs* message) {
   bushd_mcu_watch_emergency_input(mcu);
   return bushd_mcu_set_outputs(mcu, message);
 }
 
-static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
+bushd_status bushd_mcu_take_control(bushd_mcu* mcu, const bushd_control* message) {
   const uint8_t at_rest_only = actions_at_rest_only(mcu, message->faults);
   if ((message->actions & at_rest_only) != 0 && bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   bushd_mcu_watch_emergency_input(mcu);
@@ -124,7 +117,7 @@ static bushd_status control(bushd_mcu* mcu, const bushd_control* message) {
   return BUSHD_OK;
 }
 
-static bushd_status set_position(bushd_mcu* mcu, const bushd_set_position* message) {
+bushd_status bushd_mcu_take_set_position(bushd_mcu* mcu, const bushd_set_position* message) {
   if (message->motor >= mcu->config.motors) return BUSHD_E_FORMAT;
   if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   mcu->motor[message->motor].position_steps = message->position_steps;
@@ -214,75 +207,49 @@ static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, int32_t 
 
 // Decodes into a local and hands it to the function that acts; a decoding error is the answer as it
 // is.
-#define HANDLE(kind, act)                                                   \
-  do {                                                                      \
-    bushd_##kind message;                                                   \
-    const bushd_status decoded =                                            \
-        bushd_decode_##kind(frame->payload, frame->payload_size, &message); \
-    return decoded == BUSHD_OK ? act(mcu, &message) : decoded;              \
+#define TAKE(kind)                                                               \
+  do {                                                                           \
+    bushd_##kind message;                                                        \
+    const bushd_status decoded =                                                 \
+        bushd_decode_##kind(frame->payload, frame->payload_size, &message);      \
+    return decoded == BUSHD_OK ? bushd_mcu_take_##kind(mcu, &message) : decoded; \
   } while (0)
+#define CASE_TAKE(type, number, kind, needs) \
+  case BUSHD_MSG_##type:                     \
+    TAKE(kind);
 
 // What an MCU is told of without answering it.
 static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
   switch (frame->type) {
     case BUSHD_MSG_SYNC:
       return hear_sync(mcu, frame, time_in_tick_ns);
-    case BUSHD_MSG_TICKS:
-      HANDLE(ticks, bushd_mcu_take_ticks);
-    case BUSHD_MSG_TABLE_TICKS:
-      HANDLE(table_ticks, bushd_mcu_take_table_ticks);
-    case BUSHD_MSG_TABLE_RUN:
-      HANDLE(table_run, bushd_mcu_take_table_run);
-    case BUSHD_MSG_LINE_RUN:
-      HANDLE(line_run, bushd_mcu_take_line_run);
+      BUSHD_STREAMED(CASE_TAKE)
     default:
-      HANDLE(emergency, bushd_mcu_emergency);
+      TAKE(emergency);
   }
 }
 
-// What a frame of this type asks for is beyond the port. Modes of emission have statuses of their
-// own.
-// Without all of which an MCU does not know such a message; 0: every MCU does.
+// What a frame of this type asks for is beyond the port without one of these. Modes of emission
+// have statuses of their own.
+#define CASE_NEEDS(type, number, kind, needs) \
+  case BUSHD_MSG_##type:                      \
+    return needs;
 static uint32_t capability_of(uint8_t type) {
   switch (type) {
-    case BUSHD_MSG_TABLE_TICKS:
-      return BUSHD_CAN_TABLE_TICKS;
-    case BUSHD_MSG_TABLE_RUN:
-      return BUSHD_CAN_TABLE_RUN;
-    case BUSHD_MSG_HOME:
-      return BUSHD_CAN_HOME;
-    case BUSHD_MSG_LOCAL:
-      return BUSHD_CAN_LOCAL;
-    case BUSHD_MSG_POSITION_COMPARE:
-      return BUSHD_CAN_POSITION_COMPARE;
-    case BUSHD_MSG_TRAVEL:
-      return BUSHD_CAN_TRAVEL;
-    case BUSHD_MSG_MOTOR_INPUTS:
-      return BUSHD_CAN_MOTOR_INPUTS;
-    case BUSHD_MSG_LINE_RUN:
-      return BUSHD_CAN_LINE_RUN;
-    case BUSHD_MSG_LINE_TRIGGER:
-      return BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRIGGER;
-    case BUSHD_MSG_CURRENTS:
-      return BUSHD_CAN_CURRENTS;
-    case BUSHD_MSG_VELOCITY:
-      return BUSHD_CAN_VELOCITY;
-    case BUSHD_MSG_PROGRAM_PUT:
-    case BUSHD_MSG_PROGRAM:
-    case BUSHD_MSG_PROGRAM_STATE:
-      return BUSHD_CAN_PROGRAM;
+    BUSHD_MESSAGES(CASE_NEEDS)
     default:
       return 0;
   }
 }
 
+#define OR_IT_IS(type_of, number, kind, needs) || type == BUSHD_MSG_##type_of
 static bool is_answered(uint8_t type) {
-  return type != BUSHD_MSG_SYNC && type != BUSHD_MSG_TICKS && type != BUSHD_MSG_TABLE_TICKS &&
-         type != BUSHD_MSG_TABLE_RUN && type != BUSHD_MSG_LINE_RUN && type != BUSHD_MSG_EMERGENCY;
+  return !(type == BUSHD_MSG_SYNC || type == BUSHD_MSG_EMERGENCY BUSHD_STREAMED(OR_IT_IS));
 }
 
 static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns,
                            answer* a) {
+  if (!is_answered(frame->type)) return hear(mcu, frame, time_in_tick_ns);
   switch (frame->type) {
     case BUSHD_MSG_IDENTIFY:
       return answer_identify(mcu, frame, a);
@@ -292,59 +259,12 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       return answer_set_address(mcu, frame, a);
     case BUSHD_MSG_TABLES:
       return answer_tables(mcu, frame, a);
-    case BUSHD_MSG_CONFIGURE:
-      HANDLE(configure, configure);
-    case BUSHD_MSG_TABLE_BEGIN:
-      HANDLE(table_begin, bushd_mcu_table_begin);
-    case BUSHD_MSG_TABLE_DATA:
-      HANDLE(table_data, bushd_mcu_table_data);
-    case BUSHD_MSG_TABLE_END:
-      HANDLE(table_end, bushd_mcu_table_end);
-    case BUSHD_MSG_ASSIGN:
-      HANDLE(assign, bushd_mcu_assign);
-    case BUSHD_MSG_CONTROL:
-      HANDLE(control, control);
-    case BUSHD_MSG_SET_POSITION:
-      HANDLE(set_position, set_position);
-    case BUSHD_MSG_INPUTS:
-      HANDLE(set_inputs, bushd_mcu_set_inputs);
-    case BUSHD_MSG_OUTPUTS:
-      HANDLE(set_outputs, set_outputs);
-    case BUSHD_MSG_MOTOR_INPUTS:
-      HANDLE(motor_inputs, bushd_mcu_set_motor_inputs);
-    case BUSHD_MSG_EMISSION:
-      HANDLE(emission, bushd_mcu_take_emission);
-    case BUSHD_MSG_HOME:
-      HANDLE(home, bushd_mcu_home);
-    case BUSHD_MSG_LOCAL:
-      HANDLE(local, bushd_mcu_set_local);
-    case BUSHD_MSG_TRAVEL:
-      HANDLE(travel, bushd_mcu_take_travel);
-    case BUSHD_MSG_TRIGGER:
-      HANDLE(trigger, bushd_mcu_arm);
-    case BUSHD_MSG_LINE_TRIGGER:
-      HANDLE(line_trigger, bushd_mcu_arm_line);
-    case BUSHD_MSG_POSITION_COMPARE:
-      HANDLE(position_compare, bushd_mcu_take_position_compare);
-    case BUSHD_MSG_CURRENTS:
-      HANDLE(currents, bushd_mcu_set_currents);
-    case BUSHD_MSG_VELOCITY:
-      HANDLE(set_velocity, bushd_mcu_take_velocity);
+      BUSHD_ACKNOWLEDGED(CASE_TAKE)
 #if BUSHD_PROGRAMS
-    case BUSHD_MSG_PROGRAM_PUT:
-      HANDLE(program_put, bushd_mcu_put_program);
-    case BUSHD_MSG_PROGRAM:
-      HANDLE(program_control, bushd_mcu_control_program);
+      BUSHD_ACKNOWLEDGED_OF_PROGRAMS(CASE_TAKE)
     case BUSHD_MSG_PROGRAM_STATE:
       return answer_program_state(mcu, frame, a);
 #endif
-    case BUSHD_MSG_SYNC:
-    case BUSHD_MSG_TICKS:
-    case BUSHD_MSG_TABLE_TICKS:
-    case BUSHD_MSG_TABLE_RUN:
-    case BUSHD_MSG_LINE_RUN:
-    case BUSHD_MSG_EMERGENCY:
-      return hear(mcu, frame, time_in_tick_ns);
     default:
       return BUSHD_E_UNKNOWN_MESSAGE;
   }

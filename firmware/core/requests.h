@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "engine/frame.h"
+#include "engine/message.h"
 
 typedef struct bushd_mcu bushd_mcu;
 
@@ -28,6 +28,15 @@ typedef struct bushd_mcu_answer {
   uint8_t checked;  // by the CRC
   uint32_t delay_ns;
 } bushd_mcu_answer;
+
+// What a message asks for, in the module that it concerns. The status is the answer.
+#define BUSHD_MCU_TAKE(type, number, kind, needs) \
+  bushd_status bushd_mcu_take_##kind(bushd_mcu* mcu, const bushd_##kind* message);
+BUSHD_ACKNOWLEDGED(BUSHD_MCU_TAKE)
+BUSHD_ACKNOWLEDGED_OF_PROGRAMS(BUSHD_MCU_TAKE)
+BUSHD_STREAMED(BUSHD_MCU_TAKE)
+#undef BUSHD_MCU_TAKE
+bushd_status bushd_mcu_take_emergency(bushd_mcu* mcu, const bushd_emergency* message);
 
 void bushd_mcu_handle_frame(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns);
 // Goes on with an answer; false if there is none.

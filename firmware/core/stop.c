@@ -62,7 +62,7 @@ void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_stop_mode mode, uint32_t next) {
   for (uint8_t m = 0; m < mcu->config.motors; ++m) bushd_mcu_stop_motor(mcu, m, mode, next);
 }
 
-bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
+bushd_status bushd_mcu_take_emergency(bushd_mcu* mcu, const bushd_emergency* message) {
   const bool disables = message->mode == BUSHD_STOP_DISABLE;
   const uint8_t faults = BUSHD_FAULT_EMERGENCY | (disables ? BUSHD_FAULT_DISABLED : 0);
   bushd_mcu_stop_all(mcu, message->mode, bushd_mcu_first_open(mcu));

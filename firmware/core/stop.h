@@ -9,7 +9,6 @@
 typedef struct bushd_mcu bushd_mcu;
 
 void bushd_mcu_watch_comm_timeout(bushd_mcu* mcu);  // before every tick is prepared
-bushd_status bushd_mcu_emergency(bushd_mcu* mcu, const bushd_emergency* message);
 // All motors stop from `next` on, the first tick that is not prepared. With BUSHD_STOP_DISABLE EN
 // falls first; who says so latches a fault that keeps it off.
 void bushd_mcu_stop_all(bushd_mcu* mcu, bushd_stop_mode mode, uint32_t next);

@@ -47,8 +47,6 @@ typedef struct bushd_mcu_tick_range {
 } bushd_mcu_tick_range;
 // What all frames that move motors must keep to. BUSHD_E_LATE: good, and holds nothing new.
 bushd_status bushd_mcu_check_tick_range(bushd_mcu* mcu, const bushd_mcu_tick_range* range);
-bushd_status bushd_mcu_take_ticks(bushd_mcu* mcu, const bushd_ticks* ticks);
-bushd_status bushd_mcu_take_table_ticks(bushd_mcu* mcu, const bushd_table_ticks* ticks);
 // The motor, at rest at its known_until, starts at that tick.
 void bushd_mcu_note_start(bushd_mcu* mcu, uint8_t m, uint32_t tick);
 // Nothing is known of this motor from `tick` on.

@@ -12,7 +12,6 @@
 
 typedef struct bushd_mcu bushd_mcu;
 
-bushd_status bushd_mcu_take_table_run(bushd_mcu* mcu, const bushd_table_run* message);
 // Into the motor's own run, which nothing reads as long as it is in a stream or at rest; nor its
 // end: it holds how many ticks the run takes. `spare_ns`: by how much it may begin late and still
 // be over then; less than a tick. False if its end is farther than tick numbers reach.

@@ -65,7 +65,7 @@ static void forget_table(bushd_mcu* mcu, uint8_t bank) {
   }
 }
 
-bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
+bushd_status bushd_mcu_take_table_begin(bushd_mcu* mcu, const bushd_table_begin* message) {
   if (!has_bank(mcu, message->bank)) return BUSHD_E_FORMAT;
   if (bushd_mcu_engaged(mcu) != 0) return BUSHD_E_STATE;
   forget_scratch(mcu);
@@ -87,7 +87,7 @@ bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* mess
   return BUSHD_OK;
 }
 
-bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message) {
+bushd_status bushd_mcu_take_table_data(bushd_mcu* mcu, const bushd_table_data* message) {
   if (!has_bank(mcu, message->bank)) return BUSHD_E_FORMAT;
   bushd_mcu_table* entry = entry_of(mcu, message->bank);
   const uint32_t end = (uint32_t)message->offset + message->count;
@@ -103,7 +103,7 @@ bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* messag
   return BUSHD_OK;
 }
 
-bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
+bushd_status bushd_mcu_take_table_end(bushd_mcu* mcu, const bushd_table_end* message) {
   if (!has_bank(mcu, message->bank)) return BUSHD_E_FORMAT;
   bushd_mcu_table* entry = entry_of(mcu, message->bank);
   const uint16_t count = count_of(&entry->table);
@@ -138,7 +138,7 @@ const bushd_table* bushd_mcu_checked_table(const bushd_mcu* mcu, uint8_t bank) {
                                     : &mcu->tables.bank[bank].table;
 }
 
-bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message) {
+bushd_status bushd_mcu_take_assign(bushd_mcu* mcu, const bushd_assign* message) {
   if (!bushd_mcu_has_output(mcu, message->motor)) return BUSHD_E_FORMAT;
   if (bushd_mcu_engaged(mcu) & motor_bit(message->motor)) return BUSHD_E_STATE;
   const bushd_mcu_table* entry = &mcu->tables.bank[message->bank];

@@ -39,9 +39,6 @@ typedef struct bushd_mcu_scratch {
   bushd_run_tick run_tick;  // in its terms
 } bushd_mcu_scratch;
 
-bushd_status bushd_mcu_table_begin(bushd_mcu* mcu, const bushd_table_begin* message);
-bushd_status bushd_mcu_table_data(bushd_mcu* mcu, const bushd_table_data* message);
-bushd_status bushd_mcu_table_end(bushd_mcu* mcu, const bushd_table_end* message);
 // The one in this bank; NULL if none has come whole. Precondition: bank <= BUSHD_SCRATCH_BANK.
 const bushd_table* bushd_mcu_checked_table(const bushd_mcu* mcu, uint8_t bank);
 // Whether those in this bank are codes as they are written.
@@ -54,7 +51,6 @@ static inline bool bushd_mcu_is_written(const bushd_mcu_scratch* scratch, uint8_
   return false;
 #endif
 }
-bushd_status bushd_mcu_assign(bushd_mcu* mcu, const bushd_assign* message);
 bushd_tables bushd_mcu_tables(const bushd_mcu* mcu);
 void bushd_mcu_forget_tables(bushd_mcu* mcu);
 

@@ -29,7 +29,6 @@ typedef struct bushd_mcu_travel {
   uint32_t due_ns;
 } bushd_mcu_travel;
 
-bushd_status bushd_mcu_take_travel(bushd_mcu* mcu, const bushd_travel* message);
 // The same for a program, from the tick on that is prepared next. What silence and faults end is
 // the program's affair. Precondition: its number is 0, and the motor is the program's, and rests.
 bushd_status bushd_mcu_begin_travel(bushd_mcu* mcu, const bushd_travel* message);

@@ -44,7 +44,7 @@ static void await_edge(bushd_mcu* mcu, uint16_t motors, uint8_t number, bushd_ed
   mcu->port.set_trigger(mcu->port.context, bushd_mcu_edge_of_pin(mcu, edge));
 }
 
-bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
+bushd_status bushd_mcu_take_trigger(bushd_mcu* mcu, const bushd_trigger* message) {
   if (mcu->port.set_trigger == NULL) return BUSHD_E_UNKNOWN_MESSAGE;
   if (message->edge == BUSHD_EDGE_NONE) {
     if (mcu->trigger.armed != 0) bushd_mcu_disarm(mcu, BUSHD_TRIGGER_DISARMED);
@@ -74,7 +74,7 @@ bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message) {
   return BUSHD_OK;
 }
 
-bushd_status bushd_mcu_arm_line(bushd_mcu* mcu, const bushd_line_trigger* message) {
+bushd_status bushd_mcu_take_line_trigger(bushd_mcu* mcu, const bushd_line_trigger* message) {
   if (message->number == mcu->trigger.number) return BUSHD_OK;  // as above
   if (!may_arm(mcu)) return BUSHD_E_STATE;
   uint16_t motors;

@@ -19,8 +19,6 @@ typedef struct bushd_mcu_trigger_input {
   uint32_t start_ns;
 } bushd_mcu_trigger_input;
 
-bushd_status bushd_mcu_arm(bushd_mcu* mcu, const bushd_trigger* message);
-bushd_status bushd_mcu_arm_line(bushd_mcu* mcu, const bushd_line_trigger* message);
 // The edge that armed motors wait for (bushd_mcu_trigger).
 void bushd_mcu_begin_armed(bushd_mcu* mcu, int32_t time_in_tick_ns);
 // The port knows nothing of inputs that are inverted.

@@ -36,7 +36,7 @@ static bool has_room(const bushd_mcu* mcu, int32_t most) {
   return mcu->tick_ns / period_ns + 1u <= mcu->emission.grid.max_steps;
 }
 
-bushd_status bushd_mcu_take_velocity(bushd_mcu* mcu, const bushd_set_velocity* message) {
+bushd_status bushd_mcu_take_set_velocity(bushd_mcu* mcu, const bushd_set_velocity* message) {
   const uint8_t m = message->motor;
   if (!bushd_mcu_has_output(mcu, m)) return BUSHD_E_FORMAT;
   if (m >= mcu->config.velocity_motors) return message->most == 0 ? BUSHD_OK : BUSHD_E_FORMAT;

@@ -34,7 +34,6 @@ typedef struct bushd_mcu_velocity {
 } bushd_mcu_velocity;
 #define BUSHD_MAX_VELOCITY_MOTORS 4u
 
-bushd_status bushd_mcu_take_velocity(bushd_mcu* mcu, const bushd_set_velocity* message);
 // Another tick or emission has other room for steps: they must be set again.
 void bushd_mcu_forget_velocities(bushd_mcu* mcu);
 bool bushd_mcu_has_velocity(const bushd_mcu* mcu, uint8_t m);

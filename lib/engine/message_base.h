@@ -17,40 +17,65 @@ extern "C" {
 #define BUSHD_UNIQUE_ID_SIZE 8u
 #define BUSHD_REPLY_UNIT_NS 10000u  // of times at which an answer shall begin
 
-typedef enum bushd_type {
-  BUSHD_MSG_IDENTIFY = 0x01,      // bushd_identify -> reply: bushd_identity, in a reply window
-  BUSHD_MSG_CONFIGURE = 0x02,     // bushd_configure -> acknowledgement
-  BUSHD_MSG_TABLE_BEGIN = 0x03,   // bushd_table_begin -> acknowledgement
-  BUSHD_MSG_TABLE_DATA = 0x04,    // bushd_table_data -> acknowledgement
-  BUSHD_MSG_TABLE_END = 0x05,     // bushd_table_end -> acknowledgement
-  BUSHD_MSG_ASSIGN = 0x06,        // bushd_assign -> acknowledgement
-  BUSHD_MSG_CONTROL = 0x07,       // bushd_control -> acknowledgement
-  BUSHD_MSG_SET_POSITION = 0x08,  // bushd_set_position -> acknowledgement
-  BUSHD_MSG_POLL = 0x09,          // bushd_poll, broadcast -> a bushd_report of each MCU it names
-  BUSHD_MSG_SYNC = 0x0A,   // bushd_sync, broadcast, no reply; its time is the end of the frame
-  BUSHD_MSG_TICKS = 0x0B,  // bushd_ticks, no reply: its effect shows in the next report
-  BUSHD_MSG_TABLE_TICKS = 0x0C,  // bushd_table_ticks, no reply
-  BUSHD_MSG_TABLE_RUN = 0x0D,    // bushd_table_run, no reply
-  BUSHD_MSG_EMERGENCY = 0x0E,    // bushd_emergency, no reply
-  BUSHD_MSG_SET_ADDRESS = 0x0F,  // bushd_set_address, broadcast -> acknowledgement of the one MCU
-  BUSHD_MSG_TABLES = 0x10,       // empty -> reply: bushd_tables
-  BUSHD_MSG_INPUTS = 0x11,       // bushd_set_inputs -> acknowledgement
-  BUSHD_MSG_EMISSION = 0x12,     // bushd_emission -> acknowledgement
-  BUSHD_MSG_HOME = 0x13,         // bushd_home -> acknowledgement; how it goes is told by reports
-  BUSHD_MSG_LOCAL = 0x14,        // bushd_local -> acknowledgement
-  BUSHD_MSG_TRIGGER = 0x15,      // bushd_trigger -> acknowledgement
-  BUSHD_MSG_POSITION_COMPARE = 0x16,  // bushd_position_compare -> acknowledgement
-  BUSHD_MSG_MOTOR_INPUTS = 0x17,      // bushd_motor_inputs -> acknowledgement
-  BUSHD_MSG_LINE_RUN = 0x18,          // bushd_line_run, no reply
-  BUSHD_MSG_TRAVEL = 0x19,        // bushd_travel -> acknowledgement; how it goes is told by reports
-  BUSHD_MSG_CURRENTS = 0x1A,      // bushd_currents -> acknowledgement
-  BUSHD_MSG_LINE_TRIGGER = 0x1B,  // bushd_line_trigger -> acknowledgement
-  BUSHD_MSG_VELOCITY = 0x1C,      // bushd_set_velocity -> acknowledgement
-  BUSHD_MSG_OUTPUTS = 0x1D,       // bushd_set_outputs -> acknowledgement
-  BUSHD_MSG_PROGRAM_PUT = 0x1E,   // bushd_program_put -> acknowledgement
-  BUSHD_MSG_PROGRAM = 0x1F,       // bushd_program_control -> acknowledgement
-  BUSHD_MSG_PROGRAM_STATE = 0x20  // empty -> reply: bushd_program_state
-} bushd_type;
+// All messages that a master sends. MESSAGE(TYPE, number, kind, needs): its type is
+// BUSHD_MSG_<TYPE>, its payload a bushd_<kind>; an MCU that lacks one of the capabilities `needs`
+// (engine/message_setup.h) does not know it.
+//
+// One MCU does it, or refuses to, and answers with a bushd_acknowledgement.
+#define BUSHD_ACKNOWLEDGED(MESSAGE)                                                 \
+  MESSAGE(CONFIGURE, 0x02, configure, 0)                                            \
+  MESSAGE(TABLE_BEGIN, 0x03, table_begin, 0)                                        \
+  MESSAGE(TABLE_DATA, 0x04, table_data, 0)                                          \
+  MESSAGE(TABLE_END, 0x05, table_end, 0)                                            \
+  MESSAGE(ASSIGN, 0x06, assign, 0)                                                  \
+  MESSAGE(CONTROL, 0x07, control, 0)                                                \
+  MESSAGE(SET_POSITION, 0x08, set_position, 0)                                      \
+  MESSAGE(INPUTS, 0x11, set_inputs, 0)                                              \
+  MESSAGE(EMISSION, 0x12, emission, 0)                                              \
+  MESSAGE(HOME, 0x13, home, BUSHD_CAN_HOME)                                         \
+  MESSAGE(LOCAL, 0x14, local, BUSHD_CAN_LOCAL)                                      \
+  MESSAGE(TRIGGER, 0x15, trigger, 0)                                                \
+  MESSAGE(POSITION_COMPARE, 0x16, position_compare, BUSHD_CAN_POSITION_COMPARE)     \
+  MESSAGE(MOTOR_INPUTS, 0x17, motor_inputs, BUSHD_CAN_MOTOR_INPUTS)                 \
+  MESSAGE(TRAVEL, 0x19, travel, BUSHD_CAN_TRAVEL)                                   \
+  MESSAGE(CURRENTS, 0x1A, currents, BUSHD_CAN_CURRENTS)                             \
+  MESSAGE(LINE_TRIGGER, 0x1B, line_trigger, BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRIGGER) \
+  MESSAGE(VELOCITY, 0x1C, set_velocity, BUSHD_CAN_VELOCITY)                         \
+  MESSAGE(OUTPUTS, 0x1D, set_outputs, 0)
+#define BUSHD_ACKNOWLEDGED_OF_PROGRAMS(MESSAGE)              \
+  MESSAGE(PROGRAM_PUT, 0x1E, program_put, BUSHD_CAN_PROGRAM) \
+  MESSAGE(PROGRAM, 0x1F, program_control, BUSHD_CAN_PROGRAM)
+// Motion for one MCU. Nobody answers: what comes of it is told by the next reports.
+#define BUSHD_STREAMED(MESSAGE)                                  \
+  MESSAGE(TICKS, 0x0B, ticks, 0)                                 \
+  MESSAGE(TABLE_TICKS, 0x0C, table_ticks, BUSHD_CAN_TABLE_TICKS) \
+  MESSAGE(TABLE_RUN, 0x0D, table_run, BUSHD_CAN_TABLE_RUN)       \
+  MESSAGE(LINE_RUN, 0x18, line_run, BUSHD_CAN_LINE_RUN)
+// Each has its own way:
+// IDENTIFY       -> a bushd_identity, in a reply window
+// POLL           broadcast -> a bushd_report of each MCU that it names
+// SYNC           broadcast, without reply; its time is the end of the frame
+// EMERGENCY      without reply
+// SET_ADDRESS    broadcast -> acknowledgement of the one MCU
+// TABLES         without payload -> bushd_tables
+// PROGRAM_STATE  without payload -> bushd_program_state
+#define BUSHD_SPECIAL(MESSAGE)               \
+  MESSAGE(IDENTIFY, 0x01, identify, 0)       \
+  MESSAGE(POLL, 0x09, poll, 0)               \
+  MESSAGE(SYNC, 0x0A, sync, 0)               \
+  MESSAGE(EMERGENCY, 0x0E, emergency, 0)     \
+  MESSAGE(SET_ADDRESS, 0x0F, set_address, 0) \
+  MESSAGE(TABLES, 0x10, get_tables, 0)       \
+  MESSAGE(PROGRAM_STATE, 0x20, get_program_state, BUSHD_CAN_PROGRAM)
+#define BUSHD_MESSAGES(MESSAGE)           \
+  BUSHD_ACKNOWLEDGED(MESSAGE)             \
+  BUSHD_ACKNOWLEDGED_OF_PROGRAMS(MESSAGE) \
+  BUSHD_STREAMED(MESSAGE)                 \
+  BUSHD_SPECIAL(MESSAGE)
+
+#define BUSHD_TYPE_OF(type, number, kind, needs) BUSHD_MSG_##type = (number),
+typedef enum bushd_type { BUSHD_MESSAGES(BUSHD_TYPE_OF) } bushd_type;
+#undef BUSHD_TYPE_OF
 // A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.
 
 typedef enum bushd_state {
