@@ -29,14 +29,14 @@ enum class Op : std::uint8_t {
   kControl,   // mcu, actions
   kPort,      // lost and opened again
   kReconfigure,
-  kTableRun,         // mcu, motor, ticks later
-  kEmergency,        // how
-  kHome,             // mcu, motor, u16 steps
-  kArm,              // mcu, mask, u16 us
-  kDisarm,           // mcu
-  kStarted,          // mcu, motor, ticks later: the trigger has come
-  kPositionCompare,  // mcu, motor, arrivals
-  kProgram,          // mcu, what, u16
+  kTableRun,   // mcu, motor, ticks later
+  kEmergency,  // how
+  kHome,       // mcu, motor, u16 steps
+  kArm,        // mcu, mask, u16 us
+  kDisarm,     // mcu
+  kStarted,    // mcu, motor, ticks later: the trigger has come
+  kRequest,    // mcu, motor, arrivals: for all that the MCU only acknowledges
+  kProgram,    // mcu, what, u16
   kCount
 };
 
@@ -106,11 +106,11 @@ void position_compare(Bus& bus, Input& input) {
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const auto arrivals = static_cast<std::uint8_t>(input.u8() % 4u);
   if (!bus.online(mcu) || !bus.master().can(mcu, BUSHD_CAN_POSITION_COMPARE)) return;
-  bus.master().position_compare(mcu, {.motor = motor,
-                                      .arrivals = arrivals,
-                                      .position_steps = 70,
-                                      .delay_us = 100,
-                                      .width_us = 40});
+  bus.master().ask(mcu, link::request_of(bushd_position_compare{.motor = motor,
+                                                                .arrivals = arrivals,
+                                                                .position_steps = 70,
+                                                                .delay_us = 100,
+                                                                .width_us = 40}));
 }
 
 void home(Bus& bus, Input& input) {
@@ -202,7 +202,7 @@ void run_op(Op op, Bus& bus, Input& input) {
     }
     case Op::kStarted:
       return started(bus, input);
-    case Op::kPositionCompare:
+    case Op::kRequest:
       return position_compare(bus, input);
     case Op::kProgram:
       return program(bus, input);

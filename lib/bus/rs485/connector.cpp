@@ -89,7 +89,7 @@ void Connector::add_control(McuIndex mcu, std::uint8_t actions) {
     if (view.bound_by_stop) message.faults |= BUSHD_FAULT_EMERGENCY;
     if (message.faults == 0) message.actions ^= BUSHD_CONTROL_CLEAR_FAULTS;
   }
-  links_[mcu].queue.control(message);
+  links_[mcu].queue.ask(message);
 }
 
 void Connector::emergency_stop(bushd_stop_mode mode) {
@@ -130,7 +130,7 @@ void Connector::tell_local(McuIndex mcu) {
   local.motors &= static_cast<std::uint16_t>(~link.not_local);
   local.keypad &= static_cast<std::uint16_t>(~link.not_local);
   link.not_local_told = link.not_local;
-  link.queue.local(local);
+  link.queue.ask(local);
 }
 
 // The others have their turns first. Only one that has not answered before costs the bus a
@@ -199,13 +199,13 @@ bool Connector::send_stop(std::int64_t now_us) {
   return false;
 }
 
-const SetupQueue::Request* Connector::next_request(std::int64_t now_us, McuIndex mcu) {
+const Request* Connector::next_request(std::int64_t now_us, McuIndex mcu) {
   Link& link = links_[mcu];
   if (!link.queue.empty()) return &link.queue.front();
   return link.program.has_request(now_us) ? &link.program.ask(now_us) : nullptr;
 }
 
-const SetupQueue::Request* Connector::next_part(McuIndex mcu) {
+const Request* Connector::next_part(McuIndex mcu) {
   Link& link = links_[mcu];
   if (link.scratch.under_way()) return &link.scratch.ask();
   return link.program.has_part() ? &link.program.ask_part() : nullptr;
@@ -217,7 +217,7 @@ bool Connector::send_request(std::int64_t now_us) {
 }
 
 bool Connector::send_program_stop(std::int64_t now_us) {
-  return send_first(now_us, program_turn_, [&](McuIndex mcu) -> const SetupQueue::Request* {
+  return send_first(now_us, program_turn_, [&](McuIndex mcu) -> const Request* {
     ProgramLink& program = links_[mcu].program;
     return program.is_urgent(now_us) ? &program.ask(now_us) : nullptr;
   });
@@ -228,7 +228,7 @@ bool Connector::send_first(std::int64_t now_us, std::size_t& turn, Next next) {
   for (std::size_t n = 0; n < mcus_.size(); ++n) {
     const McuIndex i{(turn + n) % mcus_.size()};
     if (mcus_[i].view.phase == McuPhase::kOffline) continue;
-    const SetupQueue::Request* request = next(i);
+    const Request* request = next(i);
     if (request == nullptr) continue;
     turn = i.value + 1;
     transactions_.ask(now_us, {.mcu = i,
@@ -300,18 +300,18 @@ void Connector::write_configuration(McuIndex mcu) {
   const McuRecord& record = mcus_[mcu];
   SetupQueue& queue = links_[mcu].queue;
   // What a master before this one has armed nobody here knows of.
-  if (record.view.report.armed != 0) queue.disarm();
-  queue.configure({.tick_ns = setup_.tick_ns,
-                   .format = setup_.format,
-                   .comm_timeout_ticks = static_cast<std::uint16_t>(
-                       std::min<std::int64_t>(comm_timeout_ticks, UINT16_MAX))});
+  if (record.view.report.armed != 0) queue.ask(disarming());
+  queue.ask(bushd_configure{.tick_ns = setup_.tick_ns,
+                            .format = setup_.format,
+                            .comm_timeout_ticks = static_cast<std::uint16_t>(
+                                std::min<std::int64_t>(comm_timeout_ticks, UINT16_MAX))});
   // Neither is taken where STEP would rest high and windings be driven.
   const bool phases = record.setup.emission.settings.mode == BUSHD_EMISSION_PHASES;
-  if (!phases) queue.emission(record.setup.emission.settings);
+  if (!phases) queue.ask(record.setup.emission.settings);
   if ((record.view.identity.capabilities & BUSHD_CAN_OUTPUTS) != 0) {
-    queue.outputs(record.setup.outputs);
+    queue.ask(record.setup.outputs);
   }
-  if (phases) queue.emission(record.setup.emission.settings);
+  if (phases) queue.ask(record.setup.emission.settings);
 }
 
 // What comes after depends on the tables that the MCU has already.
@@ -319,14 +319,14 @@ void Connector::write_setup(McuIndex mcu) {
   write_configuration(mcu);
   const McuRecord& record = mcus_[mcu];
   SetupQueue& queue = links_[mcu].queue;
-  queue.inputs(record.setup.inputs);
-  for (const bushd_motor_inputs& one : record.setup.motor_inputs) queue.motor_inputs(one);
+  queue.ask(record.setup.inputs);
+  for (const bushd_motor_inputs& one : record.setup.motor_inputs) queue.ask(one);
   // An MCU may have kept others.
   if ((record.view.identity.capabilities & BUSHD_CAN_CURRENTS) != 0) {
-    for (const bushd_currents& one : record.setup.currents) queue.currents(one);
+    for (const bushd_currents& one : record.setup.currents) queue.ask(one);
   }
   if ((record.view.identity.capabilities & BUSHD_CAN_VELOCITY) != 0) {
-    for (const bushd_set_velocity& one : record.setup.velocities) queue.velocity(one);
+    for (const bushd_set_velocity& one : record.setup.velocities) queue.ask(one);
   }
   queue.ask_for_tables();
   links_[mcu].setup_written = true;
@@ -352,13 +352,13 @@ void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
   if (!queue.done(BUSHD_MSG_TABLES)) return;
   if (links_[mcu].adopts) return adopt_tables(mcu, held, may_clear);
   if (!holds_its_tables(mcu, held)) {
-    queue.control({.actions = BUSHD_CONTROL_FORGET_TABLES, .faults = 0});
+    queue.ask(bushd_control{.actions = BUSHD_CONTROL_FORGET_TABLES, .faults = 0});
     for (std::uint8_t bank = 0; bank < record.setup.tables.size(); ++bank) {
       queue.upload_table(bank, record.setup.tables[bank]);
     }
   }
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-    if (const auto bank = record.setup.table_of_motor[m]) queue.assign(m, *bank);
+    if (const auto bank = record.setup.table_of_motor[m]) queue.ask(bushd_assign{m, *bank});
   }
   tell_local(mcu);
   add_control(mcu, first_actions(mcu, may_clear));

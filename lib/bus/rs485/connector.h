@@ -135,8 +135,8 @@ class Connector {
   };
 
   // The request that is to be sent next; null if there is none.
-  const SetupQueue::Request* next_request(std::int64_t now_us, McuIndex mcu);
-  const SetupQueue::Request* next_part(McuIndex mcu);
+  const Request* next_request(std::int64_t now_us, McuIndex mcu);
+  const Request* next_part(McuIndex mcu);
   template <class Next>
   bool send_first(std::int64_t now_us, std::size_t& turn, Next next);
   void take(std::int64_t now_us, McuIndex mcu, const bushd_identity& identity);

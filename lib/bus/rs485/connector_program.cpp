@@ -78,7 +78,7 @@ void Connector::adopt_tables(McuIndex mcu, const bushd_tables& held, bool may_cl
   const std::uint16_t motors = links_[mcu].program.view().state.motors;
   for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
     const auto bank = mcus_[mcu].setup.table_of_motor[m];
-    if (bank && (motors >> m & 1) == 0) links_[mcu].queue.assign(m, *bank);
+    if (bank && (motors >> m & 1) == 0) links_[mcu].queue.ask(bushd_assign{m, *bank});
   }
   tell_local(mcu);
   const unsigned clear = first_actions(mcu, may_clear) & unsigned{BUSHD_CONTROL_CLEAR_FAULTS};

@@ -351,7 +351,6 @@ BusSnapshot Rs485Master::snapshot(std::int64_t now_us) const {
 
 std::uint8_t Rs485Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                               std::span<const Armed> moves) {
-  look_again();
   McuRecord& record = mcus_[mcu];
   std::vector<bushd_table_run_entry> entries;
   for (const Armed& move : moves) {
@@ -361,45 +360,43 @@ std::uint8_t Rs485Master::arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay
   std::sort(entries.begin(), entries.end(),
             [](const auto& a, const auto& b) { return a.motor < b.motor; });
   const std::uint8_t number = next_trigger_number(record);
-  connector_.queue(mcu).arm(number, edge, delay_us, entries);
+  ask(mcu, request_of(BUSHD_MSG_TRIGGER, [&](std::uint8_t* to) {
+        return bushd_encode_trigger(number, edge, delay_us, entries.data(),
+                                    static_cast<std::uint8_t>(entries.size()), to);
+      }));
   return number;
 }
 
 std::uint8_t Rs485Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                                    std::span<const ArmedOnLine> parts) {
-  look_again();
   std::vector<bushd_line_entry> entries;
   for (const auto& [motor, run] : parts) {
     entries.push_back({motor, static_cast<std::int8_t>(run.direction), run.increment});
   }
   std::ranges::sort(entries, {}, &bushd_line_entry::motor);
   const std::uint8_t number = next_trigger_number(mcus_[mcu]);
-  connector_.queue(mcu).arm_line({.number = number,
-                                  .edge = edge,
-                                  .delay_us = delay_us,
-                                  .line = line_part_of(parts.front().run)},
-                                 entries);
+  const bushd_line_trigger message = {.number = number,
+                                      .edge = edge,
+                                      .delay_us = delay_us,
+                                      .line = line_part_of(parts.front().run)};
+  ask(mcu, request_of(BUSHD_MSG_LINE_TRIGGER, [&](std::uint8_t* to) {
+        return bushd_encode_line_trigger(&message, entries.data(),
+                                         static_cast<std::uint8_t>(entries.size()), to);
+      }));
   return number;
 }
 
 std::uint8_t Rs485Master::travel(McuIndex mcu, bushd_travel message) {
-  look_again();
   message.number = next_trigger_number(mcus_[mcu]);
-  connector_.queue(mcu).travel(message);
+  ask(mcu, request_of(message));
   return message.number;
 }
 
 void Rs485Master::end_travel(McuIndex mcu, std::uint8_t motor) {
-  look_again();
   bushd_travel message{};
   message.kind = BUSHD_TRAVEL_NONE;
   message.motor = motor;
-  connector_.queue(mcu).travel(message);
-}
-
-void Rs485Master::position_compare(McuIndex mcu, const bushd_position_compare& message) {
-  look_again();
-  connector_.queue(mcu).position_compare(message);
+  ask(mcu, request_of(message));
 }
 
 // Time for each order, one of them said again, and its motors' rest.
@@ -422,11 +419,6 @@ Tick Rs485Master::earliest_program_start(std::int64_t now_us,
 void Rs485Master::stop_program(McuIndex mcu, bushd_stop_mode mode) {
   look_again();
   if (mcus_[mcu].view.phase != McuPhase::kOffline) connector_.program(mcu).stop(mode);
-}
-
-void Rs485Master::set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) {
-  look_again();
-  connector_.queue(mcu).set_position(motor, position_steps);
 }
 
 void Rs485Master::emergency_stop(bushd_stop_mode mode) {

@@ -52,7 +52,7 @@ class Rs485Master final : public BusMaster,
                           public Trigger,
                           public Travel,
                           public LocalInputs,
-                          public PositionCompare,
+                          public Requests,
                           public Programs,
                           private Transactions::Listener,
                           private Connector::Listener {
@@ -70,7 +70,7 @@ class Rs485Master final : public BusMaster,
             .trigger = this,
             .travel = this,
             .local_inputs = this,
-            .position_compare = this,
+            .requests = this,
             .programs = this};
   }
 
@@ -102,10 +102,7 @@ class Rs485Master final : public BusMaster,
   Tick earliest_start(std::int64_t now_us, McuIndex mcu, std::uint8_t motor) const override;
   CommonStart earliest_common_start(std::int64_t now_us,
                                     std::span<const ToBegin> together) const override;
-  void confirm_start(Tick at) override {
-    look_again();
-    streams_.confirm_start(at);
-  }
+  void confirm_start(Tick at) override { streams().confirm_start(at); }
   LineLoad line_load(std::span<const ToBegin> more) const override;
   void start_missed() override {
     look_again();
@@ -126,31 +123,24 @@ class Rs485Master final : public BusMaster,
   bool has_time_to_retarget(std::int64_t now_us, McuIndex mcu) const override;
   void begin(McuIndex mcu, std::uint8_t motor, Tick start) override;
   void replace(McuIndex mcu, std::uint16_t motors, Tick first) override;
-  void drop(McuIndex mcu, std::uint8_t motor) override {
-    look_again();
-    streams_.drop(mcu, motor);
-  }
+  void drop(McuIndex mcu, std::uint8_t motor) override { streams().drop(mcu, motor); }
   // Within two ticks of hearing it.
   void emergency_stop(bushd_stop_mode mode) override;
   void bind_to_stop(McuIndex mcu, bushd_stop_mode mode) override;
-  void enable_no_more() override {
-    look_again();
-    connector_.enable_no_more();
-  }
+  void enable_no_more() override { connector().enable_no_more(); }
 
   void reconfigure(McuIndex mcu, McuSetup setup) override;
   Result<void> check_room(McuIndex mcu, const McuSetup& setup) const override;
   // Sent as soon as the line allows.
-  void control(McuIndex mcu, std::uint8_t actions) override {
-    look_again();
-    connector_.control(mcu, actions);
+  void control(McuIndex mcu, std::uint8_t actions) override { connector().control(mcu, actions); }
+  void set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) override {
+    ask(mcu, request_of(bushd_set_position{motor, position_steps}));
   }
-  void set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) override;
+  void ask(McuIndex mcu, Request request) override {
+    connector().queue(mcu).ask(std::move(request));
+  }
 
-  void home(McuIndex mcu, const bushd_home& message) override {
-    look_again();
-    connector_.queue(mcu).home(message);
-  }
+  void home(McuIndex mcu, const bushd_home& message) override { ask(mcu, request_of(message)); }
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
   bool can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                     bool alone) const override;
@@ -163,8 +153,7 @@ class Rs485Master final : public BusMaster,
   std::optional<std::uint8_t> bank_of(McuIndex mcu, const bushd_table& table) const override;
   bool can_upload(McuIndex mcu, const bushd_table& table) const override;
   void upload(McuIndex mcu, const bushd_table& table) override {
-    look_again();
-    connector_.scratch(mcu).upload(table);
+    connector().scratch(mcu).upload(table);
   }
   bool uploads(McuIndex mcu) const override { return connector_.scratch(mcu).under_way(); }
   void end_upload(McuIndex mcu) override;
@@ -172,43 +161,27 @@ class Rs485Master final : public BusMaster,
                    std::span<const Armed> moves) override;
   std::uint8_t arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                         std::span<const ArmedOnLine> parts) override;
-  void disarm(McuIndex mcu) override {
-    look_again();
-    connector_.queue(mcu).disarm();
-  }
+  void disarm(McuIndex mcu) override { ask(mcu, disarming()); }
   void follow_run(McuIndex mcu, std::uint8_t motor, Tick start, const McuRun& run) override;
   std::uint8_t travel(McuIndex mcu, bushd_travel message) override;
   void end_travel(McuIndex mcu, std::uint8_t motor) override;
   void inhibit_local(McuIndex mcu, std::uint16_t motors) override {
-    look_again();
-    connector_.inhibit_local(mcu, motors);
+    connector().inhibit_local(mcu, motors);
   }
-  void position_compare(McuIndex mcu, const bushd_position_compare& message) override;
   BusSnapshot snapshot(std::int64_t now_us) const override;
 
   const ProgramView& program(McuIndex mcu) const override { return connector_.program(mcu).view(); }
   void put_program(McuIndex mcu, std::vector<std::uint8_t> bytes) override {
-    look_again();
-    connector_.program(mcu).put(std::move(bytes));
+    connector().program(mcu).put(std::move(bytes));
   }
-  void erase_program(McuIndex mcu) override {
-    look_again();
-    connector_.program(mcu).erase();
-  }
+  void erase_program(McuIndex mcu) override { connector().program(mcu).erase(); }
   Tick earliest_program_start(std::int64_t now_us, std::span<const McuIndex> mcus) const override;
   void run_program(McuIndex mcu, std::uint8_t number, Tick start) override {
-    look_again();
-    connector_.program(mcu).run(number, start);
+    connector().program(mcu).run(number, start);
   }
   void stop_program(McuIndex mcu, bushd_stop_mode mode) override;
-  void pause_program(McuIndex mcu) override {
-    look_again();
-    connector_.program(mcu).pause();
-  }
-  void resume_program(McuIndex mcu) override {
-    look_again();
-    connector_.program(mcu).resume();
-  }
+  void pause_program(McuIndex mcu) override { connector().program(mcu).pause(); }
+  void resume_program(McuIndex mcu) override { connector().program(mcu).resume(); }
 
  private:
   bool answered(std::int64_t now_us, const Transactions::Answer& answer) override;
@@ -224,6 +197,15 @@ class Rs485Master final : public BusMaster,
 
   // Something has come by which step() may have more to do.
   void look_again() { due_us_ = INT64_MIN; }
+  // For what may give step() more to do.
+  Connector& connector() {
+    look_again();
+    return connector_;
+  }
+  StreamScheduler& streams() {
+    look_again();
+    return streams_;
+  }
   std::int64_t wake_us() const;
   void notice_standing_still(std::int64_t now_us);
   void handle_report(std::int64_t now_us, const Transactions::Answer& answer,

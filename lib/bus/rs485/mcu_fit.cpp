@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bus/bus_times.h"
+#include "bus/rs485/request.h"
 #include "engine/velocity.h"
 
 namespace bushd::link {
@@ -156,6 +157,22 @@ Result<void> check_inputs(const McuSetup& setup, const bushd_identity& identity)
               at(setup, SetupKey::kMotorInputs, setup.motor_inputs[0].motor));
 }
 
+const char* remedy_if_too_much(std::uint8_t type) {
+  switch (type) {
+    case BUSHD_MSG_CONFIGURE:
+      return "use a longer tick_us on its bus";
+    case BUSHD_MSG_TABLE_BEGIN:
+    case BUSHD_MSG_TABLE_DATA:
+    case BUSHD_MSG_TABLE_END:
+    case BUSHD_MSG_ASSIGN:
+      return "use shorter or slower tables, or fewer on this MCU";
+    case BUSHD_MSG_VELOCITY:
+      return "use a lower max_steps_per_s in `velocity`";
+    default:
+      return nullptr;
+  }
+}
+
 }  // namespace
 
 std::size_t codes_of(const bushd_table& table) {
@@ -220,32 +237,11 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
     return "VELOCITY: only its first motors have the velocity loop; leave out `velocity` of the "
            "others, or connect them to the first outputs";
   }
-  struct Request {
-    std::uint8_t type;
-    const char* name;
-    const char* if_too_much;  // remedy
-  };
-  constexpr const char* kTables = "use shorter or slower tables, or fewer on this MCU";
-  static constexpr std::array<Request, 11> kRequests = {{
-      {BUSHD_MSG_CONFIGURE, "CONFIGURE", "use a longer tick_us on its bus"},
-      {BUSHD_MSG_TABLE_BEGIN, "TABLE_BEGIN", kTables},
-      {BUSHD_MSG_TABLE_DATA, "TABLE_DATA", kTables},
-      {BUSHD_MSG_TABLE_END, "TABLE_END", kTables},
-      {BUSHD_MSG_ASSIGN, "ASSIGN", kTables},
-      {BUSHD_MSG_OUTPUTS, "OUTPUTS", nullptr},
-      {BUSHD_MSG_INPUTS, "INPUTS", nullptr},
-      {BUSHD_MSG_MOTOR_INPUTS, "MOTOR_INPUTS", nullptr},
-      {BUSHD_MSG_LOCAL, "LOCAL", nullptr},
-      {BUSHD_MSG_CURRENTS, "CURRENTS", nullptr},
-      {BUSHD_MSG_VELOCITY, "VELOCITY", "use a lower max_steps_per_s in `velocity`"},
-  }};
-  const auto* const request =
-      std::find_if(kRequests.begin(), kRequests.end(),
-                   [type](const Request& candidate) { return candidate.type == type; });
-  const bool known = request != kRequests.end();
-  const bool too_much = known && status == BUSHD_E_CAPACITY && request->if_too_much != nullptr;
-  return (known ? std::string(request->name) + ": " : std::string()) + bushd_status_text(status) +
-         "; " + (too_much ? request->if_too_much : fieldbus::remedy_of(status));
+  const std::string name = name_of_request(type);
+  const char* const if_too_much = remedy_if_too_much(type);
+  const bool too_much = status == BUSHD_E_CAPACITY && if_too_much != nullptr;
+  return (name.empty() ? name : name + ": ") + bushd_status_text(status) + "; " +
+         (too_much ? if_too_much : fieldbus::remedy_of(status));
 }
 
 }  // namespace bushd::link

@@ -14,6 +14,7 @@
 #include "bus/rs485/mcu_index.h"
 #include "bus/rs485/pulse_port.h"
 #include "bus/rs485/rehearsal.h"
+#include "bus/rs485/request.h"
 #include "bus/rs485/table_run.h"
 #include "bus/rs485/tick.h"
 #include "engine/message.h"
@@ -145,12 +146,12 @@ class LocalInputs {
   virtual void inhibit_local(McuIndex mcu, std::uint16_t motors) = 0;
 };
 
-// BUSHD_CAN_POSITION_COMPARE
-class PositionCompare {
+// Messages that an MCU acknowledges, and that need nothing else of the bus. Precondition: the MCU
+// has the capabilities that the message needs.
+class Requests {
  public:
-  virtual ~PositionCompare() = default;
-  // When the MCU's position compare output pulses from now on.
-  virtual void position_compare(McuIndex mcu, const bushd_position_compare& message) = 0;
+  virtual ~Requests() = default;
+  virtual void ask(McuIndex mcu, Request request) = 0;
 };
 
 // Motors make their parts of a line's run with motors of other buses that offer this, each by
@@ -221,7 +222,7 @@ struct Offers {
   Trigger* trigger = nullptr;
   Travel* travel = nullptr;
   LocalInputs* local_inputs = nullptr;
-  PositionCompare* position_compare = nullptr;
+  Requests* requests = nullptr;
   PacedLines* paced_lines = nullptr;
   Programs* programs = nullptr;
 };

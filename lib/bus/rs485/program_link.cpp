@@ -22,13 +22,9 @@ bool is_kept(std::uint8_t flags) {
   return (flags & BUSHD_PROGRAM_KEPT) != 0;
 }
 
-SetupQueue::Request control(bushd_program_action action, std::uint8_t number, std::uint32_t value) {
-  const bushd_program_control message = {
-      .action = static_cast<std::uint8_t>(action), .number = number, .value = value};
-  SetupQueue::Request request{.type = BUSHD_MSG_PROGRAM,
-                              .payload = std::vector<std::uint8_t>(BUSHD_FRAME_MAX_PAYLOAD)};
-  request.payload.resize(bushd_encode_program_control(&message, request.payload.data()));
-  return request;
+Request control(bushd_program_action action, std::uint8_t number, std::uint32_t value) {
+  return request_of(bushd_program_control{
+      .action = static_cast<std::uint8_t>(action), .number = number, .value = value});
 }
 
 }  // namespace
@@ -49,10 +45,7 @@ void ProgramLink::put(std::vector<std::uint8_t> bytes) {
                                     .total = static_cast<std::uint16_t>(bytes.size()),
                                     .count = count,
                                     .bytes = bytes.data() + at};
-    Request request{.type = BUSHD_MSG_PROGRAM_PUT,
-                    .payload = std::vector<std::uint8_t>(BUSHD_FRAME_MAX_PAYLOAD)};
-    request.payload.resize(bushd_encode_program_put(&part, request.payload.data()));
-    upload_.push_back(std::move(request));
+    upload_.push_back(request_of(part));
   }
   const std::uint32_t crc = ~bushd_crc32(BUSHD_CRC32_START, bytes.data(), bytes.size());
   upload_.push_back(control(BUSHD_PROGRAM_COMMIT, 0, crc));
@@ -130,7 +123,7 @@ std::int64_t ProgramLink::due_us() const {
   return news ? view_.heard_us + kStatePeriodUs : INT64_MAX;
 }
 
-const ProgramLink::Request& ProgramLink::ask(std::int64_t now_us) {
+const Request& ProgramLink::ask(std::int64_t now_us) {
   if (orders_.empty()) {
     asked_ = 0;
     return question_;
@@ -140,7 +133,7 @@ const ProgramLink::Request& ProgramLink::ask(std::int64_t now_us) {
   return orders_.front().request;
 }
 
-const ProgramLink::Request& ProgramLink::ask_part() {
+const Request& ProgramLink::ask_part() {
   asked_ = upload_serial_;
   return upload_.front();
 }

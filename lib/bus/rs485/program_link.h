@@ -13,15 +13,13 @@
 #include <vector>
 
 #include "bus/rs485/offers.h"
-#include "bus/rs485/setup_queue.h"
+#include "bus/rs485/request.h"
 #include "engine/message.h"
 
 namespace bushd::link {
 
 class ProgramLink {
  public:
-  using Request = SetupQueue::Request;
-
   const ProgramView& view() const { return view_; }
   // The view tells what is so now: nothing has been asked since that could have changed it.
   bool settled() const { return view_.known && !wanted_ && orders_.empty(); }

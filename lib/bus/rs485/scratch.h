@@ -20,9 +20,9 @@ class Scratch {
 
   bool under_way() const { return !requests_.empty(); }
   // The next request. Precondition: one is under way.
-  const SetupQueue::Request& front() const { return requests_.front(); }
+  const Request& front() const { return requests_.front(); }
   // The same: it is being sent now.
-  const SetupQueue::Request& ask() {
+  const Request& ask() {
     asked_ = true;
     return front();
   }

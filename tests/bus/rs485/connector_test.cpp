@@ -281,7 +281,7 @@ TEST_F(Connecting, RefusalEndsTheSetupAndOfAnOnlineMcuIsOnlyTold) {
   EXPECT_TRUE(connector.queue(kFirst).empty());
   story.clear();
   mcus[kFirst].view.phase = McuPhase::kOnline;
-  connector.queue(kFirst).control({.actions = BUSHD_CONTROL_ENABLE, .faults = 0});
+  connector.queue(kFirst).ask(bushd_control{.actions = BUSHD_CONTROL_ENABLE, .faults = 0});
   connector.acknowledged(0, kFirst, BUSHD_MSG_CONTROL, BUSHD_E_STATE);
   EXPECT_EQ(story, "refused ");
   EXPECT_TRUE(connector.queue(kFirst).empty());
@@ -290,9 +290,9 @@ TEST_F(Connecting, RefusalEndsTheSetupAndOfAnOnlineMcuIsOnlyTold) {
 // What others have asked of it is not lost when it gets another setup, and comes before that.
 TEST_F(Connecting, ReconfiguringKeepsWhatElseWasAsked) {
   mcus[kFirst].view.phase = McuPhase::kOnline;
-  connector.queue(kFirst).inputs({});
-  connector.queue(kFirst).set_position(2, -77);
-  connector.queue(kFirst).position_compare({});
+  connector.queue(kFirst).ask(bushd_set_inputs{});
+  connector.queue(kFirst).ask(bushd_set_position{2, -77});
+  connector.queue(kFirst).ask(bushd_position_compare{});
   connector.control(kFirst, BUSHD_CONTROL_DISABLE);
   ASSERT_TRUE(connector.reconfigure(kFirst, mcus[kFirst].setup));
   connector.follow_report(0, kFirst, true);
@@ -305,7 +305,7 @@ TEST_F(Connecting, ReconfiguringKeepsWhatElseWasAsked) {
 
 TEST_F(Connecting, ARefusalOfWhatElseWasAskedIsNoneOfTheSetup) {
   mcus[kFirst].view.phase = McuPhase::kOnline;
-  connector.queue(kFirst).set_position(2, -77);
+  connector.queue(kFirst).ask(bushd_set_position{2, -77});
   ASSERT_TRUE(connector.reconfigure(kFirst, mcus[kFirst].setup));
   connector.acknowledged(0, kFirst, BUSHD_MSG_SET_POSITION, BUSHD_E_STATE);
   EXPECT_EQ(story, "refused ");

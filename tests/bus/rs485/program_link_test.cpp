@@ -22,7 +22,7 @@ bushd_program_state state_of(bushd_program_stage stage) {
 // The action of the order that is sent now; -1: it is the question, -2: nothing.
 int next_action(ProgramLink& link, std::int64_t now_us = kNow) {
   if (!link.has_request(now_us)) return -2;
-  const ProgramLink::Request& request = link.ask(now_us);
+  const Request& request = link.ask(now_us);
   return request.type == BUSHD_MSG_PROGRAM_STATE ? -1 : request.payload[0];
 }
 
@@ -40,7 +40,7 @@ TEST(ProgramLink, PutsPartsInOrderAndCommits) {
   std::vector<std::uint8_t> taken;
   for (const std::size_t put : {243u, 486u, 500u}) {
     ASSERT_TRUE(link.has_part());
-    const ProgramLink::Request request = link.ask_part();
+    const Request request = link.ask_part();
     ASSERT_EQ(request.type, BUSHD_MSG_PROGRAM_PUT);
     EXPECT_EQ(bushd_get_u16(&request.payload[0]), taken.size());
     EXPECT_EQ(bushd_get_u16(&request.payload[2]), 500);
@@ -51,7 +51,7 @@ TEST(ProgramLink, PutsPartsInOrderAndCommits) {
     EXPECT_TRUE(link.view().uploading);
   }
   EXPECT_EQ(taken, bytes);
-  const ProgramLink::Request commit = link.ask_part();
+  const Request commit = link.ask_part();
   ASSERT_EQ(commit.type, BUSHD_MSG_PROGRAM);
   EXPECT_EQ(commit.payload[0], BUSHD_PROGRAM_COMMIT);
   EXPECT_EQ(bushd_get_u32(&commit.payload[2]), ~bushd_crc32(BUSHD_CRC32_START, bytes.data(), 500));
