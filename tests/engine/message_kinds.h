@@ -1,10 +1,15 @@
-// A message seen from outside, for the tests of all of them.
-#ifndef BUSHD_TESTS_ENGINE_MESSAGE_KINDS_H
-#define BUSHD_TESTS_ENGINE_MESSAGE_KINDS_H
+// A message seen from outside, for the tests of all of them: how a payload looks, what the engine
+// makes of one, and what is promised of what it takes. (Which byte is which field is pinned by the
+// golden frames of tests/vectors.)
+#pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <functional>
+#include <initializer_list>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,12 +19,64 @@
 namespace bushd::test {
 
 using Bytes = std::vector<uint8_t>;
+constexpr int64_t kLastMotor = BUSHD_MOTORS_PER_MCU - 1;
 
-// A message seen from outside: how its payload looks, and what the engine makes of one. (Which byte
-// is which field is pinned by the golden frames of tests/vectors.)
+// The fields of a decoded message: as text, in the notation of tests/vectors/frames.csv, and
+// whether each is as engine/message.h promises.
+class Fields {
+ public:
+  explicit Fields(std::span<const uint8_t> payload) : payload_(payload) {}
+
+  template <class T>
+  Fields& add(const char* name, T value) {
+    return add_text(name, std::to_string(static_cast<int64_t>(value)));
+  }
+  template <class T>
+  Fields& add(const char* name, T value, int64_t least, int64_t most) {
+    promise(static_cast<int64_t>(value) >= least && static_cast<int64_t>(value) <= most);
+    return add(name, value);
+  }
+  // `count` numbers of `width` bytes (1, 2).
+  Fields& add_list(const char* name, const uint8_t* data, size_t count, size_t width);
+  // The message has them where they are in the payload.
+  Fields& add_part(const char* name, const uint8_t* data, size_t count, size_t width) {
+    promise_inside(data, count * width);
+    return kept_ ? add_list(name, data, count, width) : *this;
+  }
+  Fields& add_text(const char* name, const std::string& value);
+  Fields& promise(bool kept) {
+    kept_ = kept_ && kept;
+    return *this;
+  }
+  Fields& promise_inside(const uint8_t* data, size_t size) {
+    return promise(data >= payload_.data() && data + size <= payload_.data() + payload_.size());
+  }
+
+  const std::string& text() const { return text_; }
+  bool kept() const { return kept_; }
+
+ private:
+  std::span<const uint8_t> payload_;
+  std::string text_;
+  bool kept_ = true;
+};
+
+// The numbers of one element of a list, and such a list.
+std::string parts(std::initializer_list<int64_t> values);
+void append(std::string* list, const std::string& element);
+
+// What is made of a payload.
+struct Decoded {
+  bushd_status status = BUSHD_OK;
+  // If it is taken:
+  Bytes again;        // by the encoder
+  std::string text;   // " motor=3 ...": its fields
+  bool kept = false;  // it is as promised
+};
+
 struct Kind {
   std::function<Bytes()> any;  // a valid payload
-  std::function<bushd_status(const Bytes&, Bytes*)> decode_encode;
+  std::function<Decoded(std::span<const uint8_t>)> decode;
   struct Bad {
     std::string what;
     std::function<void(Bytes*)> spoil;
@@ -29,25 +86,41 @@ struct Kind {
   bool open_ended = false;
 };
 
+// By name: that of the payload (bushd_<name>), or get_tables, get_program_state, which have none.
 using Kinds = std::map<std::string, Kind>;
+const Kinds& message_kinds();
 Kinds setup_kinds();
 Kinds motion_kinds();
+Kinds run_kinds();
+Kinds stream_kinds();
+Kinds report_kinds();
 Kinds program_kinds();
 
 bushd_run_state any_run_state();
+std::vector<uint8_t> some_motors();
 
-// `encode` writes the message to a payload of the largest size, and returns its own.
+// `encode` writes the message to a payload of the largest size, and returns its own; `tell` tells
+// its fields. Decoding begins with `before`: else with bytes of which none may be left in a message
+// that is taken.
 template <class Message, class Encode>
 auto codec(bushd_status (*decode)(const uint8_t*, size_t, Message*), Encode encode,
-           Message message = {}) {
-  return [=](const Bytes& payload, Bytes* again) {
-    Message decoded = message;
-    const bushd_status status = decode(payload.data(), payload.size(), &decoded);
-    if (status == BUSHD_OK) {
-      again->resize(BUSHD_FRAME_MAX_PAYLOAD);
-      again->resize(encode(&decoded, again->data()));
-    }
-    return status;
+           void (*tell)(const Message&, Fields&), const Message* before = nullptr) {
+  return [=](std::span<const uint8_t> payload) {
+    Message message;
+    std::memset(static_cast<void*>(&message), 0xA5, sizeof message);
+    if (before != nullptr) message = *before;
+    Decoded decoded;
+    decoded.status = decode(payload.data(), payload.size(), &message);
+    if (decoded.status != BUSHD_OK) return decoded;
+    Fields fields(payload);
+    tell(message, fields);
+    decoded.text = fields.text();
+    decoded.kept = fields.kept();
+    // What is not as promised no encoder has to bear.
+    if (!decoded.kept) return decoded;
+    decoded.again.resize(BUSHD_FRAME_MAX_PAYLOAD);
+    decoded.again.resize(encode(&message, decoded.again.data()));
+    return decoded;
   };
 }
 
@@ -73,6 +146,23 @@ inline auto set16(size_t at, uint16_t value) {
 inline auto set32(size_t at, uint32_t value) {
   return [=](Bytes* payload) { bushd_put_u32(payload->data() + at, value); };
 }
+// With this entry alone behind a header of that size.
+inline std::function<void(Bytes*)> entry_alone(size_t header, Bytes entry) {
+  return [header, entry = std::move(entry)](Bytes* p) {
+    p->resize(header);
+    p->insert(p->end(), entry.begin(), entry.end());
+  };
+}
+inline auto cut_to(size_t size) {
+  return [=](Bytes* payload) { payload->resize(size); };
+}
+
+// The entries of a decoded message.
+template <class Entry>
+std::vector<Entry> entries_of(const uint8_t* at, uint8_t count, Entry (*next)(const uint8_t**)) {
+  std::vector<Entry> entries;
+  for (uint8_t i = 0; i < count; ++i) entries.push_back(next(&at));
+  return entries;
+}
 
 }  // namespace bushd::test
-#endif

@@ -4,6 +4,23 @@
 namespace bushd::test {
 namespace {
 
+void tell(const bushd_program_put& m, Fields& f) {
+  f.add("offset", m.offset).add("total", m.total).add_part("bytes", m.bytes, m.count, 1);
+  f.promise(m.count >= 1 && uint32_t{m.offset} + m.count <= m.total);
+}
+
+void tell(const bushd_program_control& m, Fields& f) {
+  f.add("action", m.action).add("number", m.number).add("value", m.value);
+  f.promise((m.number != 0) == (m.action == BUSHD_PROGRAM_RUN));
+}
+
+void tell(const bushd_program_state& m, Fields& f) {
+  f.add("stage", m.stage).add("reason", m.reason).add("number", m.number).add("flags", m.flags);
+  f.add("motors", m.motors).add("memory", m.memory).add("size", m.size).add("crc", m.crc);
+  f.add("frame", m.frame).add("point", m.point).add("repeats", m.repeats);
+  f.add("start_tick", m.start_tick).add("tick", m.tick);
+}
+
 // The last part: with a byte more it would lead beyond the end.
 Bytes any_program_put() {
   const auto count = between<uint16_t>(1, BUSHD_PROGRAM_PUT_MAX);
@@ -32,10 +49,13 @@ Bytes any_program_control() {
 
 Kinds program_kinds() {
   return {{"program_put",
-           {any_program_put, codec(bushd_decode_program_put, bushd_encode_program_put), {}, true}},
+           {any_program_put,
+            codec(bushd_decode_program_put, bushd_encode_program_put, tell),
+            {},
+            true}},
           {"program_control",
            {any_program_control,
-            codec(bushd_decode_program_control, bushd_encode_program_control),
+            codec(bushd_decode_program_control, bushd_encode_program_control, tell),
             {{"action 6", set8(0, 6)},
              {"a run without a number",
               [](Bytes* p) {
@@ -68,7 +88,7 @@ Kinds program_kinds() {
                          bushd_put_u16(&(*p)[6], memory);
                          bushd_put_u16(&(*p)[8], between<uint16_t>(0, memory));
                        }),
-            codec(bushd_decode_program_state, bushd_encode_program_state),
+            codec(bushd_decode_program_state, bushd_encode_program_state, tell),
             {{"stage 9", set8(0, 9)},
              {"reason 12", set8(1, 12)},
              {"more than it has memory", [](Bytes* p) {

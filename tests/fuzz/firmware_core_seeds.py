@@ -8,7 +8,11 @@ operations change: an input that the MCU refuses from its first frame on reaches
 """
 import pathlib
 import struct
+import sys
 import zlib
+
+sys.path.append(str(pathlib.Path(__file__).parents[1] / "vectors"))
+from messages import FRAMES, LAYOUTS, payload_of  # noqa: E402
 
 CORPORA = pathlib.Path(__file__).parent / "corpus"
 TICK_NS = 2_560_000
@@ -178,7 +182,11 @@ REPLACEMENT = ticks(REPLACE | FINE, 4, 1, (0,), (128, 64), epoch=1)
 
 # The limits of motor 0 are the inputs 0 and 1.
 SHUTTER = inputs(positive=1, negative=1) + frame(MOTOR_INPUTS, bytes([0, 0, 1, 0]))
+REPLY = 0x80
+GOLDEN = [(LAYOUTS[name][0], payload_of(LAYOUTS[name][1], fields)) for _, _, name, fields in FRAMES]
 SEEDS = {
+    "golden-frames": ready(0) + b"".join(frame(type_, payload) + passes(1) for type_, payload in GOLDEN
+                                         if type_ < REPLY) + passes(15) + poll(7),
     "noise": noise(bytes(range(256))[:200]),
     "identify": frame(IDENTIFY, struct.pack("<HBH", 7, 4, 100), True),
     "ready-coarse": ready(0),
