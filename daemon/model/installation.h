@@ -109,7 +109,9 @@ class Mcu {
   bool can_run_slowly() const { return can(BUSHD_CAN_SLOW_RUNS); }
   bool can_trigger() const { return can(BUSHD_CAN_TRIGGER); }
   bool can_arm_lines() const { return can_trigger() && can(BUSHD_CAN_LINE_RUN); }
-  bool can_compare_positions() const { return can(BUSHD_CAN_POSITION_COMPARE); }
+  bool can_compare_positions() const {
+    return offers.requests != nullptr && can(BUSHD_CAN_POSITION_COMPARE);
+  }
   bool can_travel() const { return can(BUSHD_CAN_TRAVEL); }
   bool can_home() const { return can(BUSHD_CAN_HOME); }
   bool can_have_program() const { return offers.programs != nullptr && can(BUSHD_CAN_PROGRAM); }

@@ -32,8 +32,7 @@ void PositionCompare::request(std::int64_t now_us, const api::Asker& asker,
   if (!motor) return asker.answer(api::Refused{motor.error().text()});
   Mcu& mcu = installation_.mcu_of(*motor);
   open_.emplace_back(asker, std::vector{mcu.id}, now_us);
-  mcu.offers.requests->ask(mcu.on_bus(),
-                           link::request_of(message_of(request, installation_[*motor])));
+  mcu.offers.requests->ask(mcu.on_bus(), message_of(request, installation_[*motor]));
 }
 
 Result<MotorId> PositionCompare::check(const api::PositionCompare& request) const {

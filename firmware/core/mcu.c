@@ -146,10 +146,17 @@ void bushd_mcu_prepare(bushd_mcu* mcu) {
 // What a line or an adapter has kept back, or made twice, must not undo what was asked later: a
 // position, drivers that were switched off, a start that was planned anew. Emergency stops always
 // count, SYNCs have ids of their own, and questions change nothing.
-#define OR_IT_IS(type_of, number, kind, needs) || type == BUSHD_MSG_##type_of
 static bool counts_in_order_only(uint8_t type) {
-  return type == BUSHD_MSG_SET_ADDRESS BUSHD_ACKNOWLEDGED(OR_IT_IS)
-                     BUSHD_ACKNOWLEDGED_OF_PROGRAMS(OR_IT_IS) BUSHD_STREAMED(OR_IT_IS);
+  switch (type) {
+    case BUSHD_MSG_SET_ADDRESS:
+      BUSHD_SETUP_REQUESTS(BUSHD_CASE)
+      BUSHD_MOTION_REQUESTS(BUSHD_CASE)
+      BUSHD_PROGRAM_REQUESTS(BUSHD_CASE)
+      BUSHD_STREAMED(BUSHD_CASE)
+      return true;
+    default:
+      return false;
+  }
 }
 
 // The master counts its frames in their sequences. So one whose sequence is the newest or one of

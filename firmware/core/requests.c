@@ -9,12 +9,9 @@
 #include "firmware/core/emission.h"
 #include "firmware/core/inputs.h"
 #include "firmware/core/local.h"
-#include "firmware/core/owner.h"
 #include "firmware/core/program.h"
 #include "firmware/core/report.h"
 #include "firmware/core/state.h"
-#include "firmware/core/stop.h"
-#include "firmware/core/stream.h"
 #include "firmware/core/sync.h"
 #include "firmware/core/tables.h"
 #include "firmware/core/velocity.h"
@@ -205,8 +202,7 @@ static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, int32_t 
   return status;
 }
 
-// Decodes into a local and hands it to the function that acts; a decoding error is the answer as it
-// is.
+// Decodes the payload and passes it on; a decoding error is the status as it is.
 #define TAKE(kind)                                                               \
   do {                                                                           \
     bushd_##kind message;                                                        \
@@ -218,19 +214,32 @@ static bushd_status hear_sync(bushd_mcu* mcu, const bushd_frame* frame, int32_t 
   case BUSHD_MSG_##type:                     \
     TAKE(kind);
 
-// What an MCU is told of without answering it.
+// What nobody answers.
 static bushd_status hear(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns) {
   switch (frame->type) {
     case BUSHD_MSG_SYNC:
       return hear_sync(mcu, frame, time_in_tick_ns);
+    case BUSHD_MSG_EMERGENCY:
+      TAKE(emergency);
       BUSHD_STREAMED(CASE_TAKE)
     default:
-      TAKE(emergency);
+      return BUSHD_E_UNKNOWN_MESSAGE;
   }
 }
 
-// What a frame of this type asks for is beyond the port without one of these. Modes of emission
-// have statuses of their own.
+static bool is_answered(uint8_t type) {
+  switch (type) {
+    case BUSHD_MSG_SYNC:
+    case BUSHD_MSG_EMERGENCY:
+      BUSHD_STREAMED(BUSHD_CASE)
+      return false;
+    default:
+      return true;
+  }
+}
+
+// The capabilities without which a message of this type is unknown. Modes of emission have
+// statuses of their own.
 #define CASE_NEEDS(type, number, kind, needs) \
   case BUSHD_MSG_##type:                      \
     return needs;
@@ -240,11 +249,6 @@ static uint32_t capability_of(uint8_t type) {
     default:
       return 0;
   }
-}
-
-#define OR_IT_IS(type_of, number, kind, needs) || type == BUSHD_MSG_##type_of
-static bool is_answered(uint8_t type) {
-  return !(type == BUSHD_MSG_SYNC || type == BUSHD_MSG_EMERGENCY BUSHD_STREAMED(OR_IT_IS));
 }
 
 static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t time_in_tick_ns,
@@ -259,9 +263,10 @@ static bushd_status handle(bushd_mcu* mcu, const bushd_frame* frame, int32_t tim
       return answer_set_address(mcu, frame, a);
     case BUSHD_MSG_TABLES:
       return answer_tables(mcu, frame, a);
-      BUSHD_ACKNOWLEDGED(CASE_TAKE)
+      BUSHD_SETUP_REQUESTS(CASE_TAKE)
+      BUSHD_MOTION_REQUESTS(CASE_TAKE)
 #if BUSHD_PROGRAMS
-      BUSHD_ACKNOWLEDGED_OF_PROGRAMS(CASE_TAKE)
+      BUSHD_PROGRAM_REQUESTS(CASE_TAKE)
     case BUSHD_MSG_PROGRAM_STATE:
       return answer_program_state(mcu, frame, a);
 #endif

@@ -29,11 +29,14 @@ typedef struct bushd_mcu_answer {
   uint32_t delay_ns;
 } bushd_mcu_answer;
 
-// What a message asks for, in the module that it concerns. The status is the answer.
+// bushd_mcu_take_home(mcu, message), and so on: what a message asks for is done, or refused by the
+// status. Each is in the source that its message is about (homing.c); those that are about the MCU
+// as a whole are in requests.c.
 #define BUSHD_MCU_TAKE(type, number, kind, needs) \
   bushd_status bushd_mcu_take_##kind(bushd_mcu* mcu, const bushd_##kind* message);
-BUSHD_ACKNOWLEDGED(BUSHD_MCU_TAKE)
-BUSHD_ACKNOWLEDGED_OF_PROGRAMS(BUSHD_MCU_TAKE)
+BUSHD_SETUP_REQUESTS(BUSHD_MCU_TAKE)
+BUSHD_MOTION_REQUESTS(BUSHD_MCU_TAKE)
+BUSHD_PROGRAM_REQUESTS(BUSHD_MCU_TAKE)
 BUSHD_STREAMED(BUSHD_MCU_TAKE)
 #undef BUSHD_MCU_TAKE
 bushd_status bushd_mcu_take_emergency(bushd_mcu* mcu, const bushd_emergency* message);

@@ -17,32 +17,37 @@ extern "C" {
 #define BUSHD_UNIQUE_ID_SIZE 8u
 #define BUSHD_REPLY_UNIT_NS 10000u  // of times at which an answer shall begin
 
-// All messages that a master sends. MESSAGE(TYPE, number, kind, needs): its type is
-// BUSHD_MSG_<TYPE>, its payload a bushd_<kind>; an MCU that lacks one of the capabilities `needs`
-// (engine/message_setup.h) does not know it.
+// All messages that a master sends: MESSAGE(TYPE, number, kind, needs). Its type is
+// BUSHD_MSG_<TYPE>, its payload a bushd_<kind>. An MCU without one of the capabilities `needs`
+// (engine/message_setup.h) answers that it does not know the message. TRIGGER and OUTPUTS need
+// none here: the MCU refuses the one by itself, and each takes the other. The next free number is
+// 0x21.
 //
-// One MCU does it, or refuses to, and answers with a bushd_acknowledgement.
-#define BUSHD_ACKNOWLEDGED(MESSAGE)                                                 \
-  MESSAGE(CONFIGURE, 0x02, configure, 0)                                            \
-  MESSAGE(TABLE_BEGIN, 0x03, table_begin, 0)                                        \
-  MESSAGE(TABLE_DATA, 0x04, table_data, 0)                                          \
-  MESSAGE(TABLE_END, 0x05, table_end, 0)                                            \
-  MESSAGE(ASSIGN, 0x06, assign, 0)                                                  \
-  MESSAGE(CONTROL, 0x07, control, 0)                                                \
-  MESSAGE(SET_POSITION, 0x08, set_position, 0)                                      \
-  MESSAGE(INPUTS, 0x11, set_inputs, 0)                                              \
-  MESSAGE(EMISSION, 0x12, emission, 0)                                              \
-  MESSAGE(HOME, 0x13, home, BUSHD_CAN_HOME)                                         \
-  MESSAGE(LOCAL, 0x14, local, BUSHD_CAN_LOCAL)                                      \
-  MESSAGE(TRIGGER, 0x15, trigger, 0)                                                \
-  MESSAGE(POSITION_COMPARE, 0x16, position_compare, BUSHD_CAN_POSITION_COMPARE)     \
-  MESSAGE(MOTOR_INPUTS, 0x17, motor_inputs, BUSHD_CAN_MOTOR_INPUTS)                 \
-  MESSAGE(TRAVEL, 0x19, travel, BUSHD_CAN_TRAVEL)                                   \
-  MESSAGE(CURRENTS, 0x1A, currents, BUSHD_CAN_CURRENTS)                             \
-  MESSAGE(LINE_TRIGGER, 0x1B, line_trigger, BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRIGGER) \
-  MESSAGE(VELOCITY, 0x1C, set_velocity, BUSHD_CAN_VELOCITY)                         \
+// One MCU does what these say, or refuses it, and acknowledges (bushd_acknowledgement); a list
+// for each purpose. How HOME and TRAVEL go on is told by reports.
+#define BUSHD_SETUP_REQUESTS(MESSAGE)                               \
+  MESSAGE(CONFIGURE, 0x02, configure, 0)                            \
+  MESSAGE(TABLE_BEGIN, 0x03, table_begin, 0)                        \
+  MESSAGE(TABLE_DATA, 0x04, table_data, 0)                          \
+  MESSAGE(TABLE_END, 0x05, table_end, 0)                            \
+  MESSAGE(ASSIGN, 0x06, assign, 0)                                  \
+  MESSAGE(CONTROL, 0x07, control, 0)                                \
+  MESSAGE(INPUTS, 0x11, set_inputs, 0)                              \
+  MESSAGE(EMISSION, 0x12, emission, 0)                              \
+  MESSAGE(LOCAL, 0x14, local, BUSHD_CAN_LOCAL)                      \
+  MESSAGE(MOTOR_INPUTS, 0x17, motor_inputs, BUSHD_CAN_MOTOR_INPUTS) \
+  MESSAGE(CURRENTS, 0x1A, currents, BUSHD_CAN_CURRENTS)             \
+  MESSAGE(VELOCITY, 0x1C, set_velocity, BUSHD_CAN_VELOCITY)         \
   MESSAGE(OUTPUTS, 0x1D, set_outputs, 0)
-#define BUSHD_ACKNOWLEDGED_OF_PROGRAMS(MESSAGE)              \
+#define BUSHD_MOTION_REQUESTS(MESSAGE)                                          \
+  MESSAGE(SET_POSITION, 0x08, set_position, 0)                                  \
+  MESSAGE(HOME, 0x13, home, BUSHD_CAN_HOME)                                     \
+  MESSAGE(TRIGGER, 0x15, trigger, 0)                                            \
+  MESSAGE(POSITION_COMPARE, 0x16, position_compare, BUSHD_CAN_POSITION_COMPARE) \
+  MESSAGE(TRAVEL, 0x19, travel, BUSHD_CAN_TRAVEL)                               \
+  MESSAGE(LINE_TRIGGER, 0x1B, line_trigger, BUSHD_CAN_LINE_RUN | BUSHD_CAN_TRIGGER)
+// Apart, since not every firmware has them (BUSHD_PROGRAMS).
+#define BUSHD_PROGRAM_REQUESTS(MESSAGE)                      \
   MESSAGE(PROGRAM_PUT, 0x1E, program_put, BUSHD_CAN_PROGRAM) \
   MESSAGE(PROGRAM, 0x1F, program_control, BUSHD_CAN_PROGRAM)
 // Motion for one MCU. Nobody answers: what comes of it is told by the next reports.
@@ -51,32 +56,35 @@ extern "C" {
   MESSAGE(TABLE_TICKS, 0x0C, table_ticks, BUSHD_CAN_TABLE_TICKS) \
   MESSAGE(TABLE_RUN, 0x0D, table_run, BUSHD_CAN_TABLE_RUN)       \
   MESSAGE(LINE_RUN, 0x18, line_run, BUSHD_CAN_LINE_RUN)
-// Each has its own way:
-// IDENTIFY       -> a bushd_identity, in a reply window
+// Handled one by one:
+// SYNC           broadcast; its time is the end of the frame; nobody answers
+// EMERGENCY      to one or to all; nobody answers
+// IDENTIFY       -> bushd_identity, in a reply window
 // POLL           broadcast -> a bushd_report of each MCU that it names
-// SYNC           broadcast, without reply; its time is the end of the frame
-// EMERGENCY      without reply
 // SET_ADDRESS    broadcast -> acknowledgement of the one MCU
 // TABLES         without payload -> bushd_tables
 // PROGRAM_STATE  without payload -> bushd_program_state
 #define BUSHD_SPECIAL(MESSAGE)               \
-  MESSAGE(IDENTIFY, 0x01, identify, 0)       \
-  MESSAGE(POLL, 0x09, poll, 0)               \
   MESSAGE(SYNC, 0x0A, sync, 0)               \
   MESSAGE(EMERGENCY, 0x0E, emergency, 0)     \
+  MESSAGE(IDENTIFY, 0x01, identify, 0)       \
+  MESSAGE(POLL, 0x09, poll, 0)               \
   MESSAGE(SET_ADDRESS, 0x0F, set_address, 0) \
   MESSAGE(TABLES, 0x10, get_tables, 0)       \
   MESSAGE(PROGRAM_STATE, 0x20, get_program_state, BUSHD_CAN_PROGRAM)
-#define BUSHD_MESSAGES(MESSAGE)           \
-  BUSHD_ACKNOWLEDGED(MESSAGE)             \
-  BUSHD_ACKNOWLEDGED_OF_PROGRAMS(MESSAGE) \
-  BUSHD_STREAMED(MESSAGE)                 \
+#define BUSHD_MESSAGES(MESSAGE)   \
+  BUSHD_SETUP_REQUESTS(MESSAGE)   \
+  BUSHD_MOTION_REQUESTS(MESSAGE)  \
+  BUSHD_PROGRAM_REQUESTS(MESSAGE) \
+  BUSHD_STREAMED(MESSAGE)         \
   BUSHD_SPECIAL(MESSAGE)
 
+// A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.
 #define BUSHD_TYPE_OF(type, number, kind, needs) BUSHD_MSG_##type = (number),
 typedef enum bushd_type { BUSHD_MESSAGES(BUSHD_TYPE_OF) } bushd_type;
 #undef BUSHD_TYPE_OF
-// A reply has the request's type with BUSHD_TYPE_REPLY set, its sequence and the MCU's address.
+// For a switch by type: BUSHD_STREAMED(BUSHD_CASE) is a case for each of a list.
+#define BUSHD_CASE(type, number, kind, needs) case BUSHD_MSG_##type:
 
 typedef enum bushd_state {
   // Takes no moves yet: not configured, not in step with the bus, or EN is low.

@@ -25,25 +25,12 @@ void append(std::string* list, const std::string& element) {
   *list += (list->empty() ? "" : ":") + element;
 }
 
-namespace {
-
-Decoded decode_nothing(std::span<const uint8_t> payload) {
-  return {
-      .status = payload.empty() ? BUSHD_OK : BUSHD_E_LENGTH, .again = {}, .text = {}, .kept = true};
-}
-
-}  // namespace
-
 const Kinds& message_kinds() {
   static const Kinds all = [] {
     Kinds kinds;
     for (auto some :
          {setup_kinds, motion_kinds, run_kinds, stream_kinds, report_kinds, program_kinds}) {
       kinds.merge(some());
-    }
-    for (const char* question : {"get_tables", "get_program_state"}) {
-      kinds[question] = {
-          .any = [] { return Bytes(); }, .decode = decode_nothing, .out_of_range = {}};
     }
     return kinds;
   }();

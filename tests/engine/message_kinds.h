@@ -1,6 +1,5 @@
-// A message seen from outside, for the tests of all of them: how a payload looks, what the engine
-// makes of one, and what is promised of what it takes. (Which byte is which field is pinned by the
-// golden frames of tests/vectors.)
+// What the tests know of each message: valid payloads, its codec, its fields as text, and their
+// ranges. (Which byte is which field is pinned by the golden frames of tests/vectors.)
 #pragma once
 
 #include <cstddef>
@@ -22,7 +21,7 @@ using Bytes = std::vector<uint8_t>;
 constexpr int64_t kLastMotor = BUSHD_MOTORS_PER_MCU - 1;
 
 // The fields of a decoded message: as text, in the notation of tests/vectors/frames.csv, and
-// whether each is as engine/message.h promises.
+// whether they are in the ranges of engine/message.h.
 class Fields {
  public:
   explicit Fields(std::span<const uint8_t> payload) : payload_(payload) {}
@@ -33,32 +32,36 @@ class Fields {
   }
   template <class T>
   Fields& add(const char* name, T value, int64_t least, int64_t most) {
-    promise(static_cast<int64_t>(value) >= least && static_cast<int64_t>(value) <= most);
-    return add(name, value);
+    add(name, value);
+    return promise(static_cast<int64_t>(value) >= least && static_cast<int64_t>(value) <= most,
+                   name);
   }
   // `count` numbers of `width` bytes (1, 2).
   Fields& add_list(const char* name, const uint8_t* data, size_t count, size_t width);
   // The message has them where they are in the payload.
   Fields& add_part(const char* name, const uint8_t* data, size_t count, size_t width) {
-    promise_inside(data, count * width);
-    return kept_ ? add_list(name, data, count, width) : *this;
+    promise_inside(data, count * width, name);
+    return in_range() ? add_list(name, data, count, width) : *this;
   }
   Fields& add_text(const char* name, const std::string& value);
-  Fields& promise(bool kept) {
-    kept_ = kept_ && kept;
+  // `what`: the field, or what is said of several.
+  Fields& promise(bool kept, const char* what) {
+    if (!kept && out_of_range_.empty()) out_of_range_ = what;
     return *this;
   }
-  Fields& promise_inside(const uint8_t* data, size_t size) {
-    return promise(data >= payload_.data() && data + size <= payload_.data() + payload_.size());
+  Fields& promise_inside(const uint8_t* data, size_t size, const char* what) {
+    return promise(data >= payload_.data() && data + size <= payload_.data() + payload_.size(),
+                   what);
   }
 
   const std::string& text() const { return text_; }
-  bool kept() const { return kept_; }
+  bool in_range() const { return out_of_range_.empty(); }
+  const std::string& out_of_range() const { return out_of_range_; }  // the first one; "": none
 
  private:
   std::span<const uint8_t> payload_;
   std::string text_;
-  bool kept_ = true;
+  std::string out_of_range_;
 };
 
 // The numbers of one element of a list, and such a list.
@@ -69,13 +72,13 @@ void append(std::string* list, const std::string& element);
 struct Decoded {
   bushd_status status = BUSHD_OK;
   // If it is taken:
-  Bytes again;        // by the encoder
-  std::string text;   // " motor=3 ...": its fields
-  bool kept = false;  // it is as promised
+  std::string text;          // " motor=3 ...": its fields
+  std::string out_of_range;  // the first field that is not as promised; "": none
+  Bytes reencoded;           // by the encoder; empty if a field is out of range
 };
 
 struct Kind {
-  std::function<Bytes()> any;  // a valid payload
+  std::function<Bytes()> valid;  // a payload
   std::function<Decoded(std::span<const uint8_t>)> decode;
   struct Bad {
     std::string what;
@@ -86,7 +89,7 @@ struct Kind {
   bool open_ended = false;
 };
 
-// By name: that of the payload (bushd_<name>), or get_tables, get_program_state, which have none.
+// By the name of the payload (bushd_<name>).
 using Kinds = std::map<std::string, Kind>;
 const Kinds& message_kinds();
 Kinds setup_kinds();
@@ -115,11 +118,10 @@ auto codec(bushd_status (*decode)(const uint8_t*, size_t, Message*), Encode enco
     Fields fields(payload);
     tell(message, fields);
     decoded.text = fields.text();
-    decoded.kept = fields.kept();
-    // What is not as promised no encoder has to bear.
-    if (!decoded.kept) return decoded;
-    decoded.again.resize(BUSHD_FRAME_MAX_PAYLOAD);
-    decoded.again.resize(encode(&message, decoded.again.data()));
+    decoded.out_of_range = fields.out_of_range();
+    if (!fields.in_range()) return decoded;
+    decoded.reencoded.resize(BUSHD_FRAME_MAX_PAYLOAD);
+    decoded.reencoded.resize(encode(&message, decoded.reencoded.data()));
     return decoded;
   };
 }

@@ -1,23 +1,33 @@
-// Messages for motions that an MCU makes by itself, and their end.
+// HOME, TRAVEL, LOCAL, POSITION_COMPARE, EMERGENCY.
 #include "engine/message_kinds.h"
 
 namespace bushd::test {
 namespace {
 
 void tell(const bushd_home& m, Fields& f) {
-  f.add("motor", m.motor, 0, kLastMotor)
-      .add("direction", m.direction)
-      .add("most_steps", m.most_steps, 0, INT32_MAX);
-  f.add("shortest_delay", m.shortest_delay);
-  f.add("slow_steps", m.slow_steps, 1, INT32_MAX).add("slow_delay", m.slow_delay);
+  f.add("motor", m.motor, 0, kLastMotor).add("direction", m.direction, -1, 1);
+  f.promise(m.direction != 0, "direction");
+  f.add("most_steps", m.most_steps, 0, INT32_MAX).add("shortest_delay", m.shortest_delay);
+  f.add("slow_steps", m.slow_steps, 1, INT32_MAX).add("slow_delay", m.slow_delay, 1, UINT32_MAX);
   f.add("position_steps", m.position_steps);
-  f.promise(m.direction * m.direction == 1);
 }
 
 void tell(const bushd_travel& m, Fields& f) {
-  f.add("number", m.number).add("kind", m.kind).add("motor", m.motor);
-  f.add("direction", m.direction).add("edge", m.edge).add("sensor", m.sensor);
-  f.add("steps", m.steps).add("delay_us", m.delay_us).add("wait_us", m.wait_us);
+  f.add("number", m.number).add("kind", m.kind, 0, BUSHD_TRAVEL_LIMITS);
+  f.add("motor", m.motor, 0, kLastMotor).add("direction", m.direction, -1, 1);
+  f.add("edge", m.edge, 0, BUSHD_EDGE_FALLING).add("sensor", m.sensor, 0, 15);
+  f.add("steps", m.steps, 0, INT32_MAX).add("delay_us", m.delay_us, 0, BUSHD_TRIGGER_MAX_DELAY_US);
+  f.add("wait_us", m.wait_us, 0, BUSHD_TRAVEL_MAX_WAIT_US);
+  if (m.kind == BUSHD_TRAVEL_NONE) {
+    f.promise(m.number == 0 && m.steps == 0 && m.wait_us == 0, "something to give up");
+    return;
+  }
+  f.promise(m.number != 0, "number").promise(m.direction != 0, "direction");
+  f.promise(m.steps >= 1, "steps").promise(m.wait_us >= BUSHD_TRAVEL_MIN_WAIT_US, "wait_us");
+  const bool at_edge = m.edge != BUSHD_EDGE_NONE;
+  f.promise(at_edge ? m.delay_us >= BUSHD_TRIGGER_MIN_DELAY_US : m.delay_us == 0, "delay_us");
+  const bool one_step = m.kind == BUSHD_TRAVEL_STEP;
+  f.promise(!one_step || (m.steps == 1 && !at_edge), "a step that is none");
 }
 
 void tell(const bushd_local& m, Fields& f) {
@@ -25,8 +35,11 @@ void tell(const bushd_local& m, Fields& f) {
 }
 
 void tell(const bushd_position_compare& m, Fields& f) {
-  f.add("motor", m.motor).add("arrivals", m.arrivals).add("position_steps", m.position_steps);
-  f.add("delay_us", m.delay_us).add("width_us", m.width_us);
+  f.add("motor", m.motor, 0, kLastMotor);
+  f.add("arrivals", m.arrivals, 0, BUSHD_ARRIVES_POSITIVE | BUSHD_ARRIVES_NEGATIVE);
+  f.add("position_steps", m.position_steps);
+  f.add("delay_us", m.delay_us, 0, BUSHD_POSITION_COMPARE_MAX_DELAY_US);
+  f.add("width_us", m.width_us, 1, BUSHD_POSITION_COMPARE_MAX_WIDTH_US);
 }
 
 void tell(const bushd_emergency& m, Fields& f) {

@@ -1,4 +1,4 @@
-// Messages about programs.
+// PROGRAM_PUT, PROGRAM, PROGRAM_STATE.
 #include "engine/message_kinds.h"
 
 namespace bushd::test {
@@ -6,18 +6,24 @@ namespace {
 
 void tell(const bushd_program_put& m, Fields& f) {
   f.add("offset", m.offset).add("total", m.total).add_part("bytes", m.bytes, m.count, 1);
-  f.promise(m.count >= 1 && uint32_t{m.offset} + m.count <= m.total);
+  f.promise(m.count >= 1 && uint32_t{m.offset} + m.count <= m.total, "count");
 }
 
 void tell(const bushd_program_control& m, Fields& f) {
-  f.add("action", m.action).add("number", m.number).add("value", m.value);
-  f.promise((m.number != 0) == (m.action == BUSHD_PROGRAM_RUN));
+  f.add("action", m.action, 0, BUSHD_PROGRAM_RESUME);
+  f.add("number", m.number).add("value", m.value);
+  f.promise((m.number != 0) == (m.action == BUSHD_PROGRAM_RUN), "number");
+  const bool any = m.action == BUSHD_PROGRAM_COMMIT || m.action == BUSHD_PROGRAM_RUN;
+  const uint32_t most = m.action == BUSHD_PROGRAM_STOP ? BUSHD_STOP_IMMEDIATE : 0;
+  f.promise(any || m.value <= most, "value");
 }
 
 void tell(const bushd_program_state& m, Fields& f) {
-  f.add("stage", m.stage).add("reason", m.reason).add("number", m.number).add("flags", m.flags);
-  f.add("motors", m.motors).add("memory", m.memory).add("size", m.size).add("crc", m.crc);
-  f.add("frame", m.frame).add("point", m.point).add("repeats", m.repeats);
+  f.add("stage", m.stage, 0, BUSHD_PROGRAM_ENDED);
+  f.add("reason", m.reason, 0, BUSHD_PROGRAM_TRAVELLED);
+  f.add("number", m.number).add("flags", m.flags);
+  f.add("motors", m.motors).add("memory", m.memory).add("size", m.size, 0, m.memory);
+  f.add("crc", m.crc).add("frame", m.frame).add("point", m.point).add("repeats", m.repeats);
   f.add("start_tick", m.start_tick).add("tick", m.tick);
 }
 
@@ -83,7 +89,7 @@ Kinds program_kinds() {
            {bytes_with(30,
                        [](Bytes* p) {
                          (*p)[0] = between<uint8_t>(0, 8);
-                         (*p)[1] = between<uint8_t>(0, 10);
+                         (*p)[1] = between<uint8_t>(0, 11);
                          const auto memory = between<uint16_t>(0, UINT16_MAX);
                          bushd_put_u16(&(*p)[6], memory);
                          bushd_put_u16(&(*p)[8], between<uint16_t>(0, memory));

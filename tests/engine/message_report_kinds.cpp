@@ -31,15 +31,16 @@ void tell_sections(const bushd_report& m, Fields& f) {
   }
   if (m.sections & BUSHD_TELLS_AUTONOMOUS) {
     f.add("homed", m.homed).add("homing", m.homing).add("armed", m.armed);
-    f.add("trigger_number", m.trigger_number).add("trigger_state", m.trigger_state);
+    f.add("trigger_number", m.trigger_number)
+        .add("trigger_state", m.trigger_state, 0, BUSHD_TRIGGER_FORBIDDEN);
     f.add("start_tick", m.start_tick).add("start_ns", m.start_ns);
   }
 }
 
 void tell(const bushd_poll& m, Fields& f) {
   f.add("count", m.count, 1, BUSHD_POLL_MAX_ENTRIES);
-  f.promise_inside(m.entries, BUSHD_POLL_ENTRY * m.count);
-  if (!f.kept()) return;
+  f.promise_inside(m.entries, BUSHD_POLL_ENTRY * m.count, "entries");
+  if (!f.in_range()) return;
   std::string entries;
   for (size_t i = 0; i < m.count; ++i) {
     const uint8_t* const at = m.entries + BUSHD_POLL_ENTRY * i;
@@ -53,7 +54,9 @@ void tell(const bushd_report& m, Fields& f) {
       .add("faults", m.faults)
       .add("flags", m.flags)
       .add("epoch", m.epoch);
-  f.add("boot_number", m.boot_number).add("number", m.number).add("sections", m.sections);
+  f.add("boot_number", m.boot_number)
+      .add("number", m.number)
+      .add("sections", m.sections, 0, BUSHD_TELLS_ALL);
   f.add("motors", m.motors).add("moving", m.moving).add("current", m.current);
   f.add("tick", m.tick).add("tick_ns", m.tick_ns);
   tell_sections(m, f);

@@ -1,16 +1,17 @@
-// Messages with runs of tables and of lines, at a tick or by the trigger.
+// TABLE_RUN, LINE_RUN, TRIGGER, LINE_TRIGGER.
 #include "engine/message_kinds.h"
 
 namespace bushd::test {
 namespace {
 
 void tell_entries(const uint8_t* at, uint8_t count, Fields& f) {
-  f.promise(count <= BUSHD_MOTORS_PER_MCU);
+  f.promise(count <= BUSHD_MOTORS_PER_MCU, "count");
   std::string text;
   int last = -1;
   for (const auto& entry : entries_of(at, count, bushd_next_table_run_entry)) {
-    f.promise(entry.motor > last && entry.bank < BUSHD_TABLE_BANKS);
-    f.promise(entry.steps >= 1 && entry.steps <= INT32_MAX);
+    f.promise(entry.motor > last && entry.motor <= kLastMotor, "motor of an entry");
+    f.promise(entry.bank < BUSHD_TABLE_BANKS, "bank of an entry");
+    f.promise(entry.steps >= 1 && entry.steps <= INT32_MAX, "steps of an entry");
     last = entry.motor;
     append(&text, parts({entry.motor, entry.bank, entry.direction, entry.steps,
                          static_cast<int64_t>(entry.shortest_delay)}));
@@ -23,23 +24,24 @@ void tell_line(const bushd_line_part& line, Fields& f) {
       .add("shortest_delay", line.shortest_delay)
       .add("longest", line.longest, 1, INT32_MAX);
   f.add("from", line.from, 0, line.longest).add("steps", line.steps, 1, line.longest - line.from);
-  f.promise(line.bank <= BUSHD_SCRATCH_BANK);
-  f.promise(line.count >= 1 && line.count <= BUSHD_MOTORS_PER_MCU);
+  f.promise(line.bank <= BUSHD_SCRATCH_BANK, "bank");
+  f.promise(line.count >= 1 && line.count <= BUSHD_MOTORS_PER_MCU, "count");
   std::string text;
   uint64_t sum = 0;
   int last = -1;
   for (const auto& entry : entries_of(line.entries, line.count, bushd_next_line_entry)) {
-    f.promise(entry.motor > last && entry.increment >= 1 && entry.increment <= line.longest);
+    f.promise(entry.motor > last && entry.motor <= kLastMotor, "motor of an entry");
+    f.promise(entry.increment >= 1 && entry.increment <= line.longest, "increment");
     last = entry.motor;
     sum += entry.increment;
     append(&text, parts({entry.motor, entry.direction, entry.increment}));
   }
-  f.promise(!line.elementary || (line.from == 0 && sum == line.longest));
+  f.promise(!line.elementary || (line.from == 0 && sum == line.longest), "elementary");
   f.add_text("entries", text);
 }
 
 void tell(const bushd_table_run& m, Fields& f) {
-  f.add("epoch", m.epoch).add("first_tick", m.first_tick).promise(m.count >= 1);
+  f.add("epoch", m.epoch).add("first_tick", m.first_tick).promise(m.count >= 1, "count");
   tell_entries(m.entries, m.count, f);
 }
 
@@ -49,14 +51,18 @@ void tell(const bushd_line_run& m, Fields& f) {
 }
 
 void tell(const bushd_line_trigger& m, Fields& f) {
-  f.promise(m.edge != BUSHD_EDGE_NONE);
-  f.add("number", m.number, 1, UINT8_MAX).add("edge", m.edge).add("delay_us", m.delay_us);
+  f.add("number", m.number, 1, UINT8_MAX).add("edge", m.edge, 1, BUSHD_EDGE_FALLING);
+  f.add("delay_us", m.delay_us, BUSHD_TRIGGER_MIN_DELAY_US, BUSHD_TRIGGER_MAX_DELAY_US);
   tell_line(m.line, f);
 }
 
 void tell(const bushd_trigger& m, Fields& f) {
-  f.promise((m.count == 0) == (m.edge == BUSHD_EDGE_NONE));
-  f.add("number", m.number).add("edge", m.edge).add("delay_us", m.delay_us);
+  const bool disarms = m.edge == BUSHD_EDGE_NONE;
+  f.add("number", m.number, disarms ? 0 : 1, disarms ? 0 : UINT8_MAX);
+  f.add("edge", m.edge, 0, BUSHD_EDGE_FALLING);
+  f.add("delay_us", m.delay_us, disarms ? 0 : BUSHD_TRIGGER_MIN_DELAY_US,
+        disarms ? 0 : BUSHD_TRIGGER_MAX_DELAY_US);
+  f.promise((m.count == 0) == disarms, "count");
   tell_entries(m.entries, m.count, f);
 }
 

@@ -15,9 +15,9 @@ void tell(const bushd_identity& m, Fields& f) {
   f.add("slots", m.slots).add("queue_ticks", m.queue_ticks).add("table_codes", m.table_codes);
   f.add("capabilities", m.capabilities);
   f.add_list("unique_id", m.unique_id, BUSHD_UNIQUE_ID_SIZE, 1);
-  // Of another version no more is told than that.
+  // No more than the version is told of another one.
   const bool known = m.protocol_version == BUSHD_PROTOCOL_VERSION;
-  f.promise(known ? m.motors >= 1 && m.motors <= BUSHD_MOTORS_PER_MCU : m.motors == 0);
+  f.promise(known ? m.motors >= 1 && m.motors <= BUSHD_MOTORS_PER_MCU : m.motors == 0, "motors");
 }
 
 void tell(const bushd_set_address& m, Fields& f) {
@@ -68,7 +68,7 @@ void tell(const bushd_assign& m, Fields& f) {
 void tell(const bushd_control& m, Fields& f) {
   f.add("actions", m.actions, 0, 15);
   if (m.faults != 0) f.add("faults", m.faults);
-  f.promise((m.actions & 3) != 3);
+  f.promise((m.actions & 3) != 3, "actions");
 }
 
 void tell(const bushd_set_position& m, Fields& f) {
@@ -78,11 +78,11 @@ void tell(const bushd_set_position& m, Fields& f) {
 void tell(const bushd_set_inputs& m, Fields& f) {
   f.add("limit_positive", m.limit_positive).add("limit_negative", m.limit_negative);
   f.add("limit_immediate", m.limit_immediate).add("inverted", m.inverted);
-  f.add("debounce_ticks", m.debounce_ticks, 0, BUSHD_MAX_DEBOUNCE_TICKS)
-      .add("system_inverted", m.system_inverted);
-  f.add("emergency", m.emergency, 0, BUSHD_EMERGENCY_INPUT_DISABLE)
-      .add("overcurrent", m.overcurrent);
-  f.add("enable_after_watchdog", m.enable_after_watchdog);
+  f.add("debounce_ticks", m.debounce_ticks, 0, BUSHD_MAX_DEBOUNCE_TICKS);
+  f.add("system_inverted", m.system_inverted, 0, BUSHD_SYSTEM_INPUTS);
+  f.add("emergency", m.emergency, 0, BUSHD_EMERGENCY_INPUT_DISABLE);
+  f.add("overcurrent", m.overcurrent, 0, BUSHD_MAX_CURRENT);
+  f.add("enable_after_watchdog", m.enable_after_watchdog, 0, 1);
 }
 
 void tell(const bushd_set_outputs& m, Fields& f) {
@@ -107,19 +107,21 @@ void tell(const bushd_emission& m, Fields& f) {
 }
 
 void tell(const bushd_currents& m, Fields& f) {
-  f.add("motor", m.motor, 0, kLastMotor)
-      .add("decay", m.decay)
-      .add("ramp_ma", m.ramp_ma, 0, BUSHD_MAX_CURRENT_MA);
-  f.add("cruise_ma", m.cruise_ma).add("hold_ma", m.hold_ma);
-  f.promise((m.cruise_ma == 0) == (m.hold_ma == 0));
+  f.add("motor", m.motor, 0, kLastMotor).add("decay", m.decay, 0, BUSHD_DECAY_FAST);
+  f.add("ramp_ma", m.ramp_ma, 0, BUSHD_MAX_CURRENT_MA);
+  f.add("cruise_ma", m.cruise_ma, 0, BUSHD_MAX_CURRENT_MA);
+  f.add("hold_ma", m.hold_ma, 0, BUSHD_MAX_CURRENT_MA);
+  f.promise((m.cruise_ma == 0) == (m.hold_ma == 0) && (m.cruise_ma == 0) == (m.ramp_ma == 0),
+            "some of the currents are 0");
 }
 
 void tell(const bushd_set_velocity& m, Fields& f) {
-  f.add("motor", m.motor, 0, kLastMotor)
-      .add("least", m.least, 0, m.most)
-      .add("most", m.most, 0, BUSHD_VELOCITY_MOST)
-      .add("acceleration", m.acceleration);
-  f.promise((m.most == 0) == (m.acceleration == 0));
+  f.add("motor", m.motor, 0, kLastMotor).add("least", m.least, 0, m.most);
+  f.add("most", m.most, 0, BUSHD_VELOCITY_MOST);
+  f.add("acceleration", m.acceleration, 0, BUSHD_VELOCITY_MOST);
+  const bool none = m.most == 0;
+  f.promise(none == (m.least == 0) && none == (m.acceleration == 0), "some of the three are 0");
+  f.promise(none || m.least >= BUSHD_VELOCITY_LEAST, "least");
 }
 
 void tell(const bushd_acknowledgement& m, Fields& f) {

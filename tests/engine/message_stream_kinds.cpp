@@ -1,4 +1,4 @@
-// Time, and ticks.
+// SYNC, TICKS, TABLE_TICKS.
 #include <algorithm>
 #include <bit>
 
@@ -46,8 +46,10 @@ size_t width_of(const bushd_ticks& m) {
 void tell(const bushd_ticks& m, Fields& f) {
   f.add("epoch", m.epoch).add("flags", m.flags).add("first_tick", m.first_tick);
   f.add("count", m.count).add("mask", m.mask, 1, UINT16_MAX);
-  f.promise(m.flags < 8 && (m.flags & 6) != 6 && m.motors == std::popcount(m.mask));
-  f.promise(m.count >= 1 && m.count <= bushd_ticks_capacity(m.motors, m.flags & BUSHD_TICKS_FINE));
+  f.promise(m.flags < 8 && (m.flags & 6) != 6, "flags");
+  f.promise(m.motors == std::popcount(m.mask), "motors");
+  f.promise(m.count >= 1 && m.count <= bushd_ticks_capacity(m.motors, m.flags & BUSHD_TICKS_FINE),
+            "count");
   f.add_part("delays", m.delays, m.motors, 2);
   f.add_part("displacements", m.displacements, width_of(m) * m.motors * m.count, 1);
 }
@@ -55,20 +57,20 @@ void tell(const bushd_ticks& m, Fields& f) {
 void tell(const bushd_table_ticks& m, Fields& f) {
   f.add("epoch", m.epoch).add("flags", m.flags).add("first_tick", m.first_tick);
   f.add("count", m.count, 1, UINT16_MAX);
-  f.promise((m.flags & ~14) == 0 && (m.flags & 6) != 6 && m.mask != 0);
-  f.promise_inside(m.entries, m.entries_size);
-  if (!f.kept()) return;
+  f.promise((m.flags & ~14) == 0 && (m.flags & 6) != 6, "flags").promise(m.mask != 0, "mask");
+  f.promise_inside(m.entries, m.entries_size, "entries");
+  if (!f.in_range()) return;
   std::string entries;
   uint16_t at = 0;
   uint16_t mask = 0;
   for (bushd_table_ticks_entry entry; bushd_next_table_ticks_entry(&m, &at, &entry);) {
     const bushd_run_state& s = entry.state;
-    f.promise(entry.motor <= kLastMotor && mask < 1 << entry.motor);
+    f.promise(entry.motor <= kLastMotor && mask < 1 << entry.motor, "motor of an entry");
     mask = static_cast<uint16_t>(mask | 1 << entry.motor);
     append(&entries, parts({entry.motor, s.direction, s.cruises, s.since, s.since_ns, s.lead_delay,
                             s.accel_at, s.accel_end, s.cruise_left, s.decel_left, s.cruise}));
   }
-  f.add_text("entries", entries).promise(at == m.entries_size && mask == m.mask);
+  f.add_text("entries", entries).promise(at == m.entries_size && mask == m.mask, "mask");
 }
 
 size_t encode_ticks(const bushd_ticks* m, uint8_t* payload) {
@@ -137,7 +139,7 @@ Kinds stream_kinds() {
                      bushd_put_u32(p->data() + 15, between(0u, BUSHD_MAX_TICK_NS - 1));
                    }),
         codec(bushd_decode_sync, bushd_encode_sync, tell),
-        {{"follows 2", set8(6, 2)}, {"mark beyond any tick", set32(15, BUSHD_MAX_TICK_NS)}}}},
+        {{"follows 2", set8(6, 2)}, {"sync_ns beyond any tick", set32(15, BUSHD_MAX_TICK_NS)}}}},
       {"ticks",
        {any_ticks,
         codec(bushd_decode_ticks, encode_ticks, tell),

@@ -17,22 +17,22 @@ class Message : public testing::TestWithParam<std::string> {
 
 TEST_P(Message, EveryBitComesThrough) {
   holds(GetParam() + ": encode(decode(payload)) == payload", [this] {
-    const Bytes payload = kind().any();
+    const Bytes payload = kind().valid();
     const Decoded decoded = kind().decode(payload);
     RC_ASSERT(decoded.status == BUSHD_OK);
-    RC_ASSERT(decoded.kept);
-    RC_ASSERT(decoded.again == payload);
+    RC_ASSERT(decoded.out_of_range == "");
+    RC_ASSERT(decoded.reencoded == payload);
   });
 }
 
 TEST_P(Message, RefusesEveryTruncationAndEveryByteTooMany) {
   holds(GetParam() + ": only the exact length is taken", [this] {
-    Bytes payload = kind().any();
+    Bytes payload = kind().valid();
     for (size_t size = 0; size < payload.size(); ++size) {
       const Bytes part(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(size));
       const Decoded decoded = kind().decode(part);
       if (kind().open_ended && decoded.status == BUSHD_OK) {
-        RC_ASSERT(decoded.again == part);
+        RC_ASSERT(decoded.reencoded == part);
       } else if (!kind().open_ended || decoded.status != BUSHD_E_FORMAT) {
         RC_ASSERT(decoded.status == BUSHD_E_LENGTH);
       }
@@ -45,7 +45,7 @@ TEST_P(Message, RefusesEveryTruncationAndEveryByteTooMany) {
 TEST_P(Message, RefusesFieldsOutOfRange) {
   for (const auto& bad : kind().out_of_range) {
     holds(GetParam() + ": " + bad.what, [&] {
-      Bytes payload = kind().any();
+      Bytes payload = kind().valid();
       bad.spoil(&payload);
       RC_ASSERT(kind().decode(payload).status == BUSHD_E_FORMAT);
     });
@@ -56,7 +56,9 @@ TEST_P(Message, SurvivesAnyPayload) {
   holds(GetParam() + ": any bytes decode to what is promised, or are refused", [this] {
     const Bytes payload = random_bytes(between<size_t>(1, BUSHD_FRAME_MAX_PAYLOAD));
     const Decoded decoded = kind().decode(payload);
-    RC_ASSERT(decoded.kept || decoded.status == BUSHD_E_LENGTH || decoded.status == BUSHD_E_FORMAT);
+    RC_ASSERT(decoded.status == BUSHD_OK || decoded.status == BUSHD_E_LENGTH ||
+              decoded.status == BUSHD_E_FORMAT);
+    RC_ASSERT(decoded.out_of_range == "");
   });
 }
 
@@ -100,7 +102,7 @@ TEST(MessageControl, MayLeaveOutTheFaults) {
     const bool both = (actions & 3) == 3;
     ASSERT_EQ(decoded.status, actions < 16 && !both ? BUSHD_OK : BUSHD_E_FORMAT);
     if (decoded.status == BUSHD_OK) {
-      EXPECT_EQ(decoded.again, payload);
+      EXPECT_EQ(decoded.reencoded, payload);
     }
   }
 }

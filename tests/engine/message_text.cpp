@@ -29,6 +29,11 @@ const char* name_of(const bushd_frame& frame) {
 }
 
 Decoded decoded(const bushd_frame& frame, const char* name) {
+  if (frame.type == BUSHD_MSG_TABLES || frame.type == BUSHD_MSG_PROGRAM_STATE) {
+    Decoded without_payload;
+    if (frame.payload_size != 0) without_payload.status = BUSHD_E_LENGTH;
+    return without_payload;
+  }
   return message_kinds().at(name).decode({frame.payload, frame.payload_size});
 }
 
@@ -48,7 +53,7 @@ bool is_message(const bushd_frame& frame) {
   const char* const name = name_of(frame);
   if (name == nullptr) return false;
   const Decoded message = decoded(frame, name);
-  return message.status == BUSHD_OK && message.kept;
+  return message.status == BUSHD_OK && message.out_of_range.empty();
 }
 
 std::set<std::string> message_names() {

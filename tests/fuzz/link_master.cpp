@@ -35,7 +35,7 @@ enum class Op : std::uint8_t {
   kArm,        // mcu, mask, u16 us
   kDisarm,     // mcu
   kStarted,    // mcu, motor, ticks later: the trigger has come
-  kRequest,    // mcu, motor, arrivals: for all that the MCU only acknowledges
+  kRequest,    // mcu, motor, arrivals
   kProgram,    // mcu, what, u16
   kCount
 };
@@ -101,16 +101,17 @@ void started(Bus& bus, Input& input) {
   bus.master().follow_run(mcu, motor, start, link::TableRun{70});
 }
 
-void position_compare(Bus& bus, Input& input) {
+// Stands for all that an MCU only acknowledges.
+void request(Bus& bus, Input& input) {
   const link::McuIndex mcu{input.u8() % kMcus};
   const auto motor = static_cast<std::uint8_t>(input.u8() % kMotors);
   const auto arrivals = static_cast<std::uint8_t>(input.u8() % 4u);
   if (!bus.online(mcu) || !bus.master().can(mcu, BUSHD_CAN_POSITION_COMPARE)) return;
-  bus.master().ask(mcu, link::request_of(bushd_position_compare{.motor = motor,
-                                                                .arrivals = arrivals,
-                                                                .position_steps = 70,
-                                                                .delay_us = 100,
-                                                                .width_us = 40}));
+  bus.master().ask(mcu, bushd_position_compare{.motor = motor,
+                                               .arrivals = arrivals,
+                                               .position_steps = 70,
+                                               .delay_us = 100,
+                                               .width_us = 40});
 }
 
 void home(Bus& bus, Input& input) {
@@ -203,7 +204,7 @@ void run_op(Op op, Bus& bus, Input& input) {
     case Op::kStarted:
       return started(bus, input);
     case Op::kRequest:
-      return position_compare(bus, input);
+      return request(bus, input);
     case Op::kProgram:
       return program(bus, input);
     case Op::kCount:

@@ -235,7 +235,7 @@ bool Connector::send_first(std::int64_t now_us, std::size_t& turn, Next next) {
                                .address = mcus_[i].setup.address,
                                .type = request->type,
                                .payload = request->payload,
-                               .reply_payload = request->reply_payload()});
+                               .reply_payload = request->reply_size()});
     return true;
   }
   return false;
@@ -298,7 +298,7 @@ void Connector::write_configuration(McuIndex mcu) {
   const std::int64_t comm_timeout_ticks =
       (kCommTimeoutUs * 1000 + setup_.tick_ns - 1) / setup_.tick_ns;
   const McuRecord& record = mcus_[mcu];
-  SetupQueue& queue = links_[mcu].queue;
+  RequestQueue& queue = links_[mcu].queue;
   // What a master before this one has armed nobody here knows of.
   if (record.view.report.armed != 0) queue.ask(disarming());
   queue.ask(bushd_configure{.tick_ns = setup_.tick_ns,
@@ -318,7 +318,7 @@ void Connector::write_configuration(McuIndex mcu) {
 void Connector::write_setup(McuIndex mcu) {
   write_configuration(mcu);
   const McuRecord& record = mcus_[mcu];
-  SetupQueue& queue = links_[mcu].queue;
+  RequestQueue& queue = links_[mcu].queue;
   queue.ask(record.setup.inputs);
   for (const bushd_motor_inputs& one : record.setup.motor_inputs) queue.ask(one);
   // An MCU may have kept others.
@@ -348,7 +348,7 @@ bool Connector::holds_its_tables(McuIndex mcu, const bushd_tables& held) const {
 // any more takes up its memory. Then it is told whose motor each one is.
 void Connector::tables(McuIndex mcu, const bushd_tables& held, bool may_clear) {
   const McuRecord& record = mcus_[mcu];
-  SetupQueue& queue = links_[mcu].queue;
+  RequestQueue& queue = links_[mcu].queue;
   if (!queue.done(BUSHD_MSG_TABLES)) return;
   if (links_[mcu].adopts) return adopt_tables(mcu, held, may_clear);
   if (!holds_its_tables(mcu, held)) {
@@ -389,7 +389,7 @@ void Connector::acknowledged(std::int64_t now_us, McuIndex mcu, std::uint8_t typ
   want_report(mcu, links_[mcu].queue.empty());
   record.answered = true;
   if (status == BUSHD_OK) return;
-  if (record.view.phase == McuPhase::kOnline || !SetupQueue::may_be_setup(type)) {
+  if (record.view.phase == McuPhase::kOnline || !RequestQueue::may_be_setup(type)) {
     listener_.refused(mcu, type, status);
     return;
   }

@@ -12,8 +12,8 @@
 #include "bus/rs485/bus_setup.h"
 #include "bus/rs485/mcu_record.h"
 #include "bus/rs485/program_link.h"
+#include "bus/rs485/request_queue.h"
 #include "bus/rs485/scratch.h"
-#include "bus/rs485/setup_queue.h"
 #include "bus/rs485/transactions.h"
 #include "engine/message.h"
 
@@ -57,8 +57,8 @@ class Connector {
   void inhibit_local(McuIndex mcu, std::uint16_t motors);
 
   // Requests beside the setup.
-  SetupQueue& queue(McuIndex mcu) { return links_[mcu].queue; }
-  const SetupQueue& queue(McuIndex mcu) const { return links_[mcu].queue; }
+  RequestQueue& queue(McuIndex mcu) { return links_[mcu].queue; }
+  const RequestQueue& queue(McuIndex mcu) const { return links_[mcu].queue; }
   void control(McuIndex mcu, std::uint8_t actions);
   // Its requests are sent when there are no others.
   Scratch& scratch(McuIndex mcu) { return links_[mcu].scratch; }
@@ -108,7 +108,7 @@ class Connector {
 
  private:
   struct Link {
-    SetupQueue queue;
+    RequestQueue queue;
     Scratch scratch;  // of an MCU that is online
     ProgramLink program;
     // It was found with a program under way: it is told only what it then takes, and all of its

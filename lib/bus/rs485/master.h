@@ -134,13 +134,11 @@ class Rs485Master final : public BusMaster,
   // Sent as soon as the line allows.
   void control(McuIndex mcu, std::uint8_t actions) override { connector().control(mcu, actions); }
   void set_position(McuIndex mcu, std::uint8_t motor, std::int32_t position_steps) override {
-    ask(mcu, request_of(bushd_set_position{motor, position_steps}));
-  }
-  void ask(McuIndex mcu, Request request) override {
-    connector().queue(mcu).ask(std::move(request));
+    ask(mcu, bushd_set_position{motor, position_steps});
   }
 
-  void home(McuIndex mcu, const bushd_home& message) override { ask(mcu, request_of(message)); }
+  using Requests::ask;
+  void home(McuIndex mcu, const bushd_home& message) override { ask(mcu, message); }
   void begin_table_run(McuIndex mcu, std::uint8_t motor, Tick start, TableRun run) override;
   bool can_run_line(McuIndex mcu, const bushd_table& table, bushd_delay shortest_delay,
                     bool alone) const override;
@@ -184,6 +182,9 @@ class Rs485Master final : public BusMaster,
   void resume_program(McuIndex mcu) override { connector().program(mcu).resume(); }
 
  private:
+  void ask(McuIndex mcu, Request request) override {
+    connector().queue(mcu).ask(std::move(request));
+  }
   bool answered(std::int64_t now_us, const Transactions::Answer& answer) override;
   bool unanswered(std::int64_t now_us, McuIndex mcu, std::uint8_t type) override;
   void ended(std::int64_t now_us, McuIndex mcu, std::uint8_t type) override;
@@ -197,7 +198,7 @@ class Rs485Master final : public BusMaster,
 
   // Something has come by which step() may have more to do.
   void look_again() { due_us_ = INT64_MIN; }
-  // For what may give step() more to do.
+  // What is done with these may give step() more to do.
   Connector& connector() {
     look_again();
     return connector_;

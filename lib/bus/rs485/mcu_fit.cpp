@@ -1,7 +1,6 @@
 #include "bus/rs485/mcu_fit.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <string>
 
@@ -237,7 +236,7 @@ std::string refusal_text(const BusSetup& bus, const McuSetup& setup, const bushd
     return "VELOCITY: only its first motors have the velocity loop; leave out `velocity` of the "
            "others, or connect them to the first outputs";
   }
-  const std::string name = name_of_request(type);
+  const std::string name = type_name(type);
   const char* const if_too_much = remedy_if_too_much(type);
   const bool too_much = status == BUSHD_E_CAPACITY && if_too_much != nullptr;
   return (name.empty() ? name : name + ": ") + bushd_status_text(status) + "; " +

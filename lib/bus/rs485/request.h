@@ -1,4 +1,4 @@
-// What an MCU is asked and answers: for the most part a message that it acknowledges.
+// A request to one MCU, and how long its answer is; most are messages that it only acknowledges.
 #pragma once
 
 #include <concepts>
@@ -14,7 +14,7 @@ struct Request {
   std::uint8_t type;
   std::vector<std::uint8_t> payload;
 
-  std::size_t reply_payload() const {
+  std::size_t reply_size() const {
     if (type == BUSHD_MSG_PROGRAM_STATE) return BUSHD_PROGRAM_STATE_SIZE;
     return type == BUSHD_MSG_TABLES ? BUSHD_TABLES_SIZE : 1;
   }
@@ -28,7 +28,9 @@ Request request_of(std::uint8_t type, Encode encode) {
   return request;
 }
 
-// Of each message that is acknowledged and has no list: request_of(bushd_home{...}).
+// request_of(bushd_home{...}): of each message that is acknowledged and has no list. Those with
+// lists have encoders with other parameters; being a template, this one is compiled only where it
+// is called.
 #define BUSHD_REQUEST_OF(type, number, kind, needs)                                         \
   template <class Message>                                                                  \
     requires std::same_as<Message, bushd_##kind>                                            \
@@ -36,11 +38,19 @@ Request request_of(std::uint8_t type, Encode encode) {
     return request_of(BUSHD_MSG_##type,                                                     \
                       [&](std::uint8_t* to) { return bushd_encode_##kind(&message, to); }); \
   }
-BUSHD_ACKNOWLEDGED(BUSHD_REQUEST_OF)
-BUSHD_ACKNOWLEDGED_OF_PROGRAMS(BUSHD_REQUEST_OF)
+BUSHD_SETUP_REQUESTS(BUSHD_REQUEST_OF)
+BUSHD_MOTION_REQUESTS(BUSHD_REQUEST_OF)
+BUSHD_PROGRAM_REQUESTS(BUSHD_REQUEST_OF)
 #undef BUSHD_REQUEST_OF
 
-// No run waits for the trigger any more.
+// One that no part of the master keeps account of: neither of the setup nor of a program.
+template <class Message>
+concept OfMotion = false
+#define BUSHD_OR_IS(type, number, kind, needs) || std::same_as<Message, bushd_##kind>
+    BUSHD_MOTION_REQUESTS(BUSHD_OR_IS);
+#undef BUSHD_OR_IS
+
+// Cancels all runs that wait for the trigger.
 inline Request disarming() {
   return request_of(BUSHD_MSG_TRIGGER, [](std::uint8_t* to) {
     return bushd_encode_trigger(0, BUSHD_EDGE_NONE, 0, nullptr, 0, to);
@@ -48,7 +58,7 @@ inline Request disarming() {
 }
 
 // "CONFIGURE"; "": no such message.
-inline const char* name_of_request(std::uint8_t type) {
+inline const char* type_name(std::uint8_t type) {
   switch (type) {
 #define BUSHD_NAME_OF(type, number, kind, needs) \
   case BUSHD_MSG_##type:                         \

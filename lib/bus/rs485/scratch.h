@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "bus/rs485/setup_queue.h"
+#include "bus/rs485/request_queue.h"
 #include "engine/message.h"
 #include "engine/table.h"
 
@@ -37,7 +37,7 @@ class Scratch {
   bushd_table table_{};
   bool there_ = false;
   bool asked_ = false;  // the next request has been sent
-  SetupQueue requests_;
+  RequestQueue requests_;
 };
 
 }  // namespace bushd::link

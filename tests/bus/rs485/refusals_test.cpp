@@ -222,14 +222,16 @@ TEST(Connect, WhatARefusalAsksForIsTold) {
     bushd_status status;
     const char* text;
   };
-  for (const Case& c : {Case{BUSHD_MSG_CONFIGURE, BUSHD_E_CAPACITY,
-                             "CONFIGURE: capacity exceeded; use a longer tick"},
-                        Case{BUSHD_MSG_TABLE_BEGIN, BUSHD_E_CAPACITY,
-                             "TABLE_BEGIN: capacity exceeded; use shorter"},
-                        Case{BUSHD_MSG_INPUTS, BUSHD_E_STATE,
-                             "INPUTS: not allowed in this state; a motor of it moves"},
-                        Case{BUSHD_MSG_EMISSION, BUSHD_E_STATE,
-                             "is refused: not allowed in this state; a motor of it"}}) {
+  for (const Case& c :
+       {Case{BUSHD_MSG_CONFIGURE, BUSHD_E_CAPACITY,
+             "CONFIGURE: capacity exceeded; use a longer tick"},
+        Case{BUSHD_MSG_TABLE_BEGIN, BUSHD_E_CAPACITY,
+             "TABLE_BEGIN: capacity exceeded; use shorter"},
+        Case{BUSHD_MSG_INPUTS, BUSHD_E_STATE,
+             "INPUTS: not allowed in this state; a motor of it moves"},
+        Case{BUSHD_MSG_CONTROL, BUSHD_E_STATE, "CONTROL: not allowed in this state; a motor of it"},
+        Case{BUSHD_MSG_EMISSION, BUSHD_E_STATE,
+             "is refused: not allowed in this state; a motor of it"}}) {
     FakeBus bus;
     bus.slaves[0].refusals = {{c.type, c.status}};
     ASSERT_TRUE(bus.run_until([&] {

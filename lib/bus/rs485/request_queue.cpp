@@ -1,45 +1,33 @@
-#include "bus/rs485/setup_queue.h"
+#include "bus/rs485/request_queue.h"
 
 #include <algorithm>
 #include <vector>
 
 namespace bushd::link {
 
-bool SetupQueue::done(std::uint8_t type) {
+bool RequestQueue::done(std::uint8_t type) {
   if (requests_.empty() || requests_.front().type != type) return false;
   requests_.pop_front();
   return true;
 }
 
-bool SetupQueue::may_be_setup(std::uint8_t type) {
+bool RequestQueue::may_be_setup(std::uint8_t type) {
   switch (type) {
-    case BUSHD_MSG_CONFIGURE:
-    case BUSHD_MSG_EMISSION:
-    case BUSHD_MSG_OUTPUTS:
-    case BUSHD_MSG_INPUTS:
-    case BUSHD_MSG_MOTOR_INPUTS:
-    case BUSHD_MSG_CURRENTS:
-    case BUSHD_MSG_VELOCITY:
     case BUSHD_MSG_TABLES:
-    case BUSHD_MSG_TABLE_BEGIN:
-    case BUSHD_MSG_TABLE_DATA:
-    case BUSHD_MSG_TABLE_END:
-    case BUSHD_MSG_ASSIGN:
-    case BUSHD_MSG_LOCAL:
-    case BUSHD_MSG_CONTROL:
+      BUSHD_SETUP_REQUESTS(BUSHD_CASE)
       return true;
     default:
       return false;
   }
 }
 
-void SetupQueue::discard_setup() {
+void RequestQueue::discard_setup() {
   std::erase_if(requests_, [](const Request& request) {
     return may_be_setup(request.type) && request.type != BUSHD_MSG_CONTROL;
   });
 }
 
-void SetupQueue::upload_table(std::uint8_t bank, const TableRef& ref) {
+void RequestQueue::upload_table(std::uint8_t bank, const TableRef& ref) {
   const bushd_table& table = *ref.table;
   const bool symmetric = table.decel.code == table.accel.code;
   std::vector<std::uint16_t> codes(table.accel.code, table.accel.code + table.accel.count);
@@ -64,7 +52,7 @@ void SetupQueue::upload_table(std::uint8_t bank, const TableRef& ref) {
   ask(bushd_table_end{.bank = bank, .crc = bushd_table_crc32(&table)});
 }
 
-void SetupQueue::discard_clearing() {
+void RequestQueue::discard_clearing() {
   for (Request& request : requests_) {
     if (request.type != BUSHD_MSG_CONTROL) continue;
     request.payload.resize(1);  // without the faults

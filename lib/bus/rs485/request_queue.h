@@ -11,15 +11,15 @@
 
 namespace bushd::link {
 
-class SetupQueue {
+class RequestQueue {
  public:
   bool empty() const { return requests_.empty(); }
   const Request& front() const { return requests_.front(); }
   void clear() { requests_.clear(); }
-  // Another setup follows, which says all that this one would have. What was asked otherwise stays;
-  // so does CONTROL, which may be either, and does no harm twice.
+  // Drops what a setup has asked for, since a new one repeats it. Other requests stay; so does
+  // CONTROL, which may be either, and does no harm twice.
   void discard_setup();
-  // Whether a setup has such requests, among others.
+  // Whether a setup may have such requests.
   static bool may_be_setup(std::uint8_t type);
   // The first request has been answered, if it is of this type. Returns false if it is not.
   bool done(std::uint8_t type);
