@@ -6,7 +6,7 @@
 
 namespace bushd::daemon {
 
-// The same asker; when its request is accepted, the log of moves gets a line that says whose it
+// Wraps the asker: when its request is accepted, the log of moves gets a line that says whose it
 // was:
 // {"event":"request",...}, docs/design.md has its keys. Not of what moves and changes nothing.
 // `outputs` outlives the request.

@@ -59,8 +59,8 @@ class Publishing : public api::Publisher {
   std::vector<const lcm::Packet*> newest();
   // Payload bytes of all packets that newest() would give, without a refresh.
   std::size_t newest_bytes() const { return newest_bytes_; }
-  // The same to all listeners: now, or as soon as what was published for the last who asked has had
-  // its time, kNewestUsPerMessage for each message and at most kNewestPeriodUs. All who ask
+  // Publishes to all listeners: now, or as soon as what was published for the last who asked has
+  // had its time, kNewestUsPerMessage for each message and at most kNewestPeriodUs. All who ask
   // meanwhile are answered by one.
   static constexpr std::int64_t kNewestUsPerMessage = 2'000;
   static constexpr std::int64_t kNewestPeriodUs = 100'000;

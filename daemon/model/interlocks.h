@@ -26,7 +26,7 @@ class Interlocks {
   // Any motion of this motor: what it does itself, its MCU, and whoever else holds it back. One
   // that moves may be given another target.
   Result<void> may_move(MotorId motor) const;
-  // The same for homing, which is what an MCU with `ready = "after-homing"` waits for.
+  // Whether it may be homed, which is what an MCU with `ready = "after-homing"` waits for.
   Result<void> may_home(MotorId motor) const;
   // A run of a motion that was taken, now: by Moves for all that has a plan, and by who has an MCU
   // move the motor by itself. What the motor does and who holds it back was asked when it was

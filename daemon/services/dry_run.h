@@ -27,8 +27,8 @@ class DryRun {
     std::int64_t steps;
     bushd_delay shortest_delay;
     std::optional<std::int64_t> from_steps{};  // none: where it stands
-    std::optional<motion::LineShare>
-        line{};  // of its run, whose shortest delay it is; all start together
+    // The shortest delay is that of its run; all start together.
+    std::optional<motion::LineShare> line{};
   };
   // `installation` outlives it, and may change meanwhile.
   // `limited_by` as of MovePlan.

@@ -50,7 +50,7 @@ class KeptPositions final : public Service {
   // What was set in operation in place of bushd.toml's keys; empty without a store.
   state::Settings settings(MotorId motor) const;
   void keep(MotorId motor, state::Settings settings);
-  // The same of what is no motor (state::is_no_motor), or is not configured any more.
+  // Settings of what is no motor (state::is_no_motor), or is not configured any more.
   state::Settings settings(const std::string& name) const;
   void keep(const std::string& name, const state::Settings& settings);
   // At rest its position has become uncertain, by no motion.

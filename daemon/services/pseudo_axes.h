@@ -32,8 +32,8 @@ class PseudoAxes {
   // From which the axes are computed that it names.
   std::vector<MotorId> motors_of(const api::Move& move) const;
 
-  // The same asker; the result that it gets has one for each computed axis of the move, in the
-  // order in which they were asked, before those of the motors. Not of a move that names none.
+  // Wraps the asker: the result that it gets has one for each computed axis of the move, in the
+  // order in which they were asked, before those of the motors. Not for a move that names none.
   api::Asker told_of_axes(const api::Asker& asker, const api::Move& move) const;
 
   // As parts 0 .. size()-1. `motor`: what is published of each motor.

@@ -5,9 +5,8 @@
 //
 // A direction counts until the next one, or, where LOCAL says so, for some ticks after it was heard
 // last. Back goes the delay of a step in units of 10 us (or of 0.1 ms, below), four decimal digits
-// and a line feed, or
-// "----" while the key counts for nothing: a fault or a limit forbids it, people use the inputs, a
-// host has the motors.
+// and a line feed, or "----" while the key counts for nothing: a fault or a limit forbids it,
+// people use the inputs, a host has the motors.
 #ifndef BUSHD_FIRMWARE_CORE_KEYPAD_H
 #define BUSHD_FIRMWARE_CORE_KEYPAD_H
 

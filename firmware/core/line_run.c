@@ -1,8 +1,8 @@
 // LINE_RUN and LINE_TRIGGER. One run for all motors of the line, made step by step; every motor is
 // asked which of its own steps fall into these (engine/line_follower.h), or each step of the run is
-// that of one motor (engine/elementary.h). All MCUs of the line have
-// the same run, begun at the same tick, and changed at the same ticks by the same rules: so the
-// motors of all of them are on the line without a word between them.
+// that of one motor (engine/elementary.h). All MCUs of the line have the same run, begun at the
+// same tick, and changed at the same ticks by the same rules: so the motors of all of them are on
+// the line without a word between them.
 //
 // The silence after which the run is ramped down is counted from a time that all MCUs know alike:
 // that which the last SYNC frame has told, in ticks of the bus, or the run's first tick.

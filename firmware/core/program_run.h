@@ -11,7 +11,7 @@
 void bushd_mcu_go_on_with_program(bushd_mcu* mcu);
 // All that it moves stops from `next` on, the first tick that is not prepared; a line as one.
 void bushd_mcu_stop_program_motors(bushd_mcu* mcu, bushd_stop_mode mode, uint32_t next);
-// The same, and the program has ended as soon as they rest. Precondition: it has motors.
+// Stops them as above; the program has ended as soon as they rest. Precondition: it has motors.
 void bushd_mcu_end_program(bushd_mcu* mcu, bushd_program_reason why, bushd_stop_mode mode,
                            uint32_t next);
 // So many ticks as the time has, rounded up.

@@ -1,4 +1,5 @@
-// How motors stop.
+// How motors stop: on request, by an emergency, at a fault, and when nobody is heard. Homing,
+// travel and programs end what they do by themselves (homing.c, travel.c, program_run.c).
 #ifndef BUSHD_FIRMWARE_CORE_STOP_H
 #define BUSHD_FIRMWARE_CORE_STOP_H
 

@@ -153,7 +153,7 @@ struct NoneIs {
   }
 };
 
-// The same of numbers that are not negative: any negative one is none, and -1 is told.
+// As above, of numbers that are not negative: any negative one is none, and -1 is told.
 template <class Told>
 struct NegativeIsNone {
   static bool nothing(const auto& value) { return !value; }

@@ -53,7 +53,7 @@ Result<unsigned> max_steps_per_tick(const EmissionSetup& setup, const bushd_iden
 // that. A step that has to wait would be followed by the next one too soon. For even emission: the
 // other modes let all steps wait.
 std::uint32_t longest_dir_setup_us(const bushd_table& table);
-// The same of the velocity loop, which turns a motor at its least speed, in 1/64 step/s, above 0.
+// By the velocity loop, which turns a motor at its least speed, in 1/64 step/s, above 0.
 std::uint32_t longest_dir_setup_us(std::int32_t least_speed);
 
 // What can be done about a refusal that the configuration is not to blame for.

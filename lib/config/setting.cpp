@@ -1,3 +1,4 @@
+// One row for each key that can be changed in operation: its texts, its check, its help.
 #include "config/setting.h"
 
 #include <fmt/format.h>

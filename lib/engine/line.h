@@ -1,5 +1,6 @@
 // A straight line of several motors: one run, which counts the steps of the longest motor, and an
-// evaluation function per motor that says which of them it makes too.
+// evaluation function per motor that says which of them it makes too. On the host
+// motion/axis_line.cpp goes by it, in the MCU line_follower.h, for firmware/core/line_run.c.
 //
 // Motors have increments N(i) of any sign, L = max |N(i)| and r(i) = |N(i)| / L. After s steps of
 // the run motor i has made

@@ -22,12 +22,11 @@ extern "C" {
 #define BUSHD_HOME_UNIT_NS 10000u
 typedef struct bushd_home {
   uint8_t motor;
-  int8_t direction;     // towards the switch: +1, -1
-  uint32_t most_steps;  // of the fast approach, below 2^31
-  bushd_delay
-      shortest_delay;      // no delay of it is shorter, time units of the motor's table; 0: none
-  uint32_t slow_steps;     // at most as many in each of the slow stages; 1 .. 2^31 - 1
-  bushd_delay slow_delay;  // of a slow step, BUSHD_HOME_UNIT_NS; >= 1
+  int8_t direction;            // towards the switch: +1, -1
+  uint32_t most_steps;         // of the fast approach, below 2^31
+  bushd_delay shortest_delay;  // no delay of it is shorter, units of the motor's table; 0: none
+  uint32_t slow_steps;         // at most as many in each of the slow stages; 1 .. 2^31 - 1
+  bushd_delay slow_delay;      // of a slow step, BUSHD_HOME_UNIT_NS; >= 1
   int32_t position_steps;
 } bushd_home;
 

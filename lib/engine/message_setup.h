@@ -78,8 +78,8 @@ typedef struct bushd_set_address {
 typedef struct bushd_configure {
   uint32_t tick_ns;  // BUSHD_MIN_TICK_NS .. BUSHD_MAX_TICK_NS
   bushd_format format;
-  uint16_t
-      comm_timeout_ticks;  // >= 1: table runs are ramped down after as many without a valid frame
+  // Table runs are ramped down after as many without a valid frame; >= 1.
+  uint16_t comm_timeout_ticks;
 } bushd_configure;
 
 // How steps get to the pins (engine/emission.h).
@@ -200,10 +200,9 @@ typedef struct bushd_set_inputs {
   // unless bushd_motor_inputs says otherwise afterwards.
   uint16_t limit_positive;
   uint16_t limit_negative;
-  uint16_t
-      limit_immediate;     // motors that stop at a limit without another step; the others ramp down
-  uint16_t inverted;       // inputs that are active when the port calls them inactive
-  uint8_t debounce_ticks;  // a limit switch counts once it has stayed for as many more ticks
+  uint16_t limit_immediate;    // motors that stop at a limit at once; the others ramp down
+  uint16_t inverted;           // inputs that are active when the port calls them inactive
+  uint8_t debounce_ticks;      // a limit switch counts once it has stayed for as many more ticks
   uint8_t system_inverted;     // as `inverted`, of BUSHD_INPUT_*
   uint8_t emergency;           // BUSHD_EMERGENCY_INPUT_*
   uint16_t overcurrent;        // EN falls above this reading; 0: never
@@ -238,9 +237,9 @@ enum {
 };
 typedef struct bushd_set_outputs {
   uint16_t step_low;  // outputs whose STEP rests high and whose pulses are low
-  uint16_t
-      direction_low;  // outputs whose DIR is low in the positive direction; all: the common DIR
-  uint8_t enabled;    // BUSHD_ENABLED_*
+  // Outputs whose DIR is low in the positive direction; all: the common DIR.
+  uint16_t direction_low;
+  uint8_t enabled;  // BUSHD_ENABLED_*
 } bushd_set_outputs;
 
 // Local motion of a motor by the velocity loop of engine/velocity.h, in its unit of 1/64 step/s:

@@ -231,7 +231,7 @@ __attribute__((noinline)) static int16_t make_by_places(bushd_run* run, const bu
   return steps;
 }
 
-// The same, for all times: `since` may be beyond 16 bits.
+// As above, where `since` may be beyond 16 bits.
 __attribute__((noinline)) static int16_t make_by_rests(bushd_run* run, const bushd_run_tick* tick,
                                                        bushd_since since, bushd_delay delay,
                                                        uint16_t bit, uint16_t* masks) {

@@ -104,8 +104,7 @@ typedef struct bushd_run_walk {
   bool over;  // no step that is next begins within the tick
 } bushd_run_walk;
 // At the beginning of the next tick, before any step. As bushd_run_slots; the run is not done, and
-// its delays are codes (engine/table.h). The
-// step that runs, or is next, has the number `step`.
+// its delays are codes (engine/table.h). The step that runs, or is next, has the number `step`.
 void bushd_run_walk_begin(bushd_run_walk* walk, const bushd_run* run, const bushd_run_tick* tick,
                           bushd_run_spans* spans, uint32_t step, uint16_t* masks);
 // The steps that run in the tick, as many as there is room for: true as long as there are some.

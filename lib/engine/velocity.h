@@ -27,9 +27,8 @@ extern "C" {
 typedef struct bushd_velocity {
   // Settings, in 1/64 step/s.
   int32_t wanted;  // VR, |VR| <= BUSHD_VELOCITY_MOST
-  int32_t
-      change;     // A, 1..BUSHD_VELOCITY_MOST: of the speed in 1/64 s, so steps/s^2 in its own unit
-  int32_t least;  // VMIN, BUSHD_VELOCITY_LEAST..BUSHD_VELOCITY_MOST
+  int32_t change;  // A, 1..BUSHD_VELOCITY_MOST: of the speed in 1/64 s, which is steps/s^2
+  int32_t least;   // VMIN, BUSHD_VELOCITY_LEAST..BUSHD_VELOCITY_MOST
   // State.
   int32_t now;         // VC
   uint16_t period;     // T

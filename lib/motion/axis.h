@@ -175,7 +175,7 @@ class Axis {
   // The same, whatever it does then: `first` or its start, if that is later. Nothing: no run of the
   // motor's own table.
   std::optional<bushd_run> plan_at(Tick first);
-  // The same of the run of a line that is no path.
+  // As plan_at(), of the run of a line that is no path.
   std::optional<bushd_run> line_run_at(Tick first);
 
   // The ticks before `until` are over and will not be asked for again. Returns the change that was

@@ -32,7 +32,7 @@ class MotorScale {
 
   // An amount in steps. Errors: not finite, beyond what is counted.
   Result<std::int64_t> steps_of_position(const words::Amount& position) const;
-  // The same, not rounded.
+  // Not rounded to a step.
   Result<units::Steps> position_of(const words::Amount& position) const;
   Result<units::Steps> distance_of(const words::Amount& distance) const;
   // The shortest delay, in units of `time_unit_ns`, of runs at max_speed and at this speed,

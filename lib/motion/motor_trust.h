@@ -1,4 +1,5 @@
-// What the position of a motor is worth, and why it is not known where it is not.
+// What the position of a motor is worth, and why it is not known where it is not. Reasons come from
+// what has happened: in motor.cpp and motor_ends.cpp, and in the services of the daemon.
 #pragma once
 
 #include <cstdint>

@@ -31,9 +31,9 @@ class PathTrack {
   std::uint64_t units_at(std::uint32_t step) const;
   std::uint64_t units() const { return units_; }
 
-  // The same with an end that is as near as it can be for a run that makes this step now; or at
-  // `end`, if that is not nearer. Itself if that does not change anything, and always of one that
-  // was made so: it has not made what it says of steps before that.
+  // A copy whose end is as near as it can be for a run that makes this step now; or at `end`, if
+  // that is not nearer. Itself if that does not change anything, and always if it was made so: it
+  // has not made what it says of steps before that.
   std::shared_ptr<const PathTrack> ending(const std::shared_ptr<const PathTrack>& self,
                                           std::uint32_t running, std::uint32_t end) const;
 

@@ -64,9 +64,8 @@ struct Rehearsal {
 };
 
 // Walks through the compiled bytes as the MCU does. Error: a frame that leads a motor beyond where
-// it may go, with the frame, the pass and the figures. It is cut
-// at the frame with which more than `most_frames` are carried out, each point of a line counted as
-// one. O(frames carried out).
+// it may go, with the frame, the pass and the figures. It is cut at the frame with which more than
+// `most_frames` are carried out, each point of a line counted as one. O(frames carried out).
 Result<Rehearsal> rehearse(const Program& program, const McuPlace& mcu,
                            std::span<const MotorPlace> motors, std::span<const std::uint8_t> bytes,
                            std::size_t most_frames = Rehearsal::kMostFrames);

@@ -137,7 +137,7 @@ class Pace {
   }
   // The motor was cut off (a reset): what came before says nothing about what follows.
   void cut() { count_ = 0; }
-  // The same; was it faster than it could have stopped?
+  // As cut(). Returns whether it was faster than it could have stopped.
   bool cut_off() { return count_ != 0 && come_to_rest() == Jump::kStoppedDead; }
 
   bool moving() const { return count_ != 0; }

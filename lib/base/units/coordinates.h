@@ -71,7 +71,7 @@ class Coordinates {
   // The nearest step, ties away from 0. Errors: not finite, beyond +-kMaxSteps.
   Result<std::int64_t> steps_of_dial(double dial) const;
   Result<std::int64_t> steps_of_user(double user) const;
-  // The same, not rounded.
+  // Not rounded to a step.
   Result<Steps> unrounded_of_user(double user) const;
   Result<Steps> unrounded_of_distance(double user_units) const;
   double user_of(const Steps& steps) const;

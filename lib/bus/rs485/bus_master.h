@@ -38,7 +38,7 @@ class BusMaster {
   BusMaster(const BusMaster&) = delete;
   BusMaster& operator=(const BusMaster&) = delete;
 
-  // The same at any time.
+  // They do not change.
   virtual Offers offers() = 0;
 
   // --- Bytes and time

@@ -115,8 +115,8 @@ class Trigger {
   virtual ~Trigger() = default;
   virtual std::uint8_t arm(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                            std::span<const Armed> moves) = 0;
-  // The same for the motors' parts of one run of a line (BUSHD_CAN_LINE_RUN). Precondition also:
-  // the MCU has no other line.
+  // Arms the motors' parts of one run of a line (BUSHD_CAN_LINE_RUN). Precondition also: the MCU
+  // has no other line.
   virtual std::uint8_t arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t delay_us,
                                 std::span<const ArmedOnLine> parts) = 0;
   // None of them waits any more; those that have been started go on.

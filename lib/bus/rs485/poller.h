@@ -26,7 +26,7 @@ class Poller {
 
   // Asks those whose report is wanted (McuRecord::poll_wanted), if there are any.
   bool send_wanted(std::int64_t now_us);
-  // The same, and those whose turn has come.
+  // Asks these, and those whose turn has come.
   bool send_due(std::int64_t now_us);
   // How long the line is taken by a poll of all MCUs that are not offline, its answers included.
   std::int64_t longest_cycle_us() const;

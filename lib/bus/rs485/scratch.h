@@ -21,7 +21,7 @@ class Scratch {
   bool under_way() const { return !requests_.empty(); }
   // The next request. Precondition: one is under way.
   const Request& front() const { return requests_.front(); }
-  // The same: it is being sent now.
+  // Notes that it is being sent, and returns it.
   const Request& ask() {
     asked_ = true;
     return front();

@@ -112,7 +112,7 @@ class StreamScheduler {
     std::int64_t target_us;
   };
   bool send_stream(std::int64_t now_us, const Filling& filling);
-  // The same for one that would be empty before its turn comes again: `filling`, unless
+  // Sends for a queue that would be empty before its turn comes again: `filling`, unless
   // replacements wait. Then these take no longer than that the queue of an MCU that has its own
   // must last, with `margin_us` to spare.
   bool send_critical(std::int64_t now_us, const Filling& filling, std::int64_t margin_us);

@@ -44,7 +44,7 @@ class TickSource {
   // later; whatever it does then. Nothing: the motor has no plan, or one that is no run of its
   // table.
   virtual std::optional<bushd_run> plan_at(McuIndex, std::uint8_t, Tick) { return std::nullopt; }
-  // The same where the motor's run may be that of a line.
+  // As plan_at(), where the motor's run may be that of a line.
   virtual std::optional<MotorPlan> plan_on_line_at(McuIndex, std::uint8_t, Tick) {
     return std::nullopt;
   }

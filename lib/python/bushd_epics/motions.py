@@ -1,4 +1,4 @@
-"""Motions of a record: when DMOV falls and rises, and what else is told, in which order, when one ends.
+"""Motions of a record, which its fields have asked for (record.py): when DMOV falls and rises, and what else is told, in which order, when one ends.
 
 DMOV is 0 from before a motion is asked for until all that belongs to it is over: both legs of backlash, the time to settle, a pause,
 a motion that others have asked for. It rises once, after the last position, the switches and the alarm are told, and puts are

@@ -61,7 +61,7 @@ class Store {
   // Ends what a crash has left: an announced revision is confirmed, unless the file is still the
   // one before. Preconditions: the lock is held, in a transaction.
   Result<void> settle(History& history, const std::string& name) const;
-  // The same, for those who only read: where they may not, nothing is settled.
+  // As settle(), for those who only read: where they may not, nothing is settled.
   void settle_if_allowed(History& history, const std::string& name) const;
   // What stands in the file, if it is a table that the history does not have.
   Result<std::uint32_t> record_found(History& history, const std::string& name) const;

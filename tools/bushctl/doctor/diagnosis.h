@@ -13,9 +13,9 @@ const char* word(Level level);  // ok warning error
 
 struct Finding {
   Level level = Level::kOk;
-  std::string
-      check{};         // configuration, port, lcm, clock, disk, socket, daemon, mcu, line, position
-  std::string seen{};  // what it is about, and what was seen
+  // configuration, port, lcm, clock, disk, socket, daemon, mcu, line, position
+  std::string check{};
+  std::string seen{};    // what it is about, and what was seen
   std::string remedy{};  // "" where nothing is wrong
   // Where the same may be found of many things: which one it is, and what is told of several at
   // once, "motors are uncertain".
