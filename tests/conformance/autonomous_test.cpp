@@ -11,37 +11,9 @@ namespace {
 
 constexpr std::uint8_t kMotor = 6;
 
-// A motor's carriage and the switch that it runs into, by the pins of its MCU.
-class Carriage {
- public:
-  Carriage(std::size_t mcu, const SwitchOptions& options) : mcu_(mcu), switch_(options) {}
-
-  bool sense(TimeNs now_ns, const std::vector<Edge>& edges) {
-    for (; seen_ < edges.size(); ++seen_) {
-      const Edge& edge = edges[seen_];
-      if (edge.mcu != mcu_ || edge.index != kMotor) continue;
-      if (edge.signal == Signal::kDir) positive_ = edge.level;
-      if (edge.signal == Signal::kStep && edge.level) position_steps_ += positive_ ? 1 : -1;
-    }
-    return switch_.read(now_ns, position_steps_);
-  }
-  std::int64_t position_steps() const { return position_steps_; }
-
- private:
-  std::size_t mcu_;
-  Switch switch_;
-  std::size_t seen_ = 0;
-  bool positive_ = false;
-  std::int64_t position_steps_ = 0;
-};
-
-class Autonomous : public Script, public testing::WithParamInterface<Target> {
+class Autonomous : public TargetScript {
  protected:
-  Autonomous() : Script(GetParam()) {}
   void SetUp() override { ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor})); }
-
-  // Inputs are looked at once a tick: they change for both in the same one.
-  void to_inputs_time() { bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4); }
 
   // The image hangs; the twin is reset when the image's watchdog has bitten.
   void bite() {
@@ -52,11 +24,7 @@ class Autonomous : public Script, public testing::WithParamInterface<Target> {
     pass_ticks(120);
   }
 
-  void expect_alike() {
-    expect_the_same_steps(kMotor, steps(0, kMotor).size());
-    expect_the_same_times(kMotor);
-    expect_the_same_reports();
-  }
+  void expect_alike() { Script::expect_alike({kMotor}); }
 };
 BUSHD_FOR_TARGETS(Autonomous, targets());
 
@@ -76,10 +44,9 @@ class HomingScript : public Autonomous {
   void pass_until_rest() {
     for (int ticks = 0; ticks < 3000; ++ticks) {
       to_inputs_time();
-      for (Carriage* carriage : {&virtual_, &real_carriage_}) {
-        const bool active = carriage->sense(bus_.now_ns(), recorder_.edges);
-        bus_.node(carriage == &virtual_ ? 0 : 1)
-            .set_inputs({static_cast<std::uint16_t>(active ? 1u << kMotor : 0u), 0});
+      for (const std::size_t mcu : {0, 1}) {
+        const bool active = contacts_[mcu].read(bus_.now_ns(), position(mcu, kMotor));
+        bus_.node(mcu).set_inputs({static_cast<std::uint16_t>(active ? 1u << kMotor : 0u), 0});
       }
       if (ticks % 60 == 59 && master_.poll(kReal).moving == 0 &&
           master_.poll(kVirtual).moving == 0) {
@@ -89,20 +56,7 @@ class HomingScript : public Autonomous {
     FAIL() << "it does not come to rest";
   }
 
-  // Both within one tick: from then on they go together.
-  void home() {
-    const bushd_home message{kMotor, -1, 5000, 0, 400, 1000, 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_home(&message, payload.data()));
-    bus_.advance_to(bus_.node(0).next_event_ns());
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      master_.post(address, BUSHD_MSG_HOME, payload);
-      bus_.advance_to(bus_.now_ns() + 1'000'000);
-    }
-  }
-
-  Carriage virtual_{0, contact()};
-  Carriage real_carriage_{1, contact()};
+  std::array<Switch, 2> contacts_{Switch(contact()), Switch(contact())};  // by MCU
 };
 BUSHD_FOR_TARGETS(HomingScript, targets());
 
@@ -115,20 +69,19 @@ TEST_P(HomingScript, WhereverItComesFromItIsTheSameToOneStep) {
     run_by_table(master_.poll(kReal).tick + 24,
                  {{kMotor, 0, 1, 20 + static_cast<std::uint32_t>(random() % 400), 0}});
     ASSERT_NO_FATAL_FAILURE(pass_until_rest());
-    home();
+    home({kMotor, -1, 5000, 0, 400, 1000, 0});
     ASSERT_NO_FATAL_FAILURE(pass_until_rest());
     const bushd_report report = master_.poll(kReal);
     EXPECT_EQ(report.homing, BUSHD_HOMING_DONE);
     EXPECT_EQ(report.homed, 1 << kMotor);
-    const std::int64_t off =
-        real_carriage_.position_steps() - kAtSteps - report.motor[kMotor].position_steps;
+    const std::int64_t off = position(1, kMotor) - kAtSteps - report.motor[kMotor].position_steps;
     EXPECT_LE(std::abs(off), 1) << "the counter is 0 where the switch closes";
     expect_alike();
   }
 }
 
 TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor, 0, 0}));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_local{1 << kMotor, 0, 0}));
   for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
     const std::size_t before = steps(1, kMotor).size();
     const std::int32_t from_steps = master_.poll(kReal).motor[kMotor].position_steps;
@@ -151,15 +104,10 @@ TEST_P(Autonomous, LocalInputsMoveItsMotorsWhileTheyAreHeld) {
 
 TEST_P(Autonomous, ItMovesNoFurtherThanPositionsAreCounted) {
   constexpr std::int32_t kLeft = 50;
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor, 0, 0}));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_local{1 << kMotor, 0, 0}));
   for (const int sign : {1, -1}) {
-    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_SET_POSITION, bushd_encode_set_position,
-                                bushd_set_position{kMotor, sign * (INT32_MAX - kLeft)}));
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_HOME, bushd_encode_home,
-                                     bushd_home{kMotor, -1, 5000, 0, 400, 1000, 0}),
-                BUSHD_E_FORMAT);
-    }
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_set_position{kMotor, sign * (INT32_MAX - kLeft)}));
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_home{kMotor, -1, 5000, 0, 400, 1000, 0}, BUSHD_E_FORMAT));
     const std::size_t before = steps(1, kMotor).size();
     to_inputs_time();
     set_inputs(
@@ -183,19 +131,19 @@ TEST_P(Autonomous, LocalMotionIsAMastersToBeginAndToEnd) {
     pass_ticks(ticks);
   };
   constexpr bushd_local kOne{1 << kMotor, 0, 0};
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, kOne));
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, bushd_set_inputs{}));
+  ASSERT_NO_FATAL_FAILURE(ask(kOne));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_set_inputs{}));
   press(BUSHD_INPUT_FORWARD, 60);
   EXPECT_EQ(steps(1, kMotor).size(), 0u);
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, kOne));
+  ASSERT_NO_FATAL_FAILURE(ask(kOne));
   press(0, 10);
   press(BUSHD_INPUT_FORWARD, 60);
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{}));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_local{}));
   pass_ticks(60);
   EXPECT_EQ(master_.poll(kReal).moving, 0);
   const std::size_t made = steps(1, kMotor).size();
   EXPECT_GT(made, 50u);
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, kOne));
+  ASSERT_NO_FATAL_FAILURE(ask(kOne));
   pass_ticks(60);
   EXPECT_EQ(steps(1, kMotor).size(), made) << "held all the time";
   press(0, 10);
@@ -211,17 +159,12 @@ class DeniedKeypad : public Autonomous {};
 BUSHD_FOR_TARGETS(DeniedKeypad, targets_without(BUSHD_CAN_KEYPAD));
 
 TEST_P(DeniedKeypad, IsRefused) {
-  for (const std::uint8_t address : {kVirtual, kReal}) {
-    EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_LOCAL, bushd_encode_local,
-                                   bushd_local{0, 1 << kMotor, 100}),
-              BUSHD_E_FORMAT);
-  }
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_local{0, 1 << kMotor, 100}, BUSHD_E_FORMAT));
   expect_the_same_reports();
 }
 
 TEST_P(KeypadLine, MovesItsMotors) {
-  ASSERT_NO_FATAL_FAILURE(
-      ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{0, 1 << kMotor, 100}));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_local{0, 1 << kMotor, 100}));
   pass_ticks(200);  // 0.5 s: a key that is held would have been repeated
   using enum test::KeypadByte;
   const auto press = [this](std::uint8_t key, int ticks) {
@@ -254,12 +197,9 @@ BUSHD_FOR_TARGETS(DeniedVelocity, targets_without(BUSHD_CAN_VELOCITY));
 
 // Local motion goes by the table then.
 TEST_P(DeniedVelocity, IsRefusedAndLocalInputsMoveByTheTable) {
-  for (const std::uint8_t address : {kVirtual, kReal}) {
-    EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
-                                   bushd_set_velocity{kMotor, 200 * 64, 1500 * 64, 3000}),
-              BUSHD_E_UNKNOWN_MESSAGE);
-  }
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kMotor, 0, 0}));
+  ASSERT_NO_FATAL_FAILURE(
+      ask(bushd_set_velocity{kMotor, 200 * 64, 1500 * 64, 3000}, BUSHD_E_UNKNOWN_MESSAGE));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_local{1 << kMotor, 0, 0}));
   to_inputs_time();
   set_inputs({0, BUSHD_INPUT_FORWARD});
   pass_ticks(60);
@@ -272,9 +212,8 @@ TEST_P(DeniedVelocity, IsRefusedAndLocalInputsMoveByTheTable) {
 
 TEST_P(VelocityLoop, LocalInputsMoveAMotor) {
   constexpr std::uint8_t kFirst = 0;
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
-                              bushd_set_velocity{kFirst, 200 * 64, 1500 * 64, 3000}));
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << kFirst, 0, 0}));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_set_velocity{kFirst, 200 * 64, 1500 * 64, 3000}));
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_local{1 << kFirst, 0, 0}));
   for (const std::uint8_t button : {BUSHD_INPUT_FORWARD, BUSHD_INPUT_REVERSE}) {
     to_inputs_time();
     set_inputs({0, button});
@@ -286,9 +225,7 @@ TEST_P(VelocityLoop, LocalInputsMoveAMotor) {
   pass_ticks(300);
   EXPECT_EQ(master_.poll(kReal).moving, 0);
   EXPECT_GT(steps(1, kFirst).size(), 800u);
-  expect_the_same_steps(kFirst, steps(0, kFirst).size());
-  expect_the_same_times(kFirst);
-  expect_the_same_reports();
+  Script::expect_alike({kFirst});
 }
 
 TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
@@ -296,7 +233,7 @@ TEST_P(Autonomous, AWatchdogResetInMotionIsToldAndLeavesEnAsItWasAskedFor) {
     SCOPED_TRACE(keeps_enable);
     bushd_set_inputs inputs{};
     inputs.enable_after_watchdog = keeps_enable;
-    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
+    ASSERT_NO_FATAL_FAILURE(ask(inputs));
     run_by_table(master_.poll(kReal).tick + 24, {{kMotor, 0, 1, 10'000, 0}});
     pass_ticks(60);
     const bushd_report before = master_.poll(kReal);
@@ -339,7 +276,7 @@ TEST_P(Autonomous, APressWhileItHangsKeepsEnOffOverTheWatchdogReset) {
   bushd_set_inputs inputs{};
   inputs.enable_after_watchdog = true;
   inputs.emergency = BUSHD_EMERGENCY_INPUT_DISABLE;
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
+  ASSERT_NO_FATAL_FAILURE(ask(inputs));
   real_->hang();
   pass_ticks(4);
   const TimeNs pressed_ns = bus_.now_ns();

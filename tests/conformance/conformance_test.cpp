@@ -7,10 +7,7 @@
 namespace bushd::sim::conformance_test {
 namespace {
 
-class Conformance : public Script, public testing::WithParamInterface<Target> {
- protected:
-  Conformance() : Script(GetParam()) {}
-};
+class Conformance : public TargetScript {};
 BUSHD_FOR_TARGETS(Conformance, targets());
 
 TEST_P(Conformance, TellsWhoItIs) {
@@ -37,10 +34,7 @@ TEST_P(Conformance, TellsWhoItIs) {
 }
 
 TEST_P(Conformance, KeepsItsNewAddressOverAReset) {
-  bushd_set_address message{{8, 7, 6, 5, 4, 3, 2, 1}, 77};
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_set_address(&message, payload.data()));
-  master_.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS, payload);
+  master_.broadcast(bushd_set_address{{8, 7, 6, 5, 4, 3, 2, 1}, 77});
   EXPECT_TRUE(master_.identify(77));
   pass_ticks(40);
   bus_.reboot(1);
@@ -203,32 +197,29 @@ void ConformanceOfStreams::move_all_motors() {
   Random random(7, 0);
   const std::uint32_t start = master_.poll(kReal).tick + 24;
   const TimeNs begin_ns = bus_.now_ns();
-  std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
   constexpr std::uint8_t kCount = 2;
   constexpr std::uint32_t kFrames = 30;
   for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
-    delays.fill(frame + 1 < kFrames ? kCruise : 0);
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    const auto flags = static_cast<std::uint8_t>((frame == 0 ? BUSHD_TICKS_START : 0) |
-                                                 (fine ? BUSHD_TICKS_FINE : 0));
-    std::size_t size = bushd_encode_ticks_head(0, flags, start + frame * kCount, kCount, mask,
-                                               delays.data(), payload.data());
+    const std::uint16_t delay = frame + 1 < kFrames ? kCruise : 0;
+    test::Ticks ticks{.flags = static_cast<std::uint8_t>((frame == 0 ? BUSHD_TICKS_START : 0) |
+                                                         (fine ? BUSHD_TICKS_FINE : 0)),
+                      .first = start + frame * kCount,
+                      .count = kCount,
+                      .mask = mask,
+                      .delays = std::vector<std::uint16_t>(motors.size(), delay)};
     for (std::size_t i = 0; i < kCount * motors.size(); ++i) {
       const auto steps = static_cast<std::uint8_t>(random.below(128));
       const bool back = random.below(2) == 0;
+      int displacement = steps | (back ? 0 : BUSHD_COARSE_DIRECTION);
       if (fine) {
-        int size_256 = steps * 256;
-        if (random.below(3) != 0) size_256 = static_cast<int>(random.below(32'513));
-        bushd_put_i16(payload.data() + size,
-                      static_cast<std::int16_t>(back ? -size_256 : size_256));
-        size += 2;
-      } else {
-        payload[size++] = static_cast<std::uint8_t>(steps | (back ? 0 : BUSHD_COARSE_DIRECTION));
+        displacement = steps * 256;
+        if (random.below(3) != 0) displacement = static_cast<int>(random.below(32'513));
+        if (back) displacement = -displacement;
       }
+      ticks.displacements.push_back(static_cast<std::int16_t>(displacement));
     }
-    payload.resize(size);
     for (const std::uint8_t address : {kVirtual, kReal}) {
-      master_.post(address, BUSHD_MSG_TICKS, payload);
+      master_.post(address, BUSHD_MSG_TICKS, test::ticks_payload(ticks));
     }
     bus_.advance_to(begin_ns + TimeNs{tick_ns_} * kCount * (frame + 1));
   }
@@ -253,7 +244,7 @@ TEST_P(ConformanceOfStreams, StepsOfInvertedOutputsFallIntoTheSameSlots) {
   tick_ns_ = real_->full_tick_ns(format());
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, format()));
   levels_ = {.step_low = 0x5555, .direction_low = 0x3333, .enabled = BUSHD_ENABLED_LOW};
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs, levels_));
+  ASSERT_NO_FATAL_FAILURE(ask(levels_));
   pass_ticks(4);
   for (const std::size_t mcu : {0, 1}) {
     EXPECT_TRUE(level_of(mcu, Signal::kEnable, 0)) << "disabled while they change";
@@ -280,11 +271,7 @@ class ConformanceOfEmission : public Script, public testing::WithParamInterface<
 
   void expect_both_answer(bushd_status status) {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(tick_ns_, BUSHD_FORMAT_COARSE));
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      ASSERT_EQ(
-          master_.acknowledged(address, BUSHD_MSG_EMISSION, bushd_encode_emission, mode_.settings),
-          status);
-    }
+    ASSERT_NO_FATAL_FAILURE(ask(mode_.settings, status));
   }
 
   // As the virtual one; both have this emission.
@@ -356,13 +343,10 @@ TEST_P(ConformanceOfEmission, ChangesInvertedOutputsInTheSlotsOfTheVirtualOne) {
                            .direction_low = common_dir ? std::uint16_t{0xFFFF} : std::uint16_t{0},
                            .enabled = BUSHD_ENABLED_LOW};
   if (phases) {
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      EXPECT_EQ(master_.acknowledged(address, BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs, levels),
-                BUSHD_E_FORMAT);
-    }
+    ASSERT_NO_FATAL_FAILURE(ask(levels, BUSHD_E_FORMAT));
     levels.step_low = 0;
   }
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs, levels));
+  ASSERT_NO_FATAL_FAILURE(ask(levels));
   ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_ENABLE}));
   levels_ = levels;
   ASSERT_NO_FATAL_FAILURE(change_outputs_alike());
@@ -378,19 +362,19 @@ void ConformanceOfEmission::change_outputs_alike() {
   const TimeNs begin_ns = bus_.now_ns();
   const std::uint32_t first = master_.poll(kReal).tick + 40;
   constexpr std::uint8_t kCount = 8;
-  const std::array<std::uint16_t, 4> at_rest{};
   for (std::uint32_t frame = 0; frame < 4; ++frame) {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_ticks_head(0, BUSHD_TICKS_START, first + 12 * frame, kCount,
-                                           static_cast<std::uint16_t>((1u << motors.size()) - 1),
-                                           at_rest.data(), payload.data()));
+    test::Ticks ticks{.flags = BUSHD_TICKS_START,
+                      .first = first + 12 * frame,
+                      .count = kCount,
+                      .mask = static_cast<std::uint16_t>((1u << motors.size()) - 1),
+                      .delays = std::vector<std::uint16_t>(motors.size(), 0)};
     for (std::uint32_t i = 0; i < kCount * motors.size(); ++i) {
       const auto motor = static_cast<std::uint32_t>(i % motors.size());
       const bool forward = (motor + frame) % 2 == 0;
-      payload.push_back(static_cast<std::uint8_t>((1 + (i + frame) % 2) |
-                                                  (forward ? BUSHD_COARSE_DIRECTION : 0)));
+      const auto steps = static_cast<int>(1 + (i + frame) % 2);
+      ticks.displacements.push_back(test::displacement_of(forward ? steps : -steps, false));
     }
-    tell(BUSHD_MSG_TICKS, payload);
+    tell(BUSHD_MSG_TICKS, test::ticks_payload(ticks));
   }
   pass_ticks(120);
   for (std::uint8_t output = 0; output < (phases ? outputs : 4); ++output) {

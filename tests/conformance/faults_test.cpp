@@ -3,36 +3,20 @@
 #include <fstream>
 #include <string>
 
-#include "conformance/targets.h"
-#include "sim/bus_fixture.h"
+#include "conformance/script.h"
 #include "source_path.h"
 
 namespace bushd::sim::faults_test {
 namespace {
 
-constexpr std::uint32_t kBaud = 500'000;
-constexpr std::uint32_t kTickNs = 2'560'000;
 constexpr TimeNs kBootNs = 300'000'000;
-constexpr std::uint8_t kVirtual = 1;
-constexpr std::uint8_t kReal = 2;
 constexpr std::uint8_t kMotor = 3;
 constexpr std::uint16_t kDelay = 150;
 constexpr std::uint8_t kTicksPerFrame = 8;  // the smallest queue holds them all
 constexpr std::size_t kFrames = 5;
 
-class Faults : public testing::TestWithParam<Target> {
+class Faults : public TargetScript {
  protected:
-  Faults() : real_(GetParam().make()), bus_(kBaud, &recorder_), master_(bus_) {
-    McuOptions twin = real_->twin();
-    twin.address = kVirtual;
-    bus_.add_mcu(twin);
-    bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-      return real_->make({kReal, 1, 0}, index, driver, sink);
-    });
-    master_.patience_ns = 6'000'000;
-    bus_.advance_to(kBootNs);
-  }
-
   void SetUp() override {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_COARSE));
     for (const std::uint8_t address : {kVirtual, kReal}) {
@@ -40,9 +24,6 @@ class Faults : public testing::TestWithParam<Target> {
       ASSERT_NO_FATAL_FAILURE(master_.assign(address, kMotor, 0));
     }
   }
-  void TearDown() override { real_->expect_unharmed(); }
-
-  void pass_ticks(int ticks) { bus_.advance_to(bus_.now_ns() + TimeNs{kTickNs} * ticks); }
 
   void tell(bushd_type type, const Bytes& payload) {
     master_.post(kVirtual, static_cast<std::uint8_t>(type), payload);
@@ -66,23 +47,19 @@ class Faults : public testing::TestWithParam<Target> {
   // One of kFrames of a move that makes a step a tick.
   Bytes frame(std::size_t index) const {
     const std::uint16_t delay = index + 1 < kFrames ? 256 : 0;
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    const std::size_t size =
-        bushd_encode_ticks_head(0, index == 0 ? BUSHD_TICKS_START : 0,
-                                first_tick_ + static_cast<std::uint32_t>(index) * kTicksPerFrame,
-                                kTicksPerFrame, 1u << kMotor, &delay, payload.data());
-    payload.resize(size);
-    payload.insert(payload.end(), kTicksPerFrame, 1 | BUSHD_COARSE_DIRECTION);
-    return payload;
+    return test::ticks_payload(
+        {.flags = static_cast<std::uint8_t>(index == 0 ? BUSHD_TICKS_START : 0),
+         .first = first_tick_ + static_cast<std::uint32_t>(index) * kTicksPerFrame,
+         .count = kTicksPerFrame,
+         .mask = 1u << kMotor,
+         .displacements = std::vector<std::int16_t>(kTicksPerFrame, 1 | BUSHD_COARSE_DIRECTION),
+         .delays = {delay}});
   }
 
   // A run of more steps than a test waits for.
   void start_run() {
     const bushd_table_run_entry entry{kMotor, 0, 1, 5000, 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(
-        bushd_encode_table_run(0, master_.poll(kReal).tick + 24, &entry, 1, payload.data()));
-    tell(BUSHD_MSG_TABLE_RUN, payload);
+    tell(BUSHD_MSG_TABLE_RUN, test::table_run_payload(0, master_.poll(kReal).tick + 24, entry));
   }
 
   void expect_alike(std::uint8_t faults, std::size_t at_least_steps, std::size_t at_most_steps) {
@@ -105,10 +82,6 @@ class Faults : public testing::TestWithParam<Target> {
   }
 
   static constexpr std::size_t kAllSteps = kFrames * kTicksPerFrame;
-  const std::unique_ptr<McuUnderTest> real_;
-  Recorder recorder_;
-  Bus bus_;
-  FrameMaster master_;
   std::uint32_t first_tick_ = 0;
 };
 BUSHD_FOR_TARGETS(Faults, targets());
@@ -149,11 +122,7 @@ TEST_P(Faults, AHoleThatStaysEndsInARampDown) {
 }
 
 TEST_P(Faults, ATableRunEndsWhenNobodyIsHeard) {
-  for (const std::uint8_t address : {kVirtual, kReal}) {
-    ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_CONFIGURE, bushd_encode_configure,
-                                   {kTickNs, BUSHD_FORMAT_COARSE, 50}),
-              BUSHD_OK);
-  }
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_configure{kTickNs, BUSHD_FORMAT_COARSE, 50}));
   start_run();
   pass_ticks(30);
   broadcast(BUSHD_MSG_POLL, {1, 99, 0, 0, 0, 255});
@@ -173,26 +142,15 @@ TEST_P(Faults, AnEmergencyStopIsTheSame) {
     broadcast(BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(how)});
     pass_ticks(60);
     expect_alike(BUSHD_FAULT_EMERGENCY, before, before + (how == BUSHD_STOP_IMMEDIATE ? 2 : 8));
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}),
-                BUSHD_OK);
-    }
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}));
   }
 }
 
-// Inputs are looked at once a tick: they change for both in the same one.
 class Inputs : public Faults {
  protected:
-  void set_inputs(bushd_inputs inputs) {
-    bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4);
-    for (const std::size_t mcu : {0, 1}) bus_.node(mcu).set_inputs(inputs);
-  }
-  void configure(const bushd_set_inputs& inputs) {
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      ASSERT_EQ(master_.acknowledged(address, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
-                BUSHD_OK);
-    }
+  void change_inputs(bushd_inputs inputs) {
+    to_inputs_time();
+    set_inputs(inputs);
   }
 };
 BUSHD_FOR_TARGETS(Inputs, targets());
@@ -200,10 +158,10 @@ BUSHD_FOR_TARGETS(Inputs, targets());
 TEST_P(Inputs, ALimitStopsItsMotorAndForbidsTheDirection) {
   bushd_set_inputs settings{};
   settings.limit_positive = 1 << kMotor;
-  ASSERT_NO_FATAL_FAILURE(configure(settings));
+  ASSERT_NO_FATAL_FAILURE(ask(settings));
   start_run();
   pass_ticks(60);
-  set_inputs({1 << kMotor, 0});
+  change_inputs({1 << kMotor, 0});
   pass_ticks(40);
   expect_alike(0, 20, 120);
   for (const std::uint8_t address : {kVirtual, kReal}) {
@@ -215,10 +173,10 @@ TEST_P(Inputs, ALimitStopsItsMotorAndForbidsTheDirection) {
 TEST_P(Inputs, TheEmergencyInputCuts) {
   bushd_set_inputs settings{};
   settings.emergency = BUSHD_EMERGENCY_INPUT_IMMEDIATE;
-  ASSERT_NO_FATAL_FAILURE(configure(settings));
+  ASSERT_NO_FATAL_FAILURE(ask(settings));
   start_run();
   pass_ticks(60);
-  set_inputs({0, BUSHD_INPUT_EMERGENCY});
+  change_inputs({0, BUSHD_INPUT_EMERGENCY});
   pass_ticks(40);
   expect_alike(BUSHD_FAULT_EMERGENCY_INPUT, 20, 120);
 }
@@ -226,7 +184,7 @@ TEST_P(Inputs, TheEmergencyInputCuts) {
 TEST_P(Inputs, TooMuchCurrentTakesThePowerAway) {
   bushd_set_inputs settings{};
   settings.overcurrent = 600;
-  ASSERT_NO_FATAL_FAILURE(configure(settings));
+  ASSERT_NO_FATAL_FAILURE(ask(settings));
   start_run();
   pass_ticks(60);
   bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} / 2);
@@ -241,9 +199,8 @@ TEST_P(Inputs, TooMuchCurrentTakesThePowerAway) {
 // Its edge at once takes EN away, in the middle of a tick, and however short it is.
 class DisablingInput : public Inputs {
  protected:
-  bushd_status control(std::uint8_t address, std::uint8_t action) {
-    return master_.acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                bushd_control{action, 0});
+  void control(std::uint8_t action, bushd_status answer = BUSHD_OK) {
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_control{action, 0}, answer));
   }
   void expect_en_fell_within_a_slot_of(TimeNs time_ns) {
     const TimeNs slot_ns = kTickNs / 128;
@@ -265,17 +222,17 @@ TEST_P(DisablingInput, TakesEnAwayWithinASlotOfAPressThatIsShorterThanATick) {
     if (open) settings.system_inverted = BUSHD_INPUT_EMERGENCY;
     const std::uint8_t rests = open ? BUSHD_INPUT_EMERGENCY : 0;
     const std::uint8_t pressed = open ? 0 : BUSHD_INPUT_EMERGENCY;
-    ASSERT_NO_FATAL_FAILURE(configure({}));
-    set_inputs({0, rests});
-    ASSERT_NO_FATAL_FAILURE(configure(settings));
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_set_inputs{}));
+    change_inputs({0, rests});
+    ASSERT_NO_FATAL_FAILURE(ask(settings));
     recorder_.edges.clear();
     const auto before = master_.poll(kReal).motor[kMotor].position_steps;
     start_run();
     pass_ticks(60);
-    set_inputs({0, pressed});
+    change_inputs({0, pressed});
     const TimeNs pressed_ns = bus_.now_ns();
     bus_.advance_to(pressed_ns + TimeNs{kTickNs} / 16);
-    for (const std::size_t mcu : {0, 1}) bus_.node(mcu).set_inputs({0, rests});
+    set_inputs({0, rests});
     pass_ticks(40);
     expect_en_fell_within_a_slot_of(pressed_ns);
     const bushd_report report = master_.poll(kReal);
@@ -285,10 +242,10 @@ TEST_P(DisablingInput, TakesEnAwayWithinASlotOfAPressThatIsShorterThanATick) {
     EXPECT_GT(steps, 20u);
     EXPECT_EQ(steps, recorder_.times(0, Signal::kStep, kMotor, true).size());
     EXPECT_EQ(report.motor[kMotor].position_steps, before + static_cast<std::int32_t>(steps));
+    ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_ENABLE, BUSHD_E_STATE));
+    ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_CLEAR_FAULTS));
+    ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_ENABLE));
     for (const std::uint8_t address : {kVirtual, kReal}) {
-      EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_E_STATE);
-      EXPECT_EQ(control(address, BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
-      EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_OK);
       EXPECT_EQ(master_.poll(address).state, BUSHD_STATE_READY);
     }
     for (const std::size_t mcu : {0, 1}) {
@@ -301,15 +258,13 @@ TEST_P(DisablingInput, TakesEnAwayWithinASlotOfAPressThatIsShorterThanATick) {
 TEST_P(DisablingInput, ThatIsActiveWhenDriversAreEnabledLeavesThemOff) {
   bushd_set_inputs settings{};
   settings.emergency = BUSHD_EMERGENCY_INPUT_DISABLE;
-  for (const std::uint8_t address : {kVirtual, kReal}) {
-    ASSERT_EQ(control(address, BUSHD_CONTROL_DISABLE), BUSHD_OK);
-  }
-  ASSERT_NO_FATAL_FAILURE(configure(settings));
-  set_inputs({0, BUSHD_INPUT_EMERGENCY});
+  ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_DISABLE));
+  ASSERT_NO_FATAL_FAILURE(ask(settings));
+  change_inputs({0, BUSHD_INPUT_EMERGENCY});
   pass_ticks(3);
   recorder_.edges.clear();
+  ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_ENABLE, BUSHD_E_STATE));
   for (const std::uint8_t address : {kVirtual, kReal}) {
-    EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_E_STATE);
     EXPECT_EQ(master_.poll(address).faults, BUSHD_FAULT_EMERGENCY_INPUT | BUSHD_FAULT_DISABLED);
   }
   for (const std::size_t mcu : {0, 1}) {
@@ -323,14 +278,12 @@ TEST_P(DisablingInput, ThatIsActiveWhenItsSettingsComeTakesEnAwayWithThem) {
     SCOPED_TRACE(open ? "active when open" : "active when closed");
     bushd_set_inputs settings{};
     if (open) settings.system_inverted = BUSHD_INPUT_EMERGENCY;
-    set_inputs({0, static_cast<std::uint8_t>(open ? BUSHD_INPUT_EMERGENCY : 0)});
+    change_inputs({0, static_cast<std::uint8_t>(open ? BUSHD_INPUT_EMERGENCY : 0)});
     settings.emergency = BUSHD_EMERGENCY_INPUT_RAMP;
-    ASSERT_NO_FATAL_FAILURE(configure(settings));
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      ASSERT_EQ(control(address, BUSHD_CONTROL_CLEAR_FAULTS), BUSHD_OK);
-      ASSERT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_OK);
-    }
-    set_inputs({0, static_cast<std::uint8_t>(open ? 0 : BUSHD_INPUT_EMERGENCY)});
+    ASSERT_NO_FATAL_FAILURE(ask(settings));
+    ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_CLEAR_FAULTS));
+    ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_ENABLE));
+    change_inputs({0, static_cast<std::uint8_t>(open ? 0 : BUSHD_INPUT_EMERGENCY)});
     pass_ticks(3);
     for (const std::uint8_t address : {kVirtual, kReal}) {
       ASSERT_EQ(master_.poll(address).faults, BUSHD_FAULT_EMERGENCY_INPUT);
@@ -341,9 +294,7 @@ TEST_P(DisablingInput, ThatIsActiveWhenItsSettingsComeTakesEnAwayWithThem) {
     for (const std::size_t mcu : {0, 1}) {
       bus_.advance_to(bus_.node(0).next_event_ns());
       const TimeNs begun_ns = bus_.now_ns();
-      ASSERT_EQ(master_.acknowledged(mcu == 0 ? kVirtual : kReal, BUSHD_MSG_INPUTS,
-                                     bushd_encode_set_inputs, settings),
-                BUSHD_OK);
+      ASSERT_EQ(master_.acknowledged(mcu == 0 ? kVirtual : kReal, settings), BUSHD_OK);
       pass_ticks(3);
       const auto falls = recorder_.times(mcu, Signal::kEnable, 0, false);
       ASSERT_EQ(falls.size(), 1u);
@@ -376,8 +327,8 @@ TEST_P(DisablingInput, IsAsFastAsTheFrameOfACommandedStop) {
   }
   for (const std::uint8_t address : {kVirtual, kReal}) {
     EXPECT_EQ(master_.poll(address).faults, BUSHD_FAULT_EMERGENCY | BUSHD_FAULT_DISABLED);
-    EXPECT_EQ(control(address, BUSHD_CONTROL_ENABLE), BUSHD_E_STATE);
   }
+  ASSERT_NO_FATAL_FAILURE(control(BUSHD_CONTROL_ENABLE, BUSHD_E_STATE));
 }
 
 // Everything that is said of a line in tests/vectors, to one MCU: its answers.

@@ -13,9 +13,8 @@ constexpr std::uint32_t kLongest = 400;
 const std::vector<bushd_line_entry> kEntries = {
     {1, 1, 400}, {6, -1, 399}, {9, 1, 137}, {15, -1, 3}};
 
-class LineScript : public Script, public testing::WithParamInterface<Target> {
+class LineScript : public TargetScript {
  protected:
-  LineScript() : Script(GetParam()) {}
   void SetUp() override {
     for (const bushd_line_entry& entry : kEntries) motors_.push_back(own(entry.motor));
   }
@@ -41,20 +40,14 @@ class LineScript : public Script, public testing::WithParamInterface<Target> {
     bushd_line_run message{};
     message.first_tick = master_.poll(kReal).tick + 40;
     message.line = line;
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_line_run(
-        &message, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
-    tell(BUSHD_MSG_LINE_RUN, payload);
+    tell(BUSHD_MSG_LINE_RUN, payload_of([&](std::uint8_t* to) {
+           return bushd_encode_line_run(&message, entries.data(),
+                                        static_cast<std::uint8_t>(entries.size()), to);
+         }));
   }
 
   // The same number of steps at the same times, and alike for all motors to half a slot.
-  void expect_alike() {
-    for (const std::uint8_t motor : motors_) {
-      expect_the_same_steps(motor, steps(0, motor).size());
-      expect_the_same_times(motor);
-    }
-    expect_the_same_reports();
-  }
+  void expect_alike() { Script::expect_alike(motors_); }
 
   std::vector<std::uint8_t> motors_;
 };
@@ -190,7 +183,7 @@ TEST_P(LineScript, ItsEndIsTheSame) {
 TEST_P(LineScript, SilenceEndsItInTheSameTick) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, motors_));
   const bushd_configure short_timeout = {tick_ns_, BUSHD_FORMAT_FINE, 100};
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_CONFIGURE, bushd_encode_configure, short_timeout));
+  ASSERT_NO_FATAL_FAILURE(ask(short_timeout));
   begin_line();
   pass_ticks(250);
   EXPECT_LT(steps(0, 1).size(), kLongest);
@@ -234,9 +227,10 @@ TEST_P(LineScript, TriggeredEveryStepIsWithinASlotOfItsTime) {
                                      BUSHD_EDGE_RISING,
                                      delay_us,
                                      {0, false, shortest_delay, kLongest, 0, kLongest, 0, nullptr}};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_line_trigger(
-        &message, kEntries.data(), static_cast<std::uint8_t>(kEntries.size()), payload.data()));
+    const Bytes payload = payload_of([&](std::uint8_t* to) {
+      return bushd_encode_line_trigger(&message, kEntries.data(),
+                                       static_cast<std::uint8_t>(kEntries.size()), to);
+    });
     ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_LINE_TRIGGER, payload));
     tell_time();
     EXPECT_EQ(master_.poll(kReal).armed, 1u << 1 | 1u << 6 | 1u << 9 | 1u << 15);

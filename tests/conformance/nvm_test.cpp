@@ -32,10 +32,14 @@ class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
     ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
   }
 
+  void make_ready_and_kept() {
+    ASSERT_NO_FATAL_FAILURE(make_ready());
+    pass(real_->keeps_within_ns(kCodes));
+  }
+
   template <class Message>
-  bushd_status ask(bushd_type type, std::size_t (*encode)(const Message*, std::uint8_t*),
-                   const Message& message) {
-    return master_.acknowledged(kAddress, type, encode, message);
+  bushd_status ask(const Message& message) {
+    return master_.acknowledged(kAddress, message);
   }
 
   const std::unique_ptr<McuUnderTest> real_;
@@ -49,11 +53,9 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   bushd_set_inputs inputs{};
   inputs.system_inverted = BUSHD_INPUT_FORWARD;
   inputs.limit_negative = 1 << 4;
-  ASSERT_EQ(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs), BUSHD_OK);
+  ASSERT_EQ(ask(inputs), BUSHD_OK);
   const auto limit = static_cast<std::uint8_t>(13 % real_->twin().motors);
-  ASSERT_EQ(
-      ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs, bushd_motor_inputs{4, 4, limit, 4}),
-      BUSHD_OK);
+  ASSERT_EQ(ask(bushd_motor_inputs{4, 4, limit, 4}), BUSHD_OK);
   const bushd_tables before = master_.tables(kAddress);
   pass(real_->keeps_within_ns(ramp.size()));
   reboot();
@@ -82,7 +84,7 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
 
 TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 3, 0, 0}), BUSHD_OK);
+  ASSERT_EQ(ask(bushd_local{1 << 3, 0, 0}), BUSHD_OK);
   pass(real_->keeps_within_ns(kCodes));
   reboot();
   bus_.node(0).set_inputs({0, BUSHD_INPUT_REVERSE});
@@ -101,9 +103,7 @@ TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
 // EN of drivers that are enabled by a low level, and STEP that rests high: before anybody speaks.
 TEST_P(Nvm, LevelsOfOutputsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  ASSERT_EQ(ask(BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs,
-                bushd_set_outputs{0x0008, 0, BUSHD_ENABLED_LOW}),
-            BUSHD_OK);
+  ASSERT_EQ(ask(bushd_set_outputs{0x0008, 0, BUSHD_ENABLED_LOW}), BUSHD_OK);
   pass(real_->keeps_within_ns(kCodes));
   recorder_.edges.clear();
   reboot();
@@ -132,10 +132,8 @@ BUSHD_FOR_TARGETS(NvmVelocity, targets_with(BUSHD_CAN_VELOCITY));
 // Without a table, too.
 TEST_P(NvmVelocity, LocalInputsMoveAMotorAfterAResetWithoutAHost) {
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
-  ASSERT_EQ(ask(BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
-                bushd_set_velocity{1, 200 * 64, 1000 * 64, 2000}),
-            BUSHD_OK);
-  ASSERT_EQ(ask(BUSHD_MSG_LOCAL, bushd_encode_local, bushd_local{1 << 1, 0, 0}), BUSHD_OK);
+  ASSERT_EQ(ask(bushd_set_velocity{1, 200 * 64, 1000 * 64, 2000}), BUSHD_OK);
+  ASSERT_EQ(ask(bushd_local{1 << 1, 0, 0}), BUSHD_OK);
   pass(real_->keeps_within_ns(kCodes));
   reboot();
   bus_.node(0).set_inputs({0, BUSHD_INPUT_REVERSE});
@@ -151,14 +149,12 @@ TEST_P(NvmVelocity, LocalInputsMoveAMotorAfterAResetWithoutAHost) {
 }
 
 TEST_P(Nvm, WhatIsTheSameIsNotWrittenAgain) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(real_->keeps_within_ns(kCodes));
+  ASSERT_NO_FATAL_FAILURE(make_ready_and_kept());
   const std::uint64_t written = real_->nvm_writes();
   EXPECT_GT(written, 20u);
   pass(real_->keeps_within_ns(kCodes));
   EXPECT_EQ(real_->nvm_writes(), written);
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(real_->keeps_within_ns(kCodes));
+  ASSERT_NO_FATAL_FAILURE(make_ready_and_kept());
   EXPECT_EQ(real_->nvm_writes(), written);
 }
 
@@ -189,8 +185,7 @@ class NvmProgram : public Nvm {
     ASSERT_EQ(control(BUSHD_PROGRAM_COMMIT, crc), BUSHD_OK);
   }
   bushd_status control(std::uint8_t action, std::uint32_t value) {
-    return ask(BUSHD_MSG_PROGRAM, bushd_encode_program_control,
-               bushd_program_control{action, 0, value});
+    return ask(bushd_program_control{action, 0, value});
   }
   bushd_program_state state() {
     bushd_program_state state{};
@@ -203,8 +198,7 @@ class NvmProgram : public Nvm {
 BUSHD_FOR_TARGETS(NvmProgram, targets_with(BUSHD_CAN_PROGRAM));
 
 TEST_P(NvmProgram, AProgramOutlivesAResetAndBeginsWhenThePowerComes) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(real_->keeps_within_ns(kCodes));
+  ASSERT_NO_FATAL_FAILURE(make_ready_and_kept());
   const Bytes bytes =
       program(BUSHD_PROGRAM_WITHOUT_HOST | BUSHD_PROGRAM_KEPT | BUSHD_PROGRAM_AT_POWER_ON);
   ASSERT_NO_FATAL_FAILURE(load(bytes));
@@ -237,8 +231,7 @@ TEST_P(NvmProgram, AProgramOutlivesAResetAndBeginsWhenThePowerComes) {
 class NvmScratch : public Nvm {
  protected:
   void SetUp() override {
-    ASSERT_NO_FATAL_FAILURE(make_ready());
-    pass(real_->keeps_within_ns(kCodes));
+    ASSERT_NO_FATAL_FAILURE(make_ready_and_kept());
     written_ = real_->nvm_writes();
     before_ = master_.tables(kAddress);
   }
@@ -254,7 +247,7 @@ class NvmScratch : public Nvm {
       EXPECT_EQ(after.bank[bank].crc, before_.bank[bank].crc);
     }
     EXPECT_EQ(master_.poll(kAddress).faults, 0);
-    EXPECT_NE(ask(BUSHD_MSG_TABLE_END, bushd_encode_table_end, {BUSHD_SCRATCH_BANK, 0}), BUSHD_OK);
+    EXPECT_NE(ask(bushd_table_end{BUSHD_SCRATCH_BANK, 0}), BUSHD_OK);
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
     ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
     run(3, 50);
@@ -279,23 +272,19 @@ BUSHD_FOR_TARGETS(DeniedNvmScratch, targets_without(BUSHD_CAN_SCRATCH));
 
 TEST_P(DeniedNvmScratch, ATableForLinesIsRefusedAndLeavesTheOthersAlone) {
   const bushd_table_begin begin{BUSHD_SCRATCH_BANK, 3, 0, 150, 10'000, 1};
-  EXPECT_EQ(ask(BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin), BUSHD_E_FORMAT);
+  EXPECT_EQ(ask(begin), BUSHD_E_FORMAT);
   expect_only_the_other_table_is_kept();
 }
 
 TEST_P(Nvm, ABitThatHasFlippedIsAFault) {
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(real_->keeps_within_ns(kCodes));
+  ASSERT_NO_FATAL_FAILURE(make_ready_and_kept());
   real_->flip_nvm_bit();
   reboot();
   EXPECT_EQ(master_.poll(kAddress).faults, BUSHD_FAULT_EEPROM);
   EXPECT_EQ(master_.valid_tables(kAddress), 0u);
   // It is mended when there is something to keep again.
-  ASSERT_EQ(
-      ask(BUSHD_MSG_CONTROL, bushd_encode_control, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}),
-      BUSHD_OK);
-  ASSERT_NO_FATAL_FAILURE(make_ready());
-  pass(real_->keeps_within_ns(kCodes));
+  ASSERT_EQ(ask(bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(make_ready_and_kept());
   reboot();
   EXPECT_EQ(master_.poll(kAddress).faults, 0);
   EXPECT_EQ(master_.valid_tables(kAddress), 1u);

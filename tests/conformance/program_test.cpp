@@ -13,9 +13,8 @@ void append(Bytes& bytes, std::uint32_t value, int size) {
   for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
 }
 
-class ProgramScript : public Script, public testing::WithParamInterface<Target> {
+class ProgramScript : public TargetScript {
  protected:
-  ProgramScript() : Script(GetParam()) {}
   static constexpr std::uint8_t kFirst = 1;
   static constexpr std::uint8_t kSecond = 6;
   static constexpr unsigned kMotors = 1u << kFirst | 1u << kSecond;
@@ -61,8 +60,7 @@ class ProgramScript : public Script, public testing::WithParamInterface<Target> 
     ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_COMMIT, 0, crc));
   }
   void control(std::uint8_t action, std::uint8_t number = 0, std::uint32_t value = 0) {
-    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_PROGRAM, bushd_encode_program_control,
-                                bushd_program_control{action, number, value}));
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_program_control{action, number, value}));
   }
   bushd_program_state state(std::uint8_t address) {
     bushd_program_state state{};
@@ -72,10 +70,7 @@ class ProgramScript : public Script, public testing::WithParamInterface<Target> 
     return state;
   }
   void expect_alike() {
-    for (const std::uint8_t motor : {kFirst, kSecond}) {
-      expect_the_same_steps(motor, steps(0, motor).size());
-      expect_the_same_times(motor);
-    }
+    Script::expect_alike({kFirst, kSecond});
     const bushd_program_state expected = state(kVirtual);
     const bushd_program_state told = state(kReal);
     EXPECT_EQ(told.stage, expected.stage);
@@ -85,7 +80,6 @@ class ProgramScript : public Script, public testing::WithParamInterface<Target> 
     EXPECT_EQ(told.repeats, expected.repeats);
     EXPECT_EQ(told.crc, expected.crc);
     EXPECT_EQ(told.memory, expected.memory);
-    expect_the_same_reports();
   }
 };
 BUSHD_FOR_TARGETS(ProgramScript, targets_with(BUSHD_CAN_PROGRAM));

@@ -67,19 +67,20 @@ class Script : public testing::Test {
     return static_cast<std::uint8_t>(number % real_->twin().motors);
   }
 
+  // Inputs are looked at once a tick: they change for both in the same one.
+  void to_inputs_time() { bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4); }
+
   void pass_ticks(int ticks) { bus_.advance_to(bus_.now_ns() + TimeNs{tick_ns_} * ticks); }
 
-  // The same request to both, which take it.
+  // The same request to both, and what both answer.
   template <class Message>
-  void ask(bushd_type type, std::size_t (*encode)(const Message*, std::uint8_t*),
-           const Message& message) {
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      ASSERT_EQ(master_.acknowledged(address, type, encode, message), BUSHD_OK);
-    }
+  void ask(const Message& message, bushd_status answer = BUSHD_OK) {
+    const test::Request request = test::request_of(message);
+    ASSERT_NO_FATAL_FAILURE(ask(request.type, request.payload, answer));
   }
-  void ask(bushd_type type, const Bytes& payload) {
+  void ask(bushd_type type, const Bytes& payload, bushd_status answer = BUSHD_OK) {
     for (const std::uint8_t address : {kVirtual, kReal}) {
-      ASSERT_EQ(master_.acknowledged(address, type, payload), BUSHD_OK);
+      ASSERT_EQ(master_.acknowledged(address, type, payload), answer);
     }
   }
 
@@ -94,6 +95,15 @@ class Script : public testing::Test {
     master_.send(kReal, static_cast<std::uint8_t>(type), payload);
   }
 
+  // To both within one tick: from then on they go together.
+  void home(const bushd_home& message) {
+    bus_.advance_to(bus_.node(0).next_event_ns());
+    for (const std::uint8_t address : {kVirtual, kReal}) {
+      master_.post(address, BUSHD_MSG_HOME, test::request_of(message).payload);
+      bus_.advance_to(bus_.now_ns() + 1'000'000);
+    }
+  }
+
   bushd_table table() const {
     bushd_table view{};
     view.accel.code = view.decel.code = codes_.data();
@@ -104,10 +114,10 @@ class Script : public testing::Test {
   }
 
   void run_by_table(std::uint32_t first, const std::vector<bushd_table_run_entry>& entries) {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_table_run(
-        0, first, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
-    tell(BUSHD_MSG_TABLE_RUN, payload);
+    tell(BUSHD_MSG_TABLE_RUN, payload_of([&](std::uint8_t* to) {
+           return bushd_encode_table_run(0, first, entries.data(),
+                                         static_cast<std::uint8_t>(entries.size()), to);
+         }));
   }
 
   // A move streamed in frames of `count` ticks; of every three one is a state of the run.
@@ -121,35 +131,28 @@ class Script : public testing::Test {
     constexpr std::uint8_t kCount = 12;
     for (int frame = 0; !bushd_run_done(&run); ++frame) {
       while (static_cast<std::int32_t>(first - master_.poll(kReal).tick) > 40) pass_ticks(4);
-      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
       const bushd_table_ticks_entry entry{motor, bushd_run_save(&run, tick_ns_, kCount)};
-      std::array<std::int16_t, kCount> fine;
-      std::array<std::uint8_t, kCount> coarse;
+      std::vector<std::int16_t> displacements(kCount);
       if (format == BUSHD_FORMAT_FINE) {
-        bushd_run_expand_fine(&run, tick_ns_, kCount, fine.data(), 1);
+        bushd_run_expand_fine(&run, tick_ns_, kCount, displacements.data(), 1);
       } else {
+        Bytes coarse(kCount);
         bushd_run_expand_coarse(&run, tick_ns_, kCount, coarse.data(), 1);
+        displacements.assign(coarse.begin(), coarse.end());
       }
       if (frame % 3 == 1 && (real_->twin().disabled_capabilities & BUSHD_CAN_TABLE_TICKS) == 0) {
         const auto state_flags = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_FINE);
-        payload.resize(
-            bushd_encode_table_ticks(0, state_flags, first, kCount, &entry, 1, payload.data()));
-        tell(BUSHD_MSG_TABLE_TICKS, payload);
+        tell(BUSHD_MSG_TABLE_TICKS, payload_of([&](std::uint8_t* to) {
+               return bushd_encode_table_ticks(0, state_flags, first, kCount, &entry, 1, to);
+             }));
       } else {
-        const auto delay = static_cast<std::uint16_t>(bushd_run_delay(&run));
-        std::size_t size = bushd_encode_ticks_head(0, flags, first, kCount,
-                                                   static_cast<std::uint16_t>(1u << motor), &delay,
-                                                   payload.data());
-        for (std::size_t i = 0; i < kCount; ++i) {
-          if (format == BUSHD_FORMAT_FINE) {
-            bushd_put_i16(payload.data() + size, fine[i]);
-            size += 2;
-          } else {
-            payload[size++] = coarse[i];
-          }
-        }
-        payload.resize(size);
-        tell(BUSHD_MSG_TICKS, payload);
+        tell(BUSHD_MSG_TICKS,
+             test::ticks_payload({.flags = flags,
+                                  .first = first,
+                                  .count = kCount,
+                                  .mask = static_cast<std::uint16_t>(1u << motor),
+                                  .displacements = displacements,
+                                  .delays = {static_cast<std::uint16_t>(bushd_run_delay(&run))}}));
       }
       first += kCount;
       flags = static_cast<std::uint8_t>(flags & ~BUSHD_TICKS_START);
@@ -219,6 +222,24 @@ class Script : public testing::Test {
     return out;
   }
 
+  // Its pulses from a time on.
+  std::vector<TimeNs> steps_since(std::size_t mcu, std::uint8_t motor, TimeNs begin_ns) const {
+    std::vector<TimeNs> found = recorder_.times(mcu, Signal::kStep, motor, true);
+    std::erase_if(found, [&](TimeNs at_ns) { return at_ns < begin_ns; });
+    return found;
+  }
+  // Where they have led it. Precondition: no edges were taken out of the recorder.
+  std::int64_t position(std::size_t mcu, std::uint8_t motor) {
+    Shaft& shaft = shafts_[{mcu, motor}];
+    for (; shaft.seen < recorder_.edges.size(); ++shaft.seen) {
+      const Edge& edge = recorder_.edges[shaft.seen];
+      if (edge.mcu != mcu || edge.index != motor) continue;
+      if (edge.signal == Signal::kDir) shaft.positive = edge.level;
+      if (edge.signal == Signal::kStep && edge.level) shaft.position += shaft.positive ? 1 : -1;
+    }
+    return shaft.position;
+  }
+
   // In number and direction.
   void expect_the_same_steps(std::uint8_t motor, std::size_t count) {
     SCOPED_TRACE("motor " + std::to_string(motor));
@@ -253,6 +274,14 @@ class Script : public testing::Test {
     seen = made.size();
   }
 
+  void expect_alike(const std::vector<std::uint8_t>& motors) {
+    for (const std::uint8_t motor : motors) {
+      expect_the_same_steps(motor, steps(0, motor).size());
+      expect_the_same_times(motor);
+    }
+    expect_the_same_reports();
+  }
+
   void expect_the_same_reports() {
     const bushd_report expected = master_.poll(kVirtual);
     const bushd_report report = master_.poll(kReal);
@@ -281,6 +310,19 @@ class Script : public testing::Test {
   FrameMaster master_;
   bushd_set_outputs levels_{};                // of the outputs of both
   std::map<std::uint8_t, std::size_t> seen_;  // steps of a motor, at the last look
+
+ private:
+  struct Shaft {
+    std::size_t seen = 0;  // edges
+    bool positive = false;
+    std::int64_t position = 0;
+  };
+  std::map<std::pair<std::size_t, std::uint8_t>, Shaft> shafts_;  // by MCU and motor
+};
+
+class TargetScript : public Script, public testing::WithParamInterface<Target> {
+ protected:
+  TargetScript() : Script(GetParam()) {}
 };
 
 }  // namespace bushd::sim

@@ -22,8 +22,7 @@ constexpr std::uint16_t bit(unsigned n) {
   return static_cast<std::uint16_t>(1u << n);
 }
 
-// What stands at the motor, by the pins of the twin: a step of both is not at just the same time,
-// and the contacts are to say the same to both.
+// What stands at the motor.
 class Stage {
  public:
   Stage(std::int64_t home_at_steps, std::uint8_t positive, std::uint8_t home) {
@@ -32,20 +31,13 @@ class Stage {
     put(home, {.at_steps = home_at_steps, .seed = 3, .width_steps = 80});
   }
 
-  bushd_inputs sense(TimeNs now_ns, const std::vector<Edge>& edges) {
-    for (; seen_ < edges.size(); ++seen_) {
-      const Edge& edge = edges[seen_];
-      if (edge.mcu != 0 || edge.index != kMotor) continue;
-      if (edge.signal == Signal::kDir) positive_ = edge.level;
-      if (edge.signal == Signal::kStep && edge.level) position_steps_ += positive_ ? 1 : -1;
-    }
+  bushd_inputs sense(TimeNs now_ns, std::int64_t position_steps) {
     unsigned active = 0;
     for (auto& [input, contact] : contacts_) {
-      if (contact.read(now_ns, position_steps_)) active |= 1u << input;
+      if (contact.read(now_ns, position_steps)) active |= 1u << input;
     }
     return {static_cast<std::uint16_t>(active), 0};
   }
-  std::int64_t position_steps() const { return position_steps_; }
 
  private:
   // Three ticks of bounce are within a slow step.
@@ -56,16 +48,11 @@ class Stage {
   }
 
   std::vector<std::pair<std::uint8_t, Switch>> contacts_;
-  std::size_t seen_ = 0;
-  bool positive_ = false;
-  std::int64_t position_steps_ = 0;
 };
 
-class Switches : public Script, public testing::WithParamInterface<Target> {
+class Switches : public TargetScript {
  protected:
   static constexpr std::int64_t kHomeAt = -120;
-
-  Switches() : Script(GetParam()) {}
 
   void SetUp() override {
     ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor}));
@@ -78,24 +65,25 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     inputs.limit_positive = inputs.limit_negative = bit(kMotor);
     inputs.inverted = bit(kNegative);
     inputs.debounce_ticks = 1;
-    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs));
-    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs,
-                                bushd_motor_inputs{kMotor, own(kPositive), kNegative, home}));
+    ASSERT_NO_FATAL_FAILURE(ask(inputs));
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_motor_inputs{kMotor, own(kPositive), kNegative, home}));
   }
 
-  // Inputs are looked at once a tick: they change for both in the same one.
+  // By the pins of the twin: a step of both is not at just the same time, and the contacts are to
+  // say the same to both.
+  std::int64_t position_steps() { return position(0, kMotor); }
   void sense() {
-    bus_.advance_to(bus_.node(0).next_event_ns() + TimeNs{kTickNs} * 3 / 4);
-    set_inputs(stage_.sense(bus_.now_ns(), recorder_.edges));
+    to_inputs_time();
+    set_inputs(stage_.sense(bus_.now_ns(), position_steps()));
   }
 
   // Polls take ticks in which nobody looks at the switches, so they wait until nothing moves.
   void pass_until_rest() {
-    std::int64_t stood_at = stage_.position_steps();
+    std::int64_t stood_at = position_steps();
     for (int ticks = 1; ticks < 6000; ++ticks) {
       sense();
       if (ticks % 60 != 0) continue;
-      if (std::exchange(stood_at, stage_.position_steps()) != stood_at) continue;
+      if (std::exchange(stood_at, position_steps()) != stood_at) continue;
       if (master_.poll(kReal).moving == 0 && master_.poll(kVirtual).moving == 0) return;
     }
     FAIL() << "it does not come to rest";
@@ -106,21 +94,13 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     ASSERT_NO_FATAL_FAILURE(pass_until_rest());
   }
   void go_to(std::int64_t place) {
-    const std::int64_t way = place - stage_.position_steps();
+    const std::int64_t way = place - position_steps();
     if (way == 0) return;
     go(way > 0 ? 1 : -1, static_cast<std::uint32_t>(std::abs(way)));
   }
 
-  // Both within one tick: from then on they go together.
   void home(std::int8_t direction) {
-    const bushd_home message{kMotor, direction, 3000, 0, 400, 1000, 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_home(&message, payload.data()));
-    bus_.advance_to(bus_.node(0).next_event_ns());
-    for (const std::uint8_t address : {kVirtual, kReal}) {
-      master_.post(address, BUSHD_MSG_HOME, payload);
-      bus_.advance_to(bus_.now_ns() + 1'000'000);
-    }
+    Script::home({kMotor, direction, 3000, 0, 400, 1000, 0});
     ASSERT_NO_FATAL_FAILURE(pass_until_rest());
   }
 
@@ -130,17 +110,15 @@ class Switches : public Script, public testing::WithParamInterface<Target> {
     EXPECT_EQ(report.homed, bit(kMotor));
     // Bounce, of three ticks, and the tick up to the next reading end within a slow step, of 10 ms
     // or almost four ticks.
-    const std::int64_t off = stage_.position_steps() - at - report.motor[kMotor].position_steps;
+    const std::int64_t off = position_steps() - at - report.motor[kMotor].position_steps;
     EXPECT_LE(std::abs(off), 1) << "the counter is 0 where the switch closes";
     // Then come two more readings, and the tick that is prepared by then is made: eight ticks in
     // all, 20.5 ms, in which two more steps may begin.
-    EXPECT_LE(std::abs(stage_.position_steps() - at), 2);
+    EXPECT_LE(std::abs(position_steps() - at), 2);
   }
 
   void expect_alike() {
-    expect_the_same_steps(kMotor, steps(0, kMotor).size());
-    expect_the_same_times(kMotor);
-    expect_the_same_reports();
+    Script::expect_alike({kMotor});
     const bushd_report expected = master_.poll(kVirtual);
     const bushd_report report = master_.poll(kReal);
     EXPECT_EQ(report.forbidden_positive, expected.forbidden_positive);
@@ -160,11 +138,11 @@ TEST_P(Switches, EachLimitStopsItsDirection) {
     EXPECT_EQ(report.forbidden_positive, direction > 0 ? bit(kMotor) : 0);
     EXPECT_EQ(report.forbidden_negative, direction < 0 ? bit(kMotor) : 0);
     EXPECT_EQ(report.inputs, bit(direction > 0 ? own(kPositive) : kNegative));
-    EXPECT_GE(stage_.position_steps() * direction, kEnd);
+    EXPECT_GE(position_steps() * direction, kEnd);
     // At cruise, 0.9 ms, a tick has 2.9 steps: three ticks of bounce, one for debouncing, two until
     // the MCU acts, and then its ramp.
     const std::int64_t overrun = 18 + static_cast<std::int64_t>(codes_.size());
-    EXPECT_LE(stage_.position_steps() * direction, kEnd + overrun);
+    EXPECT_LE(position_steps() * direction, kEnd + overrun);
     expect_alike();
   }
 }
@@ -193,7 +171,7 @@ TEST_P(Switches, NoHomeBetweenTheLimits) {
   ASSERT_NO_FATAL_FAILURE(home(1));
   EXPECT_EQ(master_.poll(kReal).homing, BUSHD_HOMING_NOT_FOUND);
   EXPECT_EQ(master_.poll(kReal).forbidden_negative, bit(kMotor));
-  EXPECT_LE(stage_.position_steps(), -kEnd);
+  EXPECT_LE(position_steps(), -kEnd);
   expect_alike();
 }
 

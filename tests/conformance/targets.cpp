@@ -14,40 +14,50 @@
 namespace bushd::sim {
 namespace {
 
-#ifdef AVR_IMAGES
-class Avr : public McuUnderTest {
+template <class Image, class Options>
+class ImageUnderTest : public McuUnderTest {
  public:
-  explicit Avr(AvrOptions options) : options_(std::move(options)) {}
-  std::uint32_t full_tick_ns(bushd_format format) const override {
-    return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;
-  }
+  explicit ImageUnderTest(Options options) : options_(std::move(options)) {}
   std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
                             EdgeSink* sink) override {
-    AvrOptions options = options_;
-    options.address = birth.address;
-    options.unique_id = birth.unique_id;
-    options.boots = birth.boots;
-    auto mcu = std::make_unique<AvrMcu>(options, index, driver, sink);
+    options_.address = birth.address;
+    options_.unique_id = birth.unique_id;
+    options_.boots = birth.boots;
+    auto mcu = std::make_unique<Image>(options_, index, driver, sink);
     mcu->on_conversion = on_conversion;
-    avr_ = mcu.get();
+    mcu_ = mcu.get();
     return mcu;
+  }
+  void expect_unharmed() const override {
+    EXPECT_EQ(mcu_->overruns(), 0u);
+    EXPECT_EQ(mcu_->bytes_cut(), 0u);
+  }
+
+ protected:
+  Image* mcu_ = nullptr;
+
+ private:
+  Options options_;
+};
+
+#ifdef AVR_IMAGES
+class Avr : public ImageUnderTest<AvrMcu, AvrOptions> {
+ public:
+  using ImageUnderTest::ImageUnderTest;
+  std::uint32_t full_tick_ns(bushd_format format) const override {
+    return format == BUSHD_FORMAT_FINE ? 4'000'000 : 2'560'000;
   }
   TimeNs keeps_within_ns(std::size_t codes) const override {
     return 3'000'000'000 + static_cast<TimeNs>(codes) * 10'000'000;
   }
-  std::uint64_t nvm_writes() const override { return avr_->eeprom_writes(); }
-  void hang() override { avr_->hang(); }
-  void flip_nvm_bit() override { avr_->flip_eeprom_bit(43 + 30, 2); }  // nvm.h
+  std::uint64_t nvm_writes() const override { return mcu_->eeprom_writes(); }
+  void hang() override { mcu_->hang(); }
+  void flip_nvm_bit() override { mcu_->flip_eeprom_bit(43 + 30, 2); }  // nvm.h
   void expect_unharmed() const override {
-    EXPECT_EQ(avr_->overruns(), 0u);
-    EXPECT_EQ(avr_->bytes_cut(), 0u);
-    EXPECT_GE(avr_->untouched_ram(), AvrMemoryWatch::kReserve);
-    testing::Test::RecordProperty("untouched_ram_bytes", static_cast<int>(avr_->untouched_ram()));
+    ImageUnderTest::expect_unharmed();
+    EXPECT_GE(mcu_->untouched_ram(), AvrMemoryWatch::kReserve);
+    testing::Test::RecordProperty("untouched_ram_bytes", static_cast<int>(mcu_->untouched_ram()));
   }
-
- private:
-  AvrOptions options_;
-  AvrMcu* avr_ = nullptr;
 };
 
 class Atmega2560 final : public Avr {
@@ -84,8 +94,10 @@ class Atmega1284p final : public Avr {
 #endif
 
 #ifdef LM3S_IMAGES
-class Lm3s6965 final : public McuUnderTest {
+class Lm3s6965 final : public ImageUnderTest<QemuMcu, QemuOptions> {
  public:
+  Lm3s6965()
+      : ImageUnderTest({.image = LM3S_IMAGES "-500000.elf", .memory_owners = LM3S_MEMORY_OWNERS}) {}
   McuOptions twin() const override {
     return {.slots = 128,
             .queue_ticks = 512,
@@ -94,34 +106,14 @@ class Lm3s6965 final : public McuUnderTest {
             .disabled_capabilities = BUSHD_CAN_CURRENTS | BUSHD_CAN_VELOCITY | BUSHD_CAN_KEYPAD};
   }
   std::uint32_t full_tick_ns(bushd_format) const override { return 2'560'000; }
-  std::unique_ptr<Mcu> make(const Birth& birth, std::size_t index, Mcu::Driver& driver,
-                            EdgeSink* sink) override {
-    QemuOptions options;
-    options.image = LM3S_IMAGES "-500000.elf";
-    options.memory_owners = LM3S_MEMORY_OWNERS;
-    options.address = birth.address;
-    options.unique_id = birth.unique_id;
-    options.boots = birth.boots;
-    auto mcu = std::make_unique<QemuMcu>(options, index, driver, sink);
-    mcu->on_conversion = on_conversion;
-    qemu_ = mcu.get();
-    return mcu;
-  }
   TimeNs keeps_within_ns(std::size_t) const override { return 2'000'000'000; }
-  std::uint64_t nvm_writes() const override { return qemu_->flash_writes(); }
-  void hang() override { qemu_->stop_ticks(); }
+  std::uint64_t nvm_writes() const override { return mcu_->flash_writes(); }
+  void hang() override { mcu_->stop_ticks(); }
   bool power_comes_back_next() override {
-    qemu_->power_comes_back_next();
+    mcu_->power_comes_back_next();
     return true;
   }
-  void flip_nvm_bit() override { qemu_->flip_flash_bit(0x27800 + 20 + 32, 2); }  // nvm.h
-  void expect_unharmed() const override {
-    EXPECT_EQ(qemu_->overruns(), 0u);
-    EXPECT_EQ(qemu_->bytes_cut(), 0u);
-  }
-
- private:
-  QemuMcu* qemu_ = nullptr;
+  void flip_nvm_bit() override { mcu_->flip_flash_bit(0x27800 + 20 + 32, 2); }  // nvm.h
 };
 #endif
 

@@ -14,16 +14,14 @@ constexpr std::uint16_t kSensor = 1 << 5;
 constexpr std::uint32_t kSteps = 12;
 constexpr std::uint32_t kDelayUs = 150'000;
 
-class Travels : public Script, public testing::WithParamInterface<Target> {
+class Travels : public TargetScript {
  protected:
-  Travels() : Script(GetParam()) {}
   void SetUp() override {
     ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {kMotor}));
     bushd_set_inputs settings{};
     settings.limit_positive = settings.limit_negative = 1 << kMotor;
-    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_INPUTS, bushd_encode_set_inputs, settings));
-    ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs,
-                                bushd_motor_inputs{kMotor, 3, 4, 4}));
+    ASSERT_NO_FATAL_FAILURE(ask(settings));
+    ASSERT_NO_FATAL_FAILURE(ask(bushd_motor_inputs{kMotor, 3, 4, 4}));
     sense();
     pass_ticks(4);
   }
@@ -32,24 +30,7 @@ class Travels : public Script, public testing::WithParamInterface<Target> {
     Script::TearDown();
   }
 
-  std::vector<TimeNs> steps_since(std::size_t mcu, TimeNs begin_ns) const {
-    std::vector<TimeNs> found;
-    for (const TimeNs at_ns : recorder_.times(mcu, Signal::kStep, kMotor, true)) {
-      if (at_ns >= begin_ns) found.push_back(at_ns);
-    }
-    return found;
-  }
-  // Where the pulses and DIR have led.
-  std::int64_t position(std::size_t mcu) const {
-    std::int64_t position = 0;
-    bool positive = false;
-    for (const Edge& edge : recorder_.edges) {
-      if (edge.mcu != mcu || edge.index != kMotor) continue;
-      if (edge.signal == Signal::kDir) positive = edge.level;
-      if (edge.signal == Signal::kStep && edge.level) position += positive ? 1 : -1;
-    }
-    return position;
-  }
+  std::int64_t position(std::size_t mcu) { return Script::position(mcu, kMotor); }
   void sense() {
     for (const std::size_t mcu : {0, 1}) {
       const std::int64_t at = position(mcu);
@@ -90,8 +71,7 @@ BUSHD_FOR_TARGETS(Travels, targets());
 TEST_P(Travels, EachReactorStartOpensTheShutterOnceAndInTime) {
   constexpr std::uint32_t kWaitUs = 320'000;
   std::mt19937 random(3);
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_TRAVEL, bushd_encode_travel,
-                              bushd_travel{1, BUSHD_TRAVEL_LIMITS, kMotor, 1, BUSHD_EDGE_RISING, 0,
+  ASSERT_NO_FATAL_FAILURE(ask(bushd_travel{1, BUSHD_TRAVEL_LIMITS, kMotor, 1, BUSHD_EDGE_RISING, 0,
                                            kSteps, kDelayUs, kWaitUs}));
   for (int start = 0; start < 3; ++start) {
     SCOPED_TRACE("start " + std::to_string(start));
@@ -107,7 +87,7 @@ TEST_P(Travels, EachReactorStartOpensTheShutterOnceAndInTime) {
     turn(false);
     pass(320'000'000);
     for (const std::size_t mcu : {0, 1}) {
-      const auto made = steps_since(mcu, edge_ns);
+      const auto made = steps_since(mcu, kMotor, edge_ns);
       EXPECT_EQ(made.size(), 2 * kSteps);
       expect_run(mcu, made, 0, edge_ns + TimeNs{kDelayUs} * 1000);
       expect_run(mcu, made, kSteps, edge_ns + TimeNs{kWaitUs} * 1000);
@@ -117,7 +97,7 @@ TEST_P(Travels, EachReactorStartOpensTheShutterOnceAndInTime) {
   }
   bushd_travel none{};
   none.motor = kMotor;
-  ASSERT_NO_FATAL_FAILURE(ask(BUSHD_MSG_TRAVEL, bushd_encode_travel, none));
+  ASSERT_NO_FATAL_FAILURE(ask(none));
   turn(true);
   pass(200'000'000);
   EXPECT_EQ(position(1), 0);
@@ -126,8 +106,7 @@ TEST_P(Travels, EachReactorStartOpensTheShutterOnceAndInTime) {
 
 TEST_P(Travels, OneStepIsSeenOrNot) {
   const auto step = [&](std::uint8_t number) {
-    ask(BUSHD_MSG_TRAVEL, bushd_encode_travel,
-        bushd_travel{number, BUSHD_TRAVEL_STEP, kMotor, 1, BUSHD_EDGE_NONE, 5, 1, 0, 40'000});
+    ask(bushd_travel{number, BUSHD_TRAVEL_STEP, kMotor, 1, BUSHD_EDGE_NONE, 5, 1, 0, 40'000});
   };
   ASSERT_NO_FATAL_FAILURE(step(1));
   pass(20'000'000);

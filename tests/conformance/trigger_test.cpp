@@ -10,17 +10,16 @@ namespace {
 
 constexpr TimeNs kSlotNs = kTickNs / 128;
 
-class Triggers : public Script, public testing::WithParamInterface<Target> {
+class Triggers : public TargetScript {
  protected:
-  Triggers() : Script(GetParam()) {}
   void SetUp() override { ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_FORMAT_FINE, {2, 3, 5})); }
 
   void arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
            const std::vector<bushd_table_run_entry>& entries) {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_trigger(number, edge, delay_us, entries.data(),
-                                        static_cast<std::uint8_t>(entries.size()), payload.data()));
-    ask(BUSHD_MSG_TRIGGER, payload);
+    ask(BUSHD_MSG_TRIGGER, payload_of([&](std::uint8_t* to) {
+          return bushd_encode_trigger(number, edge, delay_us, entries.data(),
+                                      static_cast<std::uint8_t>(entries.size()), to);
+        }));
   }
   // The input becomes active or inactive; returns when.
   TimeNs turn(bool active) {
@@ -28,14 +27,6 @@ class Triggers : public Script, public testing::WithParamInterface<Target> {
     return bus_.now_ns();
   }
   void pass(TimeNs ns) { bus_.advance_to(bus_.now_ns() + ns); }
-  // The pulses of a motor from a time on.
-  std::vector<TimeNs> steps_since(std::size_t mcu, std::uint8_t motor, TimeNs begin_ns) const {
-    std::vector<TimeNs> found;
-    for (const TimeNs at_ns : recorder_.times(mcu, Signal::kStep, motor, true)) {
-      if (at_ns >= begin_ns) found.push_back(at_ns);
-    }
-    return found;
-  }
 };
 BUSHD_FOR_TARGETS(Triggers, targets());
 
@@ -112,8 +103,7 @@ TEST_P(Triggers, TheComparePulseFollowsItsStep) {
     for (const std::uint32_t width_us : {20u, 3'000u, 50'000u}) {
       SCOPED_TRACE(std::to_string(delay_us) + " us, " + std::to_string(width_us) + " us");
       ASSERT_NO_FATAL_FAILURE(
-          ask(BUSHD_MSG_POSITION_COMPARE, bushd_encode_position_compare,
-              bushd_position_compare{2, BUSHD_ARRIVES_POSITIVE, position + 4, delay_us, width_us}));
+          ask(bushd_position_compare{2, BUSHD_ARRIVES_POSITIVE, position + 4, delay_us, width_us}));
       const TimeNs begin_ns = bus_.now_ns();
       run_by_table(master_.poll(kReal).tick + 24, {{2, 0, 1, 6, 0}});
       pass(400'000'000);
@@ -167,8 +157,7 @@ TEST_P(Current, IsMeasuredAndPulsesAreAsFarApart) {
   bushd_emission settings{};
   settings.mode = BUSHD_EMISSION_STAGGERED;
   settings.step_us = 2048;
-  ASSERT_EQ(master.acknowledged(kReal, BUSHD_MSG_EMISSION, bushd_encode_emission, settings),
-            BUSHD_OK);
+  ASSERT_EQ(master.acknowledged(kReal, settings), BUSHD_OK);
   for (std::uint8_t m = 0; m < 2; ++m) ASSERT_NO_FATAL_FAILURE(master.assign(kReal, m, 0));
   EXPECT_EQ(master.poll(kReal).state, BUSHD_STATE_BUSY);
   bus.advance_to(bus.now_ns() + 40 * TimeNs{kLongTickNs});
@@ -180,14 +169,12 @@ TEST_P(Current, IsMeasuredAndPulsesAreAsFarApart) {
 
   // One step of both motors, a tick after another.
   supply.recorder.edges.clear();
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  const std::array<std::uint16_t, 2> delays{};
-  std::size_t size = bushd_encode_ticks_head(0, BUSHD_TICKS_START, report.tick + 20, 1, 3,
-                                             delays.data(), payload.data());
-  payload[size++] = 0x81;
-  payload[size++] = 0x81;
-  payload.resize(size);
-  master.send(kReal, BUSHD_MSG_TICKS, payload);
+  master.send(kReal, BUSHD_MSG_TICKS,
+              test::ticks_payload({.flags = BUSHD_TICKS_START,
+                                   .first = report.tick + 20,
+                                   .mask = 3,
+                                   .displacements = {0x81, 0x81},
+                                   .delays = {0, 0}}));
   bus.advance_to(bus.now_ns() + 30 * TimeNs{kLongTickNs});
   const auto first = supply.recorder.times(0, Signal::kStep, 0, true);
   const auto second = supply.recorder.times(0, Signal::kStep, 1, true);

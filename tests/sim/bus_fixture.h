@@ -15,10 +15,12 @@
 #include "engine/frame.h"
 #include "engine/message.h"
 #include "sim/bus.h"
+#include "sim/requests.h"
 
 namespace bushd::sim {
 
 using Bytes = std::vector<std::uint8_t>;
+using test::payload_of;
 
 // Keeps edges per MCU as they come and checks what an EdgeSink is promised.
 class Recorder final : public EdgeSink {
@@ -61,6 +63,14 @@ struct Frame {
   TimeNs end_ns;
 };
 
+// An MCU of this kind, for Bus::add_mcu.
+template <class Kind, class Options>
+Bus::MakeMcu mcu_of(const Options& options) {
+  return [options](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
+    return std::make_unique<Kind>(options, index, driver, sink);
+  };
+}
+
 // A master that sends the frames which a test gives it, and collects those that are received.
 class FrameMaster {
  public:
@@ -99,6 +109,12 @@ class FrameMaster {
     drain();
   }
 
+  template <class Message>
+  void broadcast(const Message& message) {
+    const test::Request request = test::request_of(message);
+    send(BUSHD_ADDRESS_BROADCAST, static_cast<std::uint8_t>(request.type), request.payload);
+  }
+
   void drain() {
     TimeNs silent_ns;
     do {
@@ -131,21 +147,16 @@ class FrameMaster {
   }
   // All good answers of a broadcast scan.
   std::vector<Frame> scan(const bushd_identify& message) {
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
     frames.clear();
-    send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_IDENTIFY,
-         {payload.data(), bushd_encode_identify(&message, payload.data())});
+    broadcast(message);
     return frames;
   }
 
   // The status that an MCU acknowledges a request with; BUSHD_E_LENGTH if no good reply came.
   template <class Message>
-  bushd_status acknowledged(std::uint8_t address, bushd_type type,
-                            std::size_t (*encode)(const Message*, std::uint8_t*),
-                            const Message& message) {
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    const std::size_t size = encode(&message, payload.data());
-    return acknowledged(address, type, {payload.data(), size});
+  bushd_status acknowledged(std::uint8_t address, const Message& message) {
+    const test::Request request = test::request_of(message);
+    return acknowledged(address, request.type, request.payload);
   }
   bushd_status acknowledged(std::uint8_t address, bushd_type type,
                             std::span<const std::uint8_t> payload) {
@@ -197,11 +208,9 @@ class FrameMaster {
 
   // A SYNC to all; returns its sync id.
   std::uint32_t sync(bushd_sync message) {
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
     message.master = 1;
     message.sync_id = ++sync_id_;
-    send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC,
-         {payload.data(), bushd_encode_sync(&message, payload.data())});
+    broadcast(message);
     return sync_id_;
   }
 
@@ -212,9 +221,7 @@ class FrameMaster {
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});  // all have booted
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
       const bushd_configure configure{tick_ns, format, 1000};
-      ASSERT_EQ(acknowledged(bus_.node(i).address(), BUSHD_MSG_CONFIGURE, bushd_encode_configure,
-                             configure),
-                BUSHD_OK);
+      ASSERT_EQ(acknowledged(bus_.node(i).address(), configure), BUSHD_OK);
     }
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
     const std::uint32_t sync_id = sync({});
@@ -223,9 +230,7 @@ class FrameMaster {
     bus_.advance_to(bus_.now_ns() + 10 * TimeNs{tick_ns});
     for (std::size_t i = 0; i < bus_.mcu_count(); ++i) {
       const std::uint8_t address = bus_.node(i).address();
-      ASSERT_EQ(acknowledged(address, BUSHD_MSG_CONTROL, bushd_encode_control,
-                             bushd_control{BUSHD_CONTROL_ENABLE, 0}),
-                BUSHD_OK);
+      ASSERT_EQ(acknowledged(address, bushd_control{BUSHD_CONTROL_ENABLE, 0}), BUSHD_OK);
       ASSERT_EQ(poll(address).state, BUSHD_STATE_READY);
     }
   }
@@ -240,15 +245,15 @@ class FrameMaster {
                     const std::vector<std::uint16_t>& accel, std::uint16_t cruise) {
     const bushd_table_begin begin{
         bank, static_cast<std::uint16_t>(accel.size()), 0, cruise, time_unit_ns, 1};
-    ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin, begin),
-              BUSHD_OK);
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
+    ASSERT_EQ(acknowledged(address, begin), BUSHD_OK);
     for (std::size_t at = 0; at < accel.size(); at += BUSHD_TABLE_DATA_MAX_CODES) {
       const auto count = static_cast<std::uint8_t>(
           std::min<std::size_t>(BUSHD_TABLE_DATA_MAX_CODES, accel.size() - at));
-      const std::size_t size = bushd_encode_table_data(bank, static_cast<std::uint16_t>(at), count,
-                                                       accel.data() + at, payload.data());
-      ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_DATA, {payload.data(), size}), BUSHD_OK);
+      const Bytes payload = payload_of([&](std::uint8_t* to) {
+        return bushd_encode_table_data(bank, static_cast<std::uint16_t>(at), count,
+                                       accel.data() + at, to);
+      });
+      ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_DATA, payload), BUSHD_OK);
     }
     bushd_table table{};
     table.accel.code = table.decel.code = accel.data();
@@ -256,12 +261,11 @@ class FrameMaster {
     table.cruise = cruise;
     table.time_unit_ns = time_unit_ns;
     const bushd_table_end end{bank, bushd_table_crc32(&table)};
-    ASSERT_EQ(acknowledged(address, BUSHD_MSG_TABLE_END, bushd_encode_table_end, end), BUSHD_OK);
+    ASSERT_EQ(acknowledged(address, end), BUSHD_OK);
   }
 
   void assign(std::uint8_t address, std::uint8_t motor, std::uint8_t bank) {
-    ASSERT_EQ(acknowledged(address, BUSHD_MSG_ASSIGN, bushd_encode_assign, {motor, bank}),
-              BUSHD_OK);
+    ASSERT_EQ(acknowledged(address, bushd_assign{motor, bank}), BUSHD_OK);
   }
   void assign_all(std::uint8_t address, std::uint8_t bank) {
     for (std::uint8_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
@@ -272,16 +276,13 @@ class FrameMaster {
   // Fine ticks for one motor, from first_tick on, at rest behind the last.
   void fine_ticks(std::uint8_t address, std::uint8_t motor, std::uint32_t first_tick,
                   const std::vector<std::int16_t>& displacements, std::uint16_t delay_at_end = 0) {
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    std::size_t size = bushd_encode_ticks_head(0, BUSHD_TICKS_FINE | BUSHD_TICKS_START, first_tick,
-                                               static_cast<std::uint8_t>(displacements.size()),
-                                               static_cast<std::uint16_t>(1u << motor),
-                                               &delay_at_end, payload.data());
-    for (const std::int16_t displacement : displacements) {
-      bushd_put_i16(payload.data() + size, displacement);
-      size += 2;
-    }
-    send(address, BUSHD_MSG_TICKS, {payload.data(), size});
+    send(address, BUSHD_MSG_TICKS,
+         test::ticks_payload({.flags = BUSHD_TICKS_FINE | BUSHD_TICKS_START,
+                              .first = first_tick,
+                              .count = static_cast<std::uint8_t>(displacements.size()),
+                              .mask = static_cast<std::uint16_t>(1u << motor),
+                              .displacements = displacements,
+                              .delays = {delay_at_end}}));
   }
 
   // For how long an MCU may be silent before it answers, if it does not announce its answers.

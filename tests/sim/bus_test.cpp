@@ -134,13 +134,14 @@ TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirWindows) {
   const TimeNs asked_ns = bus.now_ns();
   const std::array<bushd_poll_entry, 3> entries = {
       {{2, 500, 0, 255}, {9, 900, 0, 255}, {1, 1300, 0, 255}}};
-  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-  const std::size_t size = bushd_encode_poll(entries.data(), 3, payload.data());
+  const Bytes payload =
+      payload_of([&](std::uint8_t* to) { return bushd_encode_poll(entries.data(), 3, to); });
   master.frames.clear();
-  master.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, {payload.data(), size});
+  master.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, payload);
   ASSERT_EQ(master.frames.size(), 2u);
   EXPECT_EQ(bus.collisions(), 0u);
-  const TimeNs poll_ns = asked_ns + static_cast<TimeNs>(1 + size + BUSHD_FRAME_OVERHEAD) * kByteNs;
+  const TimeNs poll_ns =
+      asked_ns + static_cast<TimeNs>(1 + payload.size() + BUSHD_FRAME_OVERHEAD) * kByteNs;
   const TimeNs begin_ns[] = {5'000'000, 13'000'000};
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(master.frames[i].address, i == 0 ? 2 : 1);
@@ -175,10 +176,8 @@ TEST(Bus, McusOfOneAddressAreFoundAndParted) {
   bushd_set_address message{};
   std::copy_n(identity.unique_id, BUSHD_UNIQUE_ID_SIZE, message.unique_id);
   message.address = 6;
-  std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
   master.frames.clear();
-  master.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS,
-              {payload.data(), bushd_encode_set_address(&message, payload.data())});
+  master.broadcast(message);
   ASSERT_EQ(master.frames.size(), 1u);
   EXPECT_EQ(master.frames[0].address, 6);
   EXPECT_EQ(master.frames[0].payload, Bytes{BUSHD_OK});
@@ -241,9 +240,7 @@ TEST_F(TwoMcus, QueueThatEndsEarlyRunsDownTheTable) {
 TEST_F(TwoMcus, EnableShowsOnTheEnWire) {
   make_ready();
   const TimeNs before_ns = bus.now_ns();
-  ASSERT_EQ(master.acknowledged(2, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                bushd_control{BUSHD_CONTROL_DISABLE, 0}),
-            BUSHD_OK);
+  ASSERT_EQ(master.acknowledged(2, bushd_control{BUSHD_CONTROL_DISABLE, 0}), BUSHD_OK);
   const auto falls = recorder.times(1, Signal::kEnable, 0, false);
   ASSERT_EQ(falls.size(), 1u);
   EXPECT_EQ(falls[0], before_ns + static_cast<TimeNs>(1 + BUSHD_FRAME_OVERHEAD + 1) * kByteNs);

@@ -20,8 +20,7 @@ class EmissionBus {
   }
 
   void use(const bushd_emission& settings, int motors) {
-    ASSERT_EQ(master.acknowledged(1, BUSHD_MSG_EMISSION, bushd_encode_emission, settings),
-              BUSHD_OK);
+    ASSERT_EQ(master.acknowledged(1, settings), BUSHD_OK);
     for (int m = 0; m < motors; ++m) master.assign(1, static_cast<std::uint8_t>(m), 0);
     recorder.edges.clear();
   }
@@ -31,24 +30,17 @@ class EmissionBus {
   void run(const std::vector<std::vector<int>>& rows) {
     const std::size_t motors = rows.front().size();
     const bool fine = format_ == BUSHD_FORMAT_FINE;
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    const std::vector<std::uint16_t> delays(motors, 0);
     first_tick = bus.mcu(0).core().tick + 20;
-    std::size_t size = bushd_encode_ticks_head(
-        0, static_cast<std::uint8_t>(BUSHD_TICKS_START | (fine ? BUSHD_TICKS_FINE : 0)), first_tick,
-        static_cast<std::uint8_t>(rows.size()), static_cast<std::uint16_t>((1u << motors) - 1),
-        delays.data(), payload.data());
+    test::Ticks ticks{
+        .flags = static_cast<std::uint8_t>(BUSHD_TICKS_START | (fine ? BUSHD_TICKS_FINE : 0)),
+        .first = first_tick,
+        .count = static_cast<std::uint8_t>(rows.size()),
+        .mask = static_cast<std::uint16_t>((1u << motors) - 1),
+        .delays = std::vector<std::uint16_t>(motors, 0)};
     for (const auto& row : rows) {
-      for (const int steps : row) {
-        if (fine) {
-          bushd_put_i16(payload.data() + size, static_cast<std::int16_t>(256 * steps));
-          size += 2;
-        } else {
-          payload[size++] = static_cast<std::uint8_t>(std::abs(steps) | (steps > 0 ? 0x80 : 0));
-        }
-      }
+      for (const int steps : row) ticks.displacements.push_back(test::displacement_of(steps, fine));
     }
-    master.post(1, BUSHD_MSG_TICKS, {payload.data(), size});
+    master.post(1, BUSHD_MSG_TICKS, test::ticks_payload(ticks));
     while (bus.mcu(0).core().tick != first_tick) bus.advance_to(bus.next_event_ns());
     start_ns = bus.now_ns();
     bus.advance_to(start_ns + static_cast<TimeNs>(rows.size() + 3) * tick_ns_);

@@ -309,9 +309,7 @@ TEST(EmissionOnPins, PhasesFollowThePositionInEverySequenceAndBothWays) {
       lab.use(settings, 4);
       lab.run({{3, -1, 0, 1}, {9, -7, 0, 0}, {-2, 5, 0, 0}, {-30, 1, 1, 0}});
       // Another value of the counter is not another place of the rotor.
-      ASSERT_EQ(lab.master.acknowledged(1, BUSHD_MSG_SET_POSITION, bushd_encode_set_position,
-                                        bushd_set_position{0, 1'000'001}),
-                BUSHD_OK);
+      ASSERT_EQ(lab.master.acknowledged(1, bushd_set_position{0, 1'000'001}), BUSHD_OK);
       lab.run({{-3, 0, 0, 0}, {0, 0, 0, 0}, {4, 0, 0, 0}});
       const std::array<std::int64_t, 4> expected = {-20 + 1, -2, 1, 1};
       for (int m = 0; m < 4; ++m) {
@@ -338,9 +336,7 @@ TEST(EmissionOnPins, HoldCurrentIsOnOrOffAtRest) {
     EXPECT_EQ(levels_of(lab.recorder, 0).back().second, hold ? 4 : 0);
     EXPECT_EQ(levels_of(lab.recorder, 1).back().second, hold ? 1 : 0);
     // Without EN nothing holds.
-    ASSERT_EQ(lab.master.acknowledged(1, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                      bushd_control{BUSHD_CONTROL_DISABLE, 0}),
-              BUSHD_OK);
+    ASSERT_EQ(lab.master.acknowledged(1, bushd_control{BUSHD_CONTROL_DISABLE, 0}), BUSHD_OK);
     lab.bus.advance_to(lab.bus.now_ns() + 10'000'000);
     if (hold) {
       EXPECT_EQ(levels_of(lab.recorder, 1).back().second, 0);
@@ -356,9 +352,7 @@ TEST(EmissionOnPins, AnotherModeTakesTheLevelsAway) {
   lab.use(settings, 1);
   lab.run({{1}});
   EXPECT_EQ(levels_of(lab.recorder, 0).back().second, 2);
-  ASSERT_EQ(lab.master.acknowledged(1, BUSHD_MSG_EMISSION, bushd_encode_emission,
-                                    of_mode(BUSHD_EMISSION_EVEN)),
-            BUSHD_OK);
+  ASSERT_EQ(lab.master.acknowledged(1, of_mode(BUSHD_EMISSION_EVEN)), BUSHD_OK);
   lab.bus.advance_to(lab.bus.now_ns() + 10'000'000);
   EXPECT_EQ(levels_of(lab.recorder, 0).back().second, 0);
 }
@@ -367,16 +361,12 @@ TEST(EmissionOnPins, StepsOfATickThatAResetCutsAreThoseThatWereMade) {
   for (const bushd_emission_mode mode : {BUSHD_EMISSION_BURST, BUSHD_EMISSION_PHASES}) {
     EmissionBus lab(kTickNs);
     lab.use(of_mode(mode), 1);
-    const Bytes ticks = [&] {
-      std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-      const std::uint16_t delay = 0;
-      lab.first_tick = lab.bus.mcu(0).core().tick + 5;
-      const std::size_t size = bushd_encode_ticks_head(0, BUSHD_TICKS_START, lab.first_tick, 1, 1,
-                                                       &delay, payload.data());
-      payload[size] = 0x88;
-      return Bytes(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(size) + 1);
-    }();
-    lab.master.post(1, BUSHD_MSG_TICKS, ticks);
+    lab.first_tick = lab.bus.mcu(0).core().tick + 5;
+    lab.master.post(1, BUSHD_MSG_TICKS,
+                    test::ticks_payload({.flags = BUSHD_TICKS_START,
+                                         .first = lab.first_tick,
+                                         .displacements = {0x88},
+                                         .delays = {0}}));
     while (lab.bus.mcu(0).core().tick != lab.first_tick) {
       lab.bus.advance_to(lab.bus.next_event_ns());
     }

@@ -36,13 +36,19 @@ class McuAlone : public testing::Test {
   }
   void reboot() { reboot(boot_ns_); }
 
+  void emit_phases(bushd_phase_sequence sequence) {
+    bushd_emission emission{};
+    emission.mode = BUSHD_EMISSION_PHASES;
+    emission.sequence = sequence;
+    emission.hold_current = true;
+    ASSERT_EQ(master_.acknowledged(kAddress, emission), BUSHD_OK);
+  }
+
   // By the table in bank 0.
   void run(std::uint8_t motor, std::uint32_t steps) {
     const bushd_table_run_entry entry{motor, 0, 1, steps, 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(
-        bushd_encode_table_run(0, master_.poll(kAddress).tick + 24, &entry, 1, payload.data()));
-    master_.send(kAddress, BUSHD_MSG_TABLE_RUN, payload);
+    master_.send(kAddress, BUSHD_MSG_TABLE_RUN,
+                 test::table_run_payload(0, master_.poll(kAddress).tick + 24, entry));
   }
 
   std::size_t steps_made(std::uint8_t motor) const {

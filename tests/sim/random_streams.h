@@ -22,6 +22,14 @@ inline std::uint64_t from_environment(const char* name, std::uint64_t otherwise)
   return text != nullptr ? std::strtoull(text, nullptr, 10) : otherwise;
 }
 
+// The command that shows a failure again.
+inline std::string again(std::uint64_t seed, std::uint64_t streams) {
+  const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+  return "BUSHD_SEED=" + std::to_string(seed) + " BUSHD_STREAMS=" + std::to_string(streams) + " " +
+         program_invocation_short_name + " --gtest_filter=" + test->test_suite_name() + "." +
+         test->name();
+}
+
 class RandomStreams : public testing::Test {
  protected:
   static constexpr int kGroup = 50;
@@ -45,8 +53,8 @@ class RandomStreams : public testing::Test {
   // What a test of it does; this many streams if the environment asks for no other number.
   void leave_it_alive(std::uint64_t by_default) {
     const std::uint64_t streams = from_environment("BUSHD_STREAMS", by_default);
-    std::printf("%s\n", again(streams).c_str());  // before what may be thrown
-    SCOPED_TRACE(again(streams));
+    std::printf("%s\n", again(seed_, streams).c_str());  // before what may be thrown
+    SCOPED_TRACE(again(seed_, streams));
     std::uint64_t moves = 0;
     const std::uint16_t boot_number = master_.poll(kAddress).boot_number;
     for (std::uint64_t done = 0; done < streams && !HasFailure(); ++done) {
@@ -80,14 +88,6 @@ class RandomStreams : public testing::Test {
   }
 
  private:
-  // The command that shows a failure again.
-  std::string again(std::uint64_t streams) const {
-    const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
-    return "BUSHD_SEED=" + std::to_string(seed_) + " BUSHD_STREAMS=" + std::to_string(streams) +
-           " " + program_invocation_short_name + " --gtest_filter=" + test->test_suite_name() +
-           "." + test->name();
-  }
-
   std::uint8_t byte() { return static_cast<std::uint8_t>(random_.below(256)); }
   Bytes bytes(std::size_t size) {
     Bytes out(size);
@@ -100,49 +100,37 @@ class RandomStreams : public testing::Test {
     const bushd_table_run_entry entry{static_cast<std::uint8_t>(random_.below(kMotorsInUse)), 0,
                                       static_cast<std::int8_t>(random_.one_in(2) ? 1 : -1),
                                       static_cast<std::uint32_t>(random_.between(1, 200)), 0};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_table_run(epoch_, tick_ + 9, &entry, 1, payload.data()));
-    master_.post(kAddress, BUSHD_MSG_TABLE_RUN, payload);
+    master_.post(kAddress, BUSHD_MSG_TABLE_RUN, test::table_run_payload(epoch_, tick_ + 9, entry));
   }
 
   // What a master might send; what changes a count is left out.
   Bytes sensible_payload(std::uint8_t type) {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    std::size_t size = 0;
     switch (type) {
       case BUSHD_MSG_TABLE_RUN: {
         const bushd_table_run_entry entry{static_cast<std::uint8_t>(random_.below(16)), 0, 1,
                                           static_cast<std::uint32_t>(random_.between(1, 90)), 0};
-        size = bushd_encode_table_run(epoch_, tick_ + 10, &entry, 1, payload.data());
-        break;
+        return test::table_run_payload(epoch_, tick_ + 10, entry);
       }
       case BUSHD_MSG_TICKS: {
-        const std::array<std::uint16_t, kMotorsInUse> delays{300, 200, 0, 150};
-        size = bushd_encode_ticks_head(epoch_, byte() & 7, tick_ + 10, 8, 0x000F, delays.data(),
-                                       payload.data());
+        // Fine or coarse, whichever length that has.
+        Bytes payload = test::ticks_payload({.flags = static_cast<std::uint8_t>(byte() & 7),
+                                             .first = tick_ + 10,
+                                             .count = 8,
+                                             .mask = 0x000F,
+                                             .delays = {300, 200, 0, 150},
+                                             .epoch = epoch_});
         const Bytes displacements = bytes(64);
-        std::copy(displacements.begin(), displacements.end(), payload.begin() + size);
-        size += random_.one_in(2) ? 32 : 64;
-        break;
+        const auto end = displacements.begin() + (random_.one_in(2) ? 32 : 64);
+        payload.insert(payload.end(), displacements.begin(), end);
+        return payload;
       }
       case BUSHD_MSG_CONFIGURE:
-        size = bushd_encode_configure(
-            std::array<bushd_configure, 1>{{{kTickNs, BUSHD_FORMAT_FINE, 20}}}.data(),
-            payload.data());
-        break;
+        return test::request_of(bushd_configure{kTickNs, BUSHD_FORMAT_FINE, 20}).payload;
       case BUSHD_MSG_POLL:
-        payload[0] = 1;
-        payload[1] = kAddress;
-        payload[2] = payload[3] = 0;
-        payload[4] = byte();
-        payload[5] = byte();
-        size = 6;
-        break;
+        return {1, kAddress, 0, 0, byte(), byte()};
       default:
         return bytes(random_.below(40));
     }
-    payload.resize(size);
-    return payload;
   }
 
   // A frame of the master's, its payload bent now and then; for somebody else or with a sequence
@@ -196,13 +184,11 @@ class RandomStreams : public testing::Test {
     // be answered as late as a poll can say.
     bus_.advance_to(bus_.now_ns() + TimeNs{UINT16_MAX} * BUSHD_REPLY_UNIT_NS);
     master_.patience_ns = 5 * kPatienceNs;
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs,
-                                   bushd_set_inputs{}),
-              BUSHD_OK);
-    ASSERT_EQ(master_.acknowledged(
-                  kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                  bushd_control{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES, 0}),
-              BUSHD_OK);
+    ASSERT_EQ(master_.acknowledged(kAddress, bushd_set_inputs{}), BUSHD_OK);
+    ASSERT_EQ(
+        master_.acknowledged(
+            kAddress, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS | BUSHD_CONTROL_FORGET_TABLES, 0}),
+        BUSHD_OK);
     const bushd_format format = random_.one_in(2) ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, format));
     ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 0, 10'000, {400, 300, 200}, 150));
@@ -215,10 +201,7 @@ class RandomStreams : public testing::Test {
   // All motors come to rest, by themselves or not.
   void settle() {
     if (random_.one_in(4)) bus_.advance_to(bus_.now_ns() + 300'000'000);
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    const bushd_emergency cut{BUSHD_STOP_IMMEDIATE};
-    payload.resize(bushd_encode_emergency(&cut, payload.data()));
-    master_.send(kAddress, BUSHD_MSG_EMERGENCY, payload);
+    master_.send(kAddress, BUSHD_MSG_EMERGENCY, Bytes{BUSHD_STOP_IMMEDIATE});
     bus_.advance_to(bus_.now_ns() + 100'000'000);
   }
 

@@ -12,6 +12,7 @@
 
 #include "engine/message.h"
 #include "sim/edge.h"
+#include "sim/requests.h"
 #include "sim/wire.h"
 
 namespace bushd::sim {
@@ -39,6 +40,23 @@ inline TimeNs time_to_step(const EvenTicks& of, std::size_t step) {
   const std::size_t slots = slots_to_step(of, step);
   return static_cast<TimeNs>(slots / kSlots) * of.tick_ns +
          static_cast<TimeNs>(slots % kSlots) * of.slots_ns / TimeNs{kSlots};
+}
+
+// TICKS in which all motors make so many steps.
+inline std::vector<std::uint8_t> ticks_of_all(bushd_format format, bool starts, std::uint32_t first,
+                                              const std::vector<int>& steps, std::uint16_t delay) {
+  const bool fine = format == BUSHD_FORMAT_FINE;
+  test::Ticks ticks{.flags = static_cast<std::uint8_t>((starts ? BUSHD_TICKS_START : 0) |
+                                                       (fine ? BUSHD_TICKS_FINE : 0)),
+                    .first = first,
+                    .count = static_cast<std::uint8_t>(steps.size()),
+                    .mask = 0xFFFF,
+                    .delays = std::vector<std::uint16_t>(BUSHD_MOTORS_PER_MCU, delay)};
+  for (const int of_a_motor : steps) {
+    ticks.displacements.insert(ticks.displacements.end(), BUSHD_MOTORS_PER_MCU,
+                               test::displacement_of(of_a_motor, fine));
+  }
+  return test::ticks_payload(ticks);
 }
 
 struct PulseFigures {

@@ -42,8 +42,7 @@ TEST(Sync, LateComerJoinsTheOthers) {
   bus.reboot(1, 654'321);
   bus.advance_to(bus.now_ns() + 1'000'000);
   const bushd_configure configure{kTickNs, BUSHD_FORMAT_FINE, 1000};
-  ASSERT_EQ(master.acknowledged(2, BUSHD_MSG_CONFIGURE, bushd_encode_configure, configure),
-            BUSHD_OK);
+  ASSERT_EQ(master.acknowledged(2, configure), BUSHD_OK);
   for (int i = 0; i < 4; ++i) {
     bus.advance_to(bus.now_ns() + 20'000'000);
     master.discipline(1);
@@ -61,13 +60,10 @@ TEST(Sync, RepeatedFrameIsNoOtherMark) {
   FrameMaster master(bus);
   master.bring_up(kTickNs, BUSHD_FORMAT_FINE);
   const auto mark_after = [&](TimeNs pause_ns, std::uint32_t name) {
-    std::array<std::uint8_t, BUSHD_FRAME_MAX_PAYLOAD> payload;
-    const bushd_sync message = {1, name, false, 0, 0, 0};
+    const test::Request sync = test::request_of(bushd_sync{1, name, false, 0, 0, 0});
     bus.advance_to(bus.now_ns() + pause_ns);
-    bus.master_send(
-        FrameMaster::wire(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, 200,
-                          {payload.data(), bushd_encode_sync(&message, payload.data())}),
-        bus.now_ns());
+    bus.master_send(FrameMaster::wire(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, 200, sync.payload),
+                    bus.now_ns());
     master.drain();
     return bus.mcu(0).core().clock.sync_tick;
   };
@@ -122,8 +118,7 @@ class Hour {
     bus_.reboot(0);
     bus_.advance_to(bus_.now_ns() + 100'000'000);
     const bushd_configure configure{tick_ns_, BUSHD_FORMAT_FINE, 1000};
-    ASSERT_EQ(master_.acknowledged(1, BUSHD_MSG_CONFIGURE, bushd_encode_configure, configure),
-              BUSHD_OK);
+    ASSERT_EQ(master_.acknowledged(1, configure), BUSHD_OK);
     for (int i = 0; i < syncs; ++i) {
       bus_.advance_to(bus_.now_ns() + 60'000'000);
       master_.discipline(2);

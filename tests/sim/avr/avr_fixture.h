@@ -18,12 +18,10 @@ class AvrAlone : public McuAlone {
   explicit AvrAlone(std::uint32_t baud = kBaud, std::uint16_t boots = 6,
                     const std::string& kind = "-")
       : McuAlone(baud, kBootNs) {
-    AvrOptions options;
-    options.image = AVR_IMAGES + kind + std::to_string(baud) + ".elf";
-    options.address = kAddress;
-    options.memory_owners = AVR_MEMORY_OWNERS;
-    options.boots = boots;
-    avr_ = add<AvrMcu>(options);
+    avr_ = add<AvrMcu>(AvrOptions{.image = AVR_IMAGES + kind + std::to_string(baud) + ".elf",
+                                  .address = kAddress,
+                                  .boots = boots,
+                                  .memory_owners = AVR_MEMORY_OWNERS});
   }
 
   // All motors may run the table in bank 0.
@@ -57,6 +55,21 @@ class AvrAlone : public McuAlone {
                                   TimeNs passed_ns, std::uint32_t tick_ns) {
     EXPECT_NEAR(after.tick - before.tick, static_cast<double>(passed_ns) / tick_ns, 1.5)
         << "late ticks";
+  }
+
+  AvrMcu* avr_ = nullptr;
+};
+
+// The image for ATmega1284P with a power stage behind its pins, booted.
+class Atmega1284pAlone : public McuAlone {
+ protected:
+  explicit Atmega1284pAlone(const PowerStageRules& rules = {}) : McuAlone(kBaud, 300'000'000) {
+    avr_ = add<AvrMcu>(AvrOptions{.image = ATMEGA1284P_IMAGES "-500000.elf",
+                                  .address = kAddress,
+                                  .memory_owners = ATMEGA1284P_MEMORY_OWNERS,
+                                  .chip = "atmega1284p",
+                                  .power_stage = rules});
+    pass(boot_ns_);
   }
 
   AvrMcu* avr_ = nullptr;

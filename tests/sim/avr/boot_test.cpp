@@ -20,8 +20,7 @@ TEST_F(AvrBoot, ABitOfTheProgramThatHasFlippedKeepsMotorsOff) {
     const bushd_report report = master_.poll(kAddress);
     EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST) << address;
     EXPECT_EQ(report.failed_tests, BUSHD_TEST_FLASH);
-    EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                   bushd_control{BUSHD_CONTROL_ENABLE, 0}),
+    EXPECT_EQ(master_.acknowledged(kAddress, bushd_control{BUSHD_CONTROL_ENABLE, 0}),
               BUSHD_E_STATE);
     avr_->flip_flash_bit(address, 5);
   }

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "sim/avr/avr_mcu.h"
-#include "sim/mcu_alone.h"
+#include "sim/avr/avr_fixture.h"
 
 namespace bushd::sim::chopper_test {
 namespace {
@@ -20,34 +19,17 @@ struct Figures {
   double ripple_a = 0;  // most that the current falls until it is on again
 };
 
-class Chopper : public McuAlone {
+class Chopper : public Atmega1284pAlone {
  protected:
   static constexpr std::uint16_t kRampMa = 1500;
   static constexpr std::uint16_t kCruiseMa = 1000;
   static constexpr std::uint16_t kHoldMa = 300;
 
-  Chopper() : McuAlone(kBaud, 300'000'000) {
-    AvrOptions options;
-    options.image = ATMEGA1284P_IMAGES "-500000.elf";
-    options.memory_owners = ATMEGA1284P_MEMORY_OWNERS;
-    options.chip = "atmega1284p";
-    options.address = kAddress;
-    options.power_stage = rules_;
-    avr_ = add<AvrMcu>(options);
-    pass(boot_ns_);
-  }
-
   void make_ready(bushd_phase_sequence sequence, bushd_decay decay, std::uint16_t cruise_units) {
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
-    bushd_emission emission{};
-    emission.mode = BUSHD_EMISSION_PHASES;
-    emission.sequence = sequence;
-    emission.hold_current = true;
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_EMISSION, bushd_encode_emission, emission),
-              BUSHD_OK);
-    ASSERT_EQ(master_.acknowledged(
-                  kAddress, BUSHD_MSG_CURRENTS, bushd_encode_currents,
-                  bushd_currents{0, static_cast<std::uint8_t>(decay), kRampMa, kCruiseMa, kHoldMa}),
+    ASSERT_NO_FATAL_FAILURE(emit_phases(sequence));
+    ASSERT_EQ(master_.acknowledged(kAddress, bushd_currents{0, static_cast<std::uint8_t>(decay),
+                                                            kRampMa, kCruiseMa, kHoldMa}),
               BUSHD_OK);
     std::vector<std::uint16_t> ramp;
     // 10 us a unit; steps at constant acceleration from 5 ms on.
@@ -65,8 +47,7 @@ class Chopper : public McuAlone {
     recorder_.edges.clear();
   }
 
-  PowerStageRules rules_{};
-  AvrMcu* avr_ = nullptr;
+  const PowerStageRules rules_{};
 };
 
 Figures Chopper::figures() const {
@@ -209,8 +190,7 @@ TEST_F(Chopper, TheReferenceIsTheCurrentThatIsSet) {
   constexpr std::uint16_t kSetMa[] = {1, 20, 29, 31, 40, 100, 300, 1000, 1019, 2555, 5090, 5110};
   for (const std::uint16_t ma : kSetMa) {
     SCOPED_TRACE(std::to_string(ma) + " mA");
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CURRENTS, bushd_encode_currents,
-                                   bushd_currents{0, BUSHD_DECAY_FAST, ma, ma, ma}),
+    ASSERT_EQ(master_.acknowledged(kAddress, bushd_currents{0, BUSHD_DECAY_FAST, ma, ma, ma}),
               BUSHD_OK);
     pass(10'000'000);
     EXPECT_NEAR(avr_->power_stage().reference_a(), std::max(ma / 1000.0, kCountA),
@@ -222,7 +202,7 @@ TEST_F(Chopper, TheReferenceIsTheCurrentThatIsSet) {
 TEST_F(Chopper, OnlyMotor0HasOne) {
   ASSERT_NO_FATAL_FAILURE(make_ready(BUSHD_PHASES_HALF, BUSHD_DECAY_FAST, 100));
   const auto ask = [&](const bushd_currents& message) {
-    return master_.acknowledged(kAddress, BUSHD_MSG_CURRENTS, bushd_encode_currents, message);
+    return master_.acknowledged(kAddress, message);
   };
   EXPECT_EQ(ask({1, BUSHD_DECAY_SLOW, 100, 100, 100}), BUSHD_E_FORMAT);
   run(0, 100);

@@ -45,12 +45,7 @@ class Image : public BootedBoard {
 };
 
 TEST(CommutatorImage, SwitchesEachMotorToItsFirstPhaseWhenPowerComes) {
-  Image image(100);
-  for (unsigned motor = 0; motor < BoardMotors::kMotors; ++motor) {
-    EXPECT_EQ(image.board.latch(motor), 0b0011) << motor;
-    EXPECT_EQ(image.board.motors().position(motor), 0);
-  }
-  EXPECT_EQ(image.board.latched(), BoardMotors::kMotors);
+  expect_first_phases(Image(100));
 }
 
 TEST(CommutatorImage, TakesNoPartWithSwitchesThatAreNoStartFrequency) {
@@ -65,50 +60,21 @@ TEST(CommutatorImage, TakesNoPartWithSwitchesThatAreNoStartFrequency) {
 
 TEST(CommutatorImage, TellsWhatItsInputsSay) {
   Image image(100);
-  BoardMotors& motors = image.board.motors();
-  motors.motor(3).right_limit_at = 2;
-  motors.motor(4).left_limit_at = 0;  // of another motor
-  image.send({0, 0x83, 10});
-  image.pass(kMs);
-  image.send({10});
-  image.pass(kMs);
-  motors.supply = false;
-  image.send({10});
-  image.pass(kMs);
-  motors.supply = true;
-  motors.motor(3).connected = false;
-  image.send({10});
-  image.pass(kMs);
-  motors.motor(3).connected = true;
-  image.send({0, 0x8B, 10});
-  image.pass(kMs);
-  EXPECT_THAT(image.answers, ElementsAre(kDone, kDone | 1, 1 | 4, 1 | 8, kDone));
-  EXPECT_EQ(motors.position(3), 1);
+  expect_inputs_are_told(image, 10);
 }
 
 TEST(CommutatorImage, TakesABrokenLineForAZero) {
   Image image(100);
-  image.send({0, 0x81, 100});
-  image.pass(kMs);
-  image.board.send_break(image.board.advanced_to_ns());
-  image.send({0x82, 10});
-  image.pass(10 * kMs);
-  EXPECT_THAT(image.answers, ElementsAre(kDone));
-  EXPECT_EQ(image.board.motors().position(1), 0);
-  EXPECT_EQ(image.board.motors().position(2), 1);
+  expect_a_break_is_a_zero(image, 100, 10);
 }
 
 // Windings stay as they are in a reset by the watchdog, and go on from there.
 TEST(CommutatorImage, KeepsItsPhasesWhenItHangs) {
   Image image(100);
-  image.send({0, 0x81, 10});
-  image.pass(kMs);
-  image.send({0, 0x8E, 10});
-  image.pass(kMs);
-  image.send({10});
-  image.pass(kMs);
-  image.send({250});
-  image.pass(kMs);
+  image.step({0, 0x81, 10});
+  image.step({0, 0x8E, 10});
+  image.step({10});
+  image.step({250});
   const auto latched = image.board.latched();
   image.board.node().hang();
   image.pass(kWatchdogNs);
@@ -116,8 +82,7 @@ TEST(CommutatorImage, KeepsItsPhasesWhenItHangs) {
   EXPECT_EQ(image.board.motors().position(1), 1);
   EXPECT_EQ(image.board.motors().position(6), -2);
   EXPECT_EQ(image.answers.size(), 3u) << "the code that was counted is forgotten";
-  image.send({0, 0x86, 10});
-  image.pass(kMs);
+  image.step({0, 0x86, 10});
   EXPECT_EQ(image.board.motors().position(6), -1);
   EXPECT_EQ(image.answers.back(), kDone);
 }
@@ -160,10 +125,6 @@ class CommutatorRandomStreams : public testing::Test {
         a.motor(motor).left_limit_at = b.motor(motor).left_limit_at = random_.between(-6, 3);
     }
   }
-  std::string again(std::uint64_t streams) const {
-    return "BUSHD_SEED=" + std::to_string(seed_) + " BUSHD_STREAMS=" + std::to_string(streams) +
-           " sim_avr_test --gtest_filter='CommutatorRandomStreams.*'";
-  }
 
   const std::uint64_t seed_;
   Random random_;
@@ -172,8 +133,8 @@ class CommutatorRandomStreams : public testing::Test {
 TEST_F(CommutatorRandomStreams, AreTakenAsTheModelTakesThem) {
   constexpr std::array<std::uint32_t, 3> kBauds = {9600, 57'600, 500'000};
   const std::uint64_t streams = from_environment("BUSHD_STREAMS", 400);
-  std::printf("%s\n", again(streams).c_str());
-  SCOPED_TRACE(again(streams));
+  std::printf("%s\n", again(seed_, streams).c_str());
+  SCOPED_TRACE(again(seed_, streams));
   Lateness lateness;
   for (std::uint64_t done = 0; done < streams && !HasFailure();) {
     const std::uint32_t baud = random_.pick(kBauds);

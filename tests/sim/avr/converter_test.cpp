@@ -50,10 +50,7 @@ class Image : public BootedBoard {
 
 TEST(ConverterImage, SwitchesEachMotorToItsFirstPhaseWhenPowerComes) {
   Image image;
-  for (unsigned motor = 0; motor < BoardMotors::kMotors; ++motor) {
-    EXPECT_EQ(image.board.latch(motor), 0b0011) << motor;
-  }
-  EXPECT_EQ(image.board.latched(), BoardMotors::kMotors);
+  expect_first_phases(image);
   EXPECT_EQ(image.board.converter().code(), 0);
 }
 
@@ -78,21 +75,7 @@ TEST(ConverterImage, EachCodeGoesOutWholeAndItsPulseIsTheStep) {
 
 TEST(ConverterImage, TellsWhatItsInputsSay) {
   Image image;
-  BoardMotors& motors = image.board.motors();
-  motors.motor(3).right_limit_at = 2;
-  image.send({0, 0x83, 250});
-  image.pass(kMs);
-  image.send({250});
-  image.pass(kMs);
-  motors.supply = false;
-  image.send({250});
-  image.pass(kMs);
-  motors.supply = true;
-  motors.motor(3).connected = false;
-  image.send({250});
-  image.pass(kMs);
-  EXPECT_THAT(image.answers, ElementsAre(kDone, kDone | 1, 1 | 4, 1 | 8));
-  EXPECT_EQ(motors.position(3), 2);
+  expect_inputs_are_told(image, 250);
 }
 
 TEST(ConverterImage, SaysAfterASecondThatNoPulseCame) {
@@ -106,8 +89,7 @@ TEST(ConverterImage, SaysAfterASecondThatNoPulseCame) {
   EXPECT_EQ(image.board.converter().code(), 0);
   EXPECT_EQ(image.board.motors().position(3), 0);
   image.board.set_converter(kPlain);
-  image.send({250});
-  image.pass(kMs);
+  image.step({250});
   EXPECT_THAT(image.answers, ElementsAre(kNoPulse, kDone));
 }
 
@@ -126,10 +108,8 @@ TEST(ConverterImage, AHundredHzOfItsOwnMoveNothing) {
 // Windings stay as they are in a reset by the watchdog; K is 0 after it.
 TEST(ConverterImage, StandsAfterItHasHung) {
   Image image;
-  image.send({0, 0x86, 250});
-  image.pass(kMs);
-  image.send({1});
-  image.pass(kMs);
+  image.step({0, 0x86, 250});
+  image.step({1});
   EXPECT_EQ(image.board.converter().code(), 1);
   image.board.node().hang();
   image.pass(kWatchdogNs);
@@ -137,24 +117,22 @@ TEST(ConverterImage, StandsAfterItHasHung) {
   EXPECT_EQ(image.board.motors().position(6), 1);
   image.pass(200 * kMs);
   EXPECT_THAT(image.answers, ElementsAre(kDone));
-  image.send({0, 0x86, 250});
-  image.pass(kMs);
+  image.step({0, 0x86, 250});
   EXPECT_EQ(image.board.motors().position(6), 2);
   EXPECT_THAT(image.answers, ElementsAre(kDone, kDone));
 }
 
 TEST(ConverterImage, TakesABrokenLineForAZero) {
   Image image;
-  image.send({0, 0x81, 5});
-  image.pass(kMs);
+  expect_a_break_is_a_zero(image, 5, 250);
+}
+
+TEST(ConverterImage, RestsAfterABreak) {
+  Image image;
+  image.step({0, 0x81, 5});
   image.board.send_break(image.board.advanced_to_ns());
   image.pass(kMs);
   EXPECT_EQ(image.board.converter().code(), 0);
-  image.send({0x82, 250});
-  image.pass(10 * kMs);
-  EXPECT_THAT(image.answers, ElementsAre(kDone));
-  EXPECT_EQ(image.board.motors().position(1), 0);
-  EXPECT_EQ(image.board.motors().position(2), 1);
 }
 
 // Bytes, inputs and pauses at random: to both boards the same.
@@ -162,11 +140,8 @@ TEST(ConverterRandomStreams, AreTakenAsTheModelTakesThem) {
   constexpr std::array<std::uint32_t, 3> kBauds = {9600, 57'600, 500'000};
   const std::uint64_t seed = from_environment("BUSHD_SEED", std::random_device{}());
   const std::uint64_t streams = from_environment("BUSHD_STREAMS", 400);
-  const std::string again = "BUSHD_SEED=" + std::to_string(seed) +
-                            " BUSHD_STREAMS=" + std::to_string(streams) +
-                            " sim_avr_test --gtest_filter='ConverterRandomStreams.*'";
-  std::printf("%s\n", again.c_str());
-  SCOPED_TRACE(again);
+  std::printf("%s\n", again(seed, streams).c_str());
+  SCOPED_TRACE(again(seed, streams));
   Random random(seed, 0);
   Lateness lateness;
   for (std::uint64_t done = 0; done < streams && !testing::Test::HasFailure();) {

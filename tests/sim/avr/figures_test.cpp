@@ -41,32 +41,16 @@ class AvrFigures : public AvrAlone, public testing::WithParamInterface<Load> {
   static bool forward(int tick) { return tick % 4 < 2; }
 
   void send_frame(std::uint32_t start, int from) {
-    const bool fine = GetParam().format == BUSHD_FORMAT_FINE;
     const int count = ticks_per_frame();
-    std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
-    delays.fill(from + count == kTicks ? 0 : kDelay);
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    std::size_t size = bushd_encode_ticks_head(
-        0,
-        static_cast<std::uint8_t>((from == 0 ? BUSHD_TICKS_START : 0) |
-                                  (fine ? BUSHD_TICKS_FINE : 0)),
-        start + static_cast<std::uint32_t>(from), static_cast<std::uint8_t>(count), 0xFFFF,
-        delays.data(), payload.data());
+    const bool is_last = from + count == kTicks;
+    std::vector<int> steps;
     for (int tick = from; tick < from + count; ++tick) {
-      for (std::size_t m = 0; m < BUSHD_MOTORS_PER_MCU; ++m) {
-        if (fine) {
-          const int displacement = GetParam().steps * 256;
-          bushd_put_i16(payload.data() + size,
-                        static_cast<std::int16_t>(forward(tick) ? displacement : -displacement));
-          size += 2;
-        } else {
-          payload[size++] = static_cast<std::uint8_t>(GetParam().steps |
-                                                      (forward(tick) ? BUSHD_COARSE_DIRECTION : 0));
-        }
-      }
+      steps.push_back(forward(tick) ? GetParam().steps : -GetParam().steps);
     }
-    payload.resize(size);
-    master_.post(kAddress, BUSHD_MSG_TICKS, payload);
+    master_.post(
+        kAddress, BUSHD_MSG_TICKS,
+        ticks_of_all(GetParam().format, from == 0, start + static_cast<std::uint32_t>(from), steps,
+                     is_last ? 0 : kDelay));
   }
 };
 

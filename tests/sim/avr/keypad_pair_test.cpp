@@ -48,11 +48,8 @@ class KeypadPair : public AvrAlone {
   // on.
   void set_up(std::uint16_t keypad_ticks, const bushd_set_inputs& inputs = {}) {
     ASSERT_NO_FATAL_FAILURE(make_ready());
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
-              BUSHD_OK);
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_LOCAL, bushd_encode_local,
-                                   bushd_local{0, 1 << kMotor, keypad_ticks}),
-              BUSHD_OK);
+    ASSERT_EQ(master_.acknowledged(kAddress, inputs), BUSHD_OK);
+    ASSERT_EQ(master_.acknowledged(kAddress, bushd_local{0, 1 << kMotor, keypad_ticks}), BUSHD_OK);
     pass(1'500 * kMs);
     for (std::uint64_t before = 0; before != avr_->eeprom_writes();) {
       before = avr_->eeprom_writes();

@@ -43,8 +43,7 @@ TEST_F(AvrNvm, APowerCutLeavesAllOrAFault) {
       EXPECT_EQ(report.faults, BUSHD_FAULT_EEPROM);
       EXPECT_EQ(report.failed_tests, BUSHD_TEST_EEPROM);
       EXPECT_EQ(master_.valid_tables(kAddress), 0u);
-      EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                     bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}),
+      EXPECT_EQ(master_.acknowledged(kAddress, bushd_control{BUSHD_CONTROL_CLEAR_FAULTS, 0}),
                 BUSHD_OK);
     } else {
       EXPECT_EQ(kept_crc, 0u) << "what was kept is gone";
@@ -63,10 +62,7 @@ TEST_F(AvrNvm, APowerCutLosesNoIdAndLeavesTheOldAddressOrTheNewOne) {
       SCOPED_TRACE("cut after " + std::to_string(bytes) + (torn ? " bytes and a half" : " bytes"));
       const auto other = static_cast<std::uint8_t>(address ^ 0x5A);
       const std::uint64_t before = avr_->eeprom_writes();
-      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-      const bushd_set_address message{{1}, other};
-      payload.resize(bushd_encode_set_address(&message, payload.data()));
-      master_.send(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SET_ADDRESS, payload);
+      master_.broadcast(bushd_set_address{{1}, other});
       for (int ms = 0; ms < 50 && avr_->eeprom_writes() < before + bytes; ++ms) pass(1'000'000);
       if (torn) avr_->tear_eeprom_byte();
       reboot();
@@ -105,8 +101,7 @@ TEST_F(AvrNvm, TablesThatAreForgottenMeanwhileLeaveTheRestAlone) {
       const std::uint64_t written = kBytesOfOthers + random.below(kCodes);
       for (int ms = 0; ms < 3000 && avr_->eeprom_writes() < before + written; ++ms) pass(1'000'000);
     }
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                   bushd_control{BUSHD_CONTROL_FORGET_TABLES, 0}),
+    ASSERT_EQ(master_.acknowledged(kAddress, bushd_control{BUSHD_CONTROL_FORGET_TABLES, 0}),
               BUSHD_OK);
     pass(1'000'000'000);
   }
@@ -123,15 +118,12 @@ TEST_F(AvrNvm, DriversThatSleepAndWakeWriteNothing) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
   bushd_set_inputs inputs{};
   inputs.enable_after_watchdog = true;
-  ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
-            BUSHD_OK);
+  ASSERT_EQ(master_.acknowledged(kAddress, inputs), BUSHD_OK);
   pass(4'000'000'000);
   const std::uint64_t before = avr_->eeprom_writes();
   for (int i = 0; i < 20; ++i) {
     for (const std::uint8_t action : {BUSHD_CONTROL_DISABLE, BUSHD_CONTROL_ENABLE}) {
-      ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONTROL, bushd_encode_control,
-                                     bushd_control{action, 0}),
-                BUSHD_OK);
+      ASSERT_EQ(master_.acknowledged(kAddress, bushd_control{action, 0}), BUSHD_OK);
       pass(50'000'000);
     }
   }

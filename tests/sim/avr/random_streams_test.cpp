@@ -9,14 +9,11 @@ namespace {
 class AvrRandomStreams : public RandomStreams {
  protected:
   AvrRandomStreams()
-      : RandomStreams(200'000'000, [](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-          AvrOptions options;
-          options.image = AVR_IMAGES "-1000000.elf";
-          options.address = kAddress;
-          options.unique_id = 0x1122334455667788;
-          options.memory_owners = AVR_MEMORY_OWNERS;
-          return std::make_unique<AvrMcu>(options, index, driver, sink);
-        }) {}
+      : RandomStreams(200'000'000, mcu_of<AvrMcu>(AvrOptions{.image = AVR_IMAGES "-1000000.elf",
+                                                             .address = kAddress,
+                                                             .unique_id = 0x1122334455667788,
+                                                             .memory_owners = AVR_MEMORY_OWNERS})) {
+  }
 };
 
 TEST_F(AvrRandomStreams, LeaveItAliveAnsweringAndCountingRight) {

@@ -12,25 +12,16 @@
 #include <fstream>
 #include <map>
 
-#include "sim/avr/avr_mcu.h"
-#include "sim/mcu_alone.h"
+#include "sim/avr/avr_fixture.h"
 
 namespace bushd::sim::velocity_test {
 namespace {
 
-class VelocityOfTheImage : public McuAlone {
+class VelocityOfTheImage : public Atmega1284pAlone {
  protected:
   static constexpr std::uint16_t kLimit = 1;  // input 0
 
-  VelocityOfTheImage() : McuAlone(kBaud, 300'000'000) {
-    AvrOptions options;
-    options.image = ATMEGA1284P_IMAGES "-500000.elf";
-    options.memory_owners = ATMEGA1284P_MEMORY_OWNERS;
-    options.chip = "atmega1284p";
-    options.address = kAddress;
-    options.power_stage = PowerStageRules{};
-    add<AvrMcu>(options);
-    pass(boot_ns_);
+  VelocityOfTheImage() {
     if (const char* path = std::getenv("BUSHD_VELOCITY_TRACE")) {
       out_.open(path, std::ios::app);
       EXPECT_TRUE(out_);
@@ -45,19 +36,15 @@ class VelocityOfTheImage : public McuAlone {
     out_ << "tick " << kTickNs << "\nslots 128\n";
     std::uint16_t mask = 0;
     for (const bushd_set_velocity& motor : motors) {
-      ASSERT_EQ(
-          master_.acknowledged(kAddress, BUSHD_MSG_VELOCITY, bushd_encode_set_velocity, motor),
-          BUSHD_OK);
+      ASSERT_EQ(master_.acknowledged(kAddress, motor), BUSHD_OK);
       mask |= static_cast<std::uint16_t>(1u << motor.motor);
       out_ << "motor " << int{motor.motor} << ' ' << motor.least << ' ' << motor.most << ' '
            << motor.acceleration << '\n';
     }
     bushd_set_inputs inputs{};
     inputs.limit_positive = kLimit;
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
-              BUSHD_OK);
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_LOCAL, bushd_encode_local, {mask, 0, 0}),
-              BUSHD_OK);
+    ASSERT_EQ(master_.acknowledged(kAddress, inputs), BUSHD_OK);
+    ASSERT_EQ(master_.acknowledged(kAddress, bushd_local{mask, 0, 0}), BUSHD_OK);
     tick_0_ns_ = tick_0_ns();
     out_ << "at 0 " << tick_0_ns_ << '\n';
     for (const Edge& edge : recorder_.edges) follow(edge);
@@ -151,8 +138,7 @@ TEST_F(VelocityOfTheImage, KeepsUpWithWhatItTakes) {
   hold(kReverse, 0, 400);
   hold(0, 0, 300);
   end({0, 1});
-  EXPECT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_VELOCITY, bushd_encode_set_velocity,
-                                 bushd_set_velocity{0, 200 * 64, kMost + 1, 20000}),
+  EXPECT_EQ(master_.acknowledged(kAddress, bushd_set_velocity{0, 200 * 64, kMost + 1, 20000}),
             BUSHD_E_CAPACITY);
 }
 
@@ -171,14 +157,8 @@ TEST_F(VelocityOfTheImage, ALimitBrakesAlongTheRamp) {
 // Driven by phases, with the chopper: half steps are counted, and no tick is late.
 TEST_F(VelocityOfTheImage, KeepsItsTicksBesideTheChopper) {
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
-  bushd_emission emission{};
-  emission.mode = BUSHD_EMISSION_PHASES;
-  emission.sequence = BUSHD_PHASES_HALF;
-  emission.hold_current = true;
-  ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_EMISSION, bushd_encode_emission, emission),
-            BUSHD_OK);
-  ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CURRENTS, bushd_encode_currents,
-                                 bushd_currents{0, BUSHD_DECAY_FAST, 1500, 1000, 300}),
+  ASSERT_NO_FATAL_FAILURE(emit_phases(BUSHD_PHASES_HALF));
+  ASSERT_EQ(master_.acknowledged(kAddress, bushd_currents{0, BUSHD_DECAY_FAST, 1500, 1000, 300}),
             BUSHD_OK);
   ASSERT_NO_FATAL_FAILURE(
       give_settings({{0, 200 * 64, 3000 * 64, 8000}, {1, 200 * 64, 3000 * 64, 8000}}));

@@ -44,26 +44,10 @@ class LmFigures : public QemuAlone, public testing::WithParamInterface<Load> {
   void SetUp() override { pass(250'000'000); }
 
   Bytes frame(std::uint32_t number, std::uint32_t first_tick) const {
-    const bool fine = GetParam().format == BUSHD_FORMAT_FINE;
     const bool forward = number % 2 == 0;
-    const auto flags = static_cast<std::uint8_t>((number == 0 ? BUSHD_TICKS_START : 0) |
-                                                 (fine ? BUSHD_TICKS_FINE : 0));
-    std::array<std::uint16_t, BUSHD_MOTORS_PER_MCU> delays;
-    delays.fill(number + 1 == kFrames ? 0 : kDelay);
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_ticks_head(0, flags, first_tick, GetParam().ticks_per_frame, 0xFFFF,
-                                           delays.data(), payload.data()));
-    for (int i = 0; i < GetParam().ticks_per_frame * int{BUSHD_MOTORS_PER_MCU}; ++i) {
-      if (fine) {
-        const int displacement = forward ? kSteps * 256 : -kSteps * 256;
-        payload.push_back(static_cast<std::uint8_t>(displacement));
-        payload.push_back(static_cast<std::uint8_t>(displacement >> 8));
-      } else {
-        payload.push_back(
-            static_cast<std::uint8_t>(kSteps | (forward ? BUSHD_COARSE_DIRECTION : 0)));
-      }
-    }
-    return payload;
+    return ticks_of_all(GetParam().format, number == 0, first_tick,
+                        std::vector<int>(GetParam().ticks_per_frame, forward ? kSteps : -kSteps),
+                        number + 1 == kFrames ? 0 : kDelay);
   }
 };
 

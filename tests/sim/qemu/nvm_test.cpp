@@ -11,8 +11,7 @@ class QemuNvm : public QemuAlone {
   QemuNvm() { master_.patience_ns = 20'000'000; }  // the CRC of a long table takes a while
 
   void configure(std::uint32_t tick_ns) {
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_CONFIGURE, bushd_encode_configure,
-                                   bushd_configure{tick_ns, BUSHD_FORMAT_FINE, 1000}),
+    ASSERT_EQ(master_.acknowledged(kAddress, bushd_configure{tick_ns, BUSHD_FORMAT_FINE, 1000}),
               BUSHD_OK);
   }
   // Another table than that of any other number.
@@ -61,8 +60,7 @@ TEST_F(QemuNvm, RoomIsFoundAgainAfterAReset) {
     SCOPED_TRACE(int{round});
     bushd_set_inputs inputs{};
     inputs.system_inverted = round;
-    ASSERT_EQ(master_.acknowledged(kAddress, BUSHD_MSG_INPUTS, bushd_encode_set_inputs, inputs),
-              BUSHD_OK);
+    ASSERT_EQ(master_.acknowledged(kAddress, inputs), BUSHD_OK);
     pass(600'000'000);
     reboot(700'000'000);
     const bushd_report report = master_.poll(kAddress);

@@ -16,13 +16,11 @@ class QemuAlone : public McuAlone {
   explicit QemuAlone(std::uint32_t baud = kBaud) : QemuAlone(baud, image_path(baud)) {}
   QemuAlone(std::uint32_t baud, const std::string& image, std::uint16_t recorded_boots = 1)
       : McuAlone(baud, kBootNs) {
-    QemuOptions options;
-    options.image = image;
-    options.memory_owners = LM3S_MEMORY_OWNERS;
-    options.address = kAddress;
-    options.boots = kBoots;
-    options.recorded_boots = recorded_boots;
-    qemu_ = add<QemuMcu>(options);
+    qemu_ = add<QemuMcu>(QemuOptions{.image = image,
+                                     .address = kAddress,
+                                     .boots = kBoots,
+                                     .recorded_boots = recorded_boots,
+                                     .memory_owners = LM3S_MEMORY_OWNERS});
   }
 
   // Some faults of the chip must be there before it boots: those of a constructor are.

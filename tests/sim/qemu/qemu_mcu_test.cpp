@@ -99,7 +99,7 @@ TEST_F(QemuImage, PulsesLastAsLongAsItHasTakenOnToMakeThem) {
   const auto takes_on = [this](std::uint8_t pulse_us) {
     bushd_emission settings{};
     settings.pulse_us = pulse_us;
-    return master_.acknowledged(kAddress, BUSHD_MSG_EMISSION, bushd_encode_emission, settings);
+    return master_.acknowledged(kAddress, settings);
   };
   std::uint8_t pulse_us = 12;
   while (pulse_us > 0 && takes_on(pulse_us) != BUSHD_OK) --pulse_us;
@@ -212,11 +212,7 @@ TEST_F(QemuImage, HasNoFaultWhenItIsWhole) {
 TEST(QemuMcu, SaysSoIfThereIsNoImage) {
   Recorder recorder;
   Bus bus(500'000, &recorder);
-  bus.add_mcu([](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-    QemuOptions options;
-    options.image = "/nowhere.elf";
-    return std::make_unique<QemuMcu>(options, index, driver, sink);
-  });
+  bus.add_mcu(mcu_of<QemuMcu>(QemuOptions{.image = "/nowhere.elf"}));
   EXPECT_THROW(bus.advance_to(1'000'000), std::runtime_error);
 }
 

@@ -9,14 +9,11 @@ namespace {
 class QemuRandomStreams : public RandomStreams {
  protected:
   QemuRandomStreams()
-      : RandomStreams(100'000'000, [](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
-          QemuOptions options;
-          options.image = LM3S_IMAGES "-1000000.elf";
-          options.memory_owners = LM3S_MEMORY_OWNERS;
-          options.address = kAddress;
-          options.unique_id = 0x1122334455667788;
-          return std::make_unique<QemuMcu>(options, index, driver, sink);
-        }) {}
+      : RandomStreams(100'000'000,
+                      mcu_of<QemuMcu>(QemuOptions{.image = LM3S_IMAGES "-1000000.elf",
+                                                  .address = kAddress,
+                                                  .unique_id = 0x1122334455667788,
+                                                  .memory_owners = LM3S_MEMORY_OWNERS})) {}
 };
 
 TEST_F(QemuRandomStreams, LeaveItAliveAnsweringAndCountingRight) {
