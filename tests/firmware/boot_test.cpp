@@ -79,8 +79,7 @@ TEST(Boot, FailedSelfTestNeverRaisesEn) {
   EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_SELF_TEST) << "only a reboot clears it";
   EXPECT_EQ(rig.poll().state, BUSHD_STATE_FAULT);
   EXPECT_FALSE(rig.enabled());
-  const Plan plan = plan_move(ramp_law(), 3, Rig::kTickNs, BUSHD_FORMAT_FINE);
-  EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_E_STATE);
+  EXPECT_EQ(rig.start(ramp_law(), 3), BUSHD_E_STATE);
 }
 
 TEST(Boot, WithoutWhatItKeepsAnMcuMovesOnceThatIsKnown) {
@@ -101,12 +100,10 @@ TEST(Boot, TellsWhyItBooted) {
 }
 
 TEST(Boot, ConfigureAgainKeepsAllAndAnotherTickBeginsAnew) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE), BUSHD_OK);
   EXPECT_EQ(rig.poll().state, BUSHD_STATE_READY) << "the same again changes nothing";
-  const Plan plan = plan_move(ramp_law(), 3, Rig::kTickNs, BUSHD_FORMAT_FINE);
-  EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+  EXPECT_EQ(rig.start(ramp_law(), 3), BUSHD_OK);
   EXPECT_EQ(rig.configure(BUSHD_FORMAT_COARSE), BUSHD_E_STATE) << "a motor moves";
   EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE, 3'000'000), BUSHD_E_STATE);
   rig.pass_until_rest();
@@ -125,8 +122,7 @@ TEST(Boot, ConfigureAgainKeepsAllAndAnotherTickBeginsAnew) {
 }
 
 TEST(Boot, DisableAndClearAreRefusedInMotion) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   const Plan plan = plan_move(ramp_law(), 5, Rig::kTickNs, BUSHD_FORMAT_FINE);
   ASSERT_EQ(rig.take(rig.part(plan, rig.first_open() + 20, 0, 100, 2)), BUSHD_OK);
   EXPECT_EQ(rig.poll().moving, 1 << 2) << "a queued motor moves, though not yet";
@@ -145,8 +141,7 @@ TEST(Boot, DisableAndClearAreRefusedInMotion) {
 
 // Between two reports and two ticks: the state that counts is that of now.
 TEST(Boot, TicksRightAfterDisableAreRefused) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   const Plan plan = plan_move(ramp_law(), 5, Rig::kTickNs, BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_OK);
   rig.frame(BUSHD_MSG_TICKS, rig.encode(rig.part(plan, rig.first_open(), 0, 100)));
@@ -157,8 +152,7 @@ TEST(Boot, TicksRightAfterDisableAreRefused) {
 }
 
 TEST(Boot, TicksRightAfterEnableAreTaken) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.control(BUSHD_CONTROL_DISABLE), BUSHD_OK);
   EXPECT_EQ(rig.poll().state, BUSHD_STATE_BUSY);
   const Plan plan = plan_move(ramp_law(), 5, Rig::kTickNs, BUSHD_FORMAT_FINE);

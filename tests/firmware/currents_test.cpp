@@ -21,8 +21,7 @@ class Currents : public Streams {
     return ma;
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Currents, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Currents);
 
 TEST_P(Currents, AStreamHasThatOfRampsThenOfCruiseThenOfHold) {
   ASSERT_EQ(rig.currents(kSet), BUSHD_OK);

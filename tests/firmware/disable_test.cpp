@@ -12,17 +12,14 @@ constexpr bushd_inputs kPressed{0, BUSHD_INPUT_EMERGENCY};
 class Disabling : public Streams {
  protected:
   std::unique_ptr<Rig> ready(const InputSettings& settings = {}) const {
-    auto made = std::make_unique<Rig>(RigOptions{.queue_ticks = 256});
-    made->make_ready(law, format);
+    auto made = std::make_unique<ReadyRig>(law, format, RigOptions{.queue_ticks = 256});
     EXPECT_EQ(made->set_inputs(settings), BUSHD_OK);
     return made;
   }
   std::unique_ptr<Rig> watching() const {
     return ready({.emergency = BUSHD_EMERGENCY_INPUT_DISABLE});
   }
-  void start(Rig& on, int steps) const {
-    ASSERT_EQ(on.take(on.part(plan(steps), on.first_open(), 0, 100)), BUSHD_OK);
-  }
+  void start(Rig& on, int steps) const { ASSERT_EQ(on.start(law, steps), BUSHD_OK); }
   static void expect_cut(Rig& on, std::size_t prepared, std::uint8_t fault) {
     on.pass_until_rest();
     on.pass(3);
@@ -50,8 +47,7 @@ class Disabling : public Streams {
     EXPECT_EQ(on.pulses(0), stands + 7);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Disabling,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(Disabling);
 
 TEST_P(Disabling, ACommandedStopTakesEnAwayWithItsFrame) {
   for (const int ticks : {0, 25}) {

@@ -33,8 +33,7 @@ class ElementaryLineRun : public OfLines {
     }
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, ElementaryLineRun,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(ElementaryLineRun);
 
 TEST_P(ElementaryLineRun, EveryStepFallsIntoItsSlot) {
   std::int64_t at[4] = {};
@@ -81,8 +80,7 @@ TEST_P(ElementaryLineRun, IsOfAllMotorsOfTheLineFromItsBeginning) {
 TEST_P(ElementaryLineRun, IsRefusedWhereItIsDenied) {
   EXPECT_NE(rig.identify().capabilities & BUSHD_CAN_ELEMENTARY, 0u);
   for (const std::uint32_t denied : {BUSHD_CAN_ELEMENTARY, std::uint32_t{BUSHD_CAN_LINE_RUN}}) {
-    Rig other({.disabled_capabilities = denied});
-    other.make_ready(law, format);
+    ReadyRig other(law, format, {.disabled_capabilities = denied});
     EXPECT_EQ(other.identify().capabilities & BUSHD_CAN_ELEMENTARY, 0u);
     EXPECT_EQ(start(other, line_of(other.first_open(), {{0, 5}, {1, 3}})),
               denied == BUSHD_CAN_ELEMENTARY ? BUSHD_E_FORMAT : BUSHD_E_UNKNOWN_MESSAGE);
@@ -102,8 +100,7 @@ TEST_P(ElementaryLineRun, IsReplacedByTicksAtEveryTick) {
     return format == BUSHD_FORMAT_FINE ? position : position / 256 * 256;
   };
   for (std::size_t k = 0; k + 1 < run.ticks(); k += format == BUSHD_FORMAT_FINE ? 1 : 5) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     const std::uint32_t first = fresh.first_open();
     ASSERT_EQ(start(fresh, line_of(first, motors)), BUSHD_OK);
     fresh.pass(static_cast<int>(k) / 2);
@@ -116,8 +113,7 @@ TEST_P(ElementaryLineRun, IsReplacedByTicksAtEveryTick) {
 TEST_P(ElementaryLineRun, RampsDownAlongTheLine) {
   const std::vector<LineMotor> motors = {{0, 200}, {1, -118}, {2, 1}, {3, 150}};
   for (int wait = 4; wait < 60; wait += 7) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     ASSERT_EQ(start(fresh, line_of(fresh.first_open(), motors)), BUSHD_OK);
     fresh.pass(wait);
     ASSERT_EQ(fresh.take(BUSHD_MSG_EMERGENCY, {BUSHD_STOP_RAMP}), BUSHD_OK);

@@ -22,15 +22,9 @@ class Emergency : public Streams {
     EXPECT_EQ(on.poll().motor[0].position_steps, on.pulses(0));
     return {on.history(0).begin() + static_cast<std::ptrdiff_t>(open), on.history(0).end()};
   }
-  static void expect_steps(const std::vector<int>& seen, std::vector<int> expected, int direction) {
-    for (int& n : expected) n *= direction;
-    ASSERT_LE(expected.size(), seen.size());
-    expected.resize(seen.size());
-    EXPECT_EQ(seen, expected);
-  }
-  static Bytes run_frame(std::uint32_t first, std::uint32_t steps, std::int8_t direction) {
-    const bushd_table_run_entry entry = {0, 0, direction, steps, 0};
-    return table_run_payload(0, first, entry);
+  static Bytes run_frame(std::uint32_t first, std::uint32_t steps, std::int8_t direction,
+                         std::uint8_t motor = 0) {
+    return table_run_payload(0, first, {motor, 0, direction, steps, 0});
   }
   // The delay of the step that runs at the end of the first `ticks` of a plan, as the MCU takes it:
   // from the last displacement, or in the coarse format from the steps of the two ticks before and
@@ -62,8 +56,7 @@ class Emergency : public Streams {
     return static_cast<std::uint64_t>(format == BUSHD_FORMAT_FINE ? std::abs(d) : (d & 0x7F) * 256);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Emergency,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(Emergency);
 
 // Speeds that the coarse format cannot tell: below a step in four ticks.
 class FineEmergency : public Emergency {};
@@ -72,8 +65,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, FineEmergency, testing::Values(BUSHD_FORMAT_FI
 TEST_P(Emergency, RampsATableRunDownFromEveryTick) {
   const std::size_t ticks = steps_by_tick(Reference::move(law, 150), Rig::kTickNs).size();
   for (std::size_t n = 0; n <= ticks; n += 3) {
-    Rig fresh;
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format);
     const std::uint32_t first = fresh.first_open();
     ASSERT_EQ(fresh.take(BUSHD_MSG_TABLE_RUN, run_frame(first, 150, -1)), BUSHD_OK);
     fresh.pass(static_cast<int>(n));
@@ -94,12 +86,9 @@ TEST_P(Emergency, RampsATableRunDownFromEveryTick) {
 TEST_P(Emergency, RampsAStreamDownFromEveryTick) {
   const Plan moves = plan(200);
   for (std::size_t n = 0; n <= moves.ticks(); n += 2) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     const std::uint32_t start = fresh.first_open();
-    for (std::size_t from = 0; from < moves.ticks(); from += 40) {
-      ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 40)), BUSHD_OK);
-    }
+    ASSERT_NO_FATAL_FAILURE(fresh.take_plan(moves, start, moves.ticks(), 40));
     fresh.pass(static_cast<int>(n));
     std::vector<int> expected;
     bool begun = false;
@@ -126,15 +115,12 @@ TEST_P(FineEmergency, OfAMotorThatIsSlowMakesNoStepMoreThanItsTable) {
     even.cruise = delay;
     const Plan moves = plan_move(even, 4, kShortNs, format);
     for (const double at : {0.3, 1.1, 1.6, 1.9, 2.7}) {
-      Rig fresh({.queue_ticks = 16384});
-      fresh.make_ready(slow, format);
+      ReadyRig fresh(slow, format, {.queue_ticks = 16384});
       ASSERT_EQ(fresh.configure(format, kShortNs), BUSHD_OK);
       fresh.sync_to(1000);
       ASSERT_EQ(fresh.assign(0, 0), BUSHD_OK);
       const std::uint32_t start = fresh.first_open();
-      for (std::size_t from = 0; from < moves.ticks() && from < 16000; from += 100) {
-        ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 100)), BUSHD_OK);
-      }
+      ASSERT_NO_FATAL_FAILURE(fresh.take_plan(moves, start, 16000, 100));
       fresh.pass(static_cast<int>(at * delay * 1e6 / kShortNs) - 1);
       fresh.emergency(BUSHD_STOP_RAMP);
       fresh.pass(1'200'000'000 / kShortNs);
@@ -151,8 +137,7 @@ TEST_P(FineEmergency, OfAMotorThatIsSlowMakesNoStepMoreThanItsTable) {
 // Tick numbers of starts have 16 bits: 2^16 ticks later the same ones come again.
 TEST_P(Emergency, RampsAStreamDownThatBeganLongAgo) {
   const auto steps_after = [&](std::uint32_t ticks) {
-    Rig on;
-    on.make_ready(law, format, 1000);
+    ReadyRig on(law, format);
     const std::uint32_t first = on.first_open() + 20;
     std::uint32_t end = first;
     for (std::uint8_t flags = kStart; on.first_open() != first + ticks; on.pass()) {
@@ -193,8 +178,7 @@ TEST_P(Emergency, MotorThatStandsBeforeItsQueueEndsMakesNoStep) {
   moves.displacement.resize(ticks + 20, format == BUSHD_FORMAT_FINE ? 0 : 0x80);
   moves.delay.resize(ticks + 20, 0);
   for (std::size_t n = ticks; n < ticks + 20; n += 3) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     ASSERT_EQ(fresh.take(fresh.part(moves, fresh.first_open(), 0, ticks + 20)), BUSHD_OK);
     fresh.pass(static_cast<int>(n));
     SCOPED_TRACE(n);
@@ -207,14 +191,12 @@ TEST_P(Emergency, CutsWithoutAnotherStep) {
   const Plan moves = plan(200);
   for (const int n : {0, 3, 30, 100}) {
     for (const bool run : {false, true}) {
-      Rig fresh({.queue_ticks = 256});
-      fresh.make_ready(law, format);
+      ReadyRig fresh(law, format, {.queue_ticks = 256});
       const std::uint32_t start = fresh.first_open();
       if (run) {
         ASSERT_EQ(fresh.take(BUSHD_MSG_TABLE_RUN, run_frame(start, 200, 1)), BUSHD_OK);
-      }
-      for (std::size_t from = 0; !run && from < moves.ticks(); from += 40) {
-        ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 40)), BUSHD_OK);
+      } else {
+        ASSERT_NO_FATAL_FAILURE(fresh.take_plan(moves, start, moves.ticks(), 40));
       }
       fresh.pass(n);
       expect_steps(after_emergency(fresh, BUSHD_STOP_IMMEDIATE), {}, 1);
@@ -239,19 +221,10 @@ TEST_P(Emergency, RepeatedFramesChangeNothing) {
   const Plan moves = plan(200);
   std::vector<std::vector<int>> seen;
   for (const int repeats : {0, 5}) {
-    Rig fresh;
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format);
     const std::uint32_t start = fresh.first_open();
-    for (std::size_t from = 0; from < 80; from += 40) {
-      ASSERT_EQ(fresh.take(fresh.part(moves, start, from, 40)), BUSHD_OK);
-    }
-    ASSERT_EQ(fresh.take(BUSHD_MSG_TABLE_RUN,
-                         [&] {
-                           Bytes payload = run_frame(start, 200, -1);
-                           payload[BUSHD_TABLE_RUN_HEADER] |= 1;  // motor 1
-                           return payload;
-                         }()),
-              BUSHD_OK);
+    ASSERT_NO_FATAL_FAILURE(fresh.take_plan(moves, start, 80, 40));
+    ASSERT_EQ(fresh.take(BUSHD_MSG_TABLE_RUN, run_frame(start, 200, -1, 1)), BUSHD_OK);
     fresh.pass(40);
     fresh.emergency(BUSHD_STOP_RAMP);
     for (int i = 0; i < repeats; ++i) {
@@ -271,9 +244,7 @@ TEST_P(Emergency, WaitingStartsAreEmptied) {
   const std::uint32_t start = rig.first_open();
   ASSERT_EQ(rig.take(ones(kStart, start + 20, 10, 64)), BUSHD_OK);
   ASSERT_EQ(rig.take(ones(0, start + 40, 10, 64)), BUSHD_OK);
-  Bytes run = run_frame(start + 20, 200, -1);
-  run[BUSHD_TABLE_RUN_HEADER] |= 1;
-  ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run), BUSHD_OK);
+  ASSERT_EQ(rig.take(BUSHD_MSG_TABLE_RUN, run_frame(start + 20, 200, -1, 1)), BUSHD_OK);
   rig.pass(5);
   expect_steps(after_emergency(rig, BUSHD_STOP_RAMP), {}, 1);
   EXPECT_EQ(rig.poll().out_of_order, 0);

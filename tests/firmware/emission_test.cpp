@@ -53,8 +53,7 @@ TEST(Emission, IsRefusedWhileAMotorMovesUnlessItIsTheSame) {
 }
 
 TEST(Emission, MotorsHaveNoTableAfterAnotherOne) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE);
   const Ticks ticks{.flags = BUSHD_TICKS_START,
                     .first = rig.first_open() + 5,
                     .displacements = {0x81},
@@ -78,8 +77,7 @@ TEST(Emission, AnotherTickMakesItEvenAgain) {
 }
 
 TEST(Emission, TableThatIsTooFastForTheStepPeriodIsNotAssigned) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE);
   // Up to four steps in 2.56 ms at 0.8 ms a step.
   EXPECT_EQ(rig.emission(burst(640)), BUSHD_OK);
   EXPECT_EQ(rig.assign(0, 0), BUSHD_OK);
@@ -107,8 +105,7 @@ TEST(Emission, TicksWithMoreStepsThanFindRoomAreRefused) {
 }
 
 TEST(Emission, SettingsThatSlotsCannotKeepAreRefusedWithTheirStatus) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE);
   bushd_emission settings{};
   settings.pulse_us = 5;  // half a slot is 5 us, of a shortened tick 4.9
   EXPECT_EQ(rig.emission(settings), BUSHD_E_PULSE_WIDTH);
@@ -133,15 +130,13 @@ TEST(Emission, ModeThatThePortDoesNotSupportIsRefused) {
 
 TEST(Emission, StaggeredStepsWithACommonDirNeedBothCapabilities) {
   for (const std::uint32_t denied : {BUSHD_CAN_COMMON_DIR, BUSHD_CAN_STAGGERED}) {
-    Rig rig({.disabled_capabilities = denied});
-    rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+    ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE, {.disabled_capabilities = denied});
     EXPECT_EQ(rig.emission(of_mode(BUSHD_EMISSION_COMMON_STAGGERED)), BUSHD_E_FORMAT) << denied;
   }
 }
 
 TEST(Emission, PulsesAreRefusedThatThePortDoesNotMake) {
-  Rig rig({.pulse_ns = 3'500});
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE, {.pulse_ns = 3'500});
   bushd_emission settings{};
   settings.pulse_us = 3;
   EXPECT_EQ(rig.emission(settings), BUSHD_OK);
@@ -150,8 +145,7 @@ TEST(Emission, PulsesAreRefusedThatThePortDoesNotMake) {
 }
 
 TEST(Emission, PulsesAreRefusedThatThePortMayMakeTooShort) {
-  Rig rig({.slots = 128, .pulse_ns = -3'000});
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE, {.slots = 128, .pulse_ns = -3'000});
   // A tick may be shortened to follow the bus.
   const std::uint32_t half_slot_ns = (Rig::kTickNs - Rig::kTickNs / 64) / 256;
   bushd_emission settings{};
@@ -165,16 +159,14 @@ TEST(Emission, PulsesAreRefusedThatThePortMayMakeTooShort) {
 }
 
 TEST(Emission, NoLengthOfPulsesIsKeptWhereTheyMayBeginAsLateAsTheyEnd) {
-  Rig rig({.slots = 128, .pulse_ns = -1'000'000});
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE, {.slots = 128, .pulse_ns = -1'000'000});
   bushd_emission settings{};
   settings.pulse_us = 1;
   EXPECT_EQ(rig.emission(settings), BUSHD_E_PULSE_WIDTH);
 }
 
 TEST(Emission, PhasesTakeFourOutputsAMotor) {
-  Rig rig({.motors = 11});
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE, {.motors = 11});
   EXPECT_EQ(rig.emission(of_mode(BUSHD_EMISSION_PHASES)), BUSHD_OK);
   EXPECT_EQ(rig.assign(1, 0), BUSHD_OK);
   EXPECT_EQ(rig.assign(2, 0), BUSHD_E_FORMAT);

@@ -92,8 +92,7 @@ class Stage : public Switches {
   std::array<int, 3> left_{};
   std::mt19937 noise_{5};
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Stage, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Stage);
 
 TEST_P(Stage, TheHomeSwitchIsNoLimit) {
   put(0, {.at = 700, .direction = 1, .width = 50});

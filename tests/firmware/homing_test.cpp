@@ -63,8 +63,7 @@ class Homing : public Streams {
   std::int64_t plus_ = 0;
   Contact contact_{0, 1};
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Homing, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Homing);
 
 TEST_P(Homing, SetsThePositionAtTheSwitch) {
   for (const int direction : {-1, 1}) {
@@ -173,8 +172,7 @@ TEST_P(Homing, CanBeGivenUpInEveryStage) {
   int whole = 0;
   for (; rig.poll().moving != 0; ++whole) rig.pass();
   for (int n = 0; n < whole; n += 7) {
-    Rig fresh;
-    fresh.make_ready(law, format, 1000);
+    ReadyRig fresh(law, format);
     Contact contact(-300, -1, 5);
     fresh.sense = [&] {
       const bool active = contact.read(fresh.pulses(kHomed));
@@ -217,8 +215,7 @@ TEST_P(Homing, AnotherMotorWaitsUntilTheLastSlowStepIsOver) {
 
 TEST_P(Homing, EmergencyEndsIt) {
   for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
-    Rig fresh;
-    fresh.make_ready(law, format, 1000);
+    ReadyRig fresh(law, format);
     ASSERT_EQ(fresh.home(command()), BUSHD_OK);
     fresh.pass(100);
     const std::int64_t at = fresh.pulses(kHomed);

@@ -21,8 +21,7 @@ class Inputs : public Streams {
  protected:
   // A fresh MCU whose motors have these limits.
   std::unique_ptr<Rig> with(const InputSettings& settings) const {
-    auto made = std::make_unique<Rig>(RigOptions{.queue_ticks = 256});
-    made->make_ready(law, format);
+    auto made = std::make_unique<ReadyRig>(law, format, RigOptions{.queue_ticks = 256});
     EXPECT_EQ(made->set_inputs(settings), BUSHD_OK);
     return made;
   }
@@ -49,8 +48,7 @@ class Inputs : public Streams {
     ASSERT_LT(on.pulses(0), 50);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Inputs, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Inputs);
 
 TEST_P(Inputs, ALimitRampsAMotorDownByItsTableOrCutsItAtAnyTick) {
   for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE}) {
@@ -129,9 +127,9 @@ TEST_P(Inputs, StartsByTableTicksIntoALimitAreRefused) {
   bushd_table_ticks_entry entry{0, {}};
   entry.state.direction = -1;
   entry.state.accel_end = 1;
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(bushd_encode_table_ticks(0, BUSHD_TICKS_START, on->first_open(), 30, &entry, 1,
-                                          payload.data()));
+  const Bytes payload = payload_of([&](std::uint8_t* to) {
+    return bushd_encode_table_ticks(0, BUSHD_TICKS_START, on->first_open(), 30, &entry, 1, to);
+  });
   EXPECT_EQ(on->take(BUSHD_MSG_TABLE_TICKS, payload), BUSHD_E_FORBIDDEN);
   EXPECT_EQ(on->poll().forbidden_negative, 1);
 }
@@ -143,8 +141,9 @@ TEST_P(Inputs, AMotorWhoseWayIsBarredDoesNotHoldUpThoseThatStartWithIt) {
     on->pass();
     if (whole) {
       const bushd_table_run_entry both[] = {{0, 0, 1, 20, 0}, {1, 0, 1, 20, 0}};
-      Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-      payload.resize(bushd_encode_table_run(0, on->first_open(), both, 2, payload.data()));
+      const Bytes payload = payload_of([&](std::uint8_t* to) {
+        return bushd_encode_table_run(0, on->first_open(), both, 2, to);
+      });
       ASSERT_EQ(on->take(BUSHD_MSG_TABLE_RUN, payload), BUSHD_OK);
     } else {
       Ticks ticks = ones(kStart, on->first_open(), 4);
@@ -226,7 +225,7 @@ TEST_P(Inputs, OneSwitchForBothEndsForbidsTheDirectionInWhichItWasMet) {
 
 TEST_P(Inputs, OtherMotorsAndOtherInputsGoTheirWay) {
   const auto on = with({.limit_positive = 1});
-  ASSERT_EQ(on->take(on->part(plan(40), on->first_open(), 0, 100, 1)), BUSHD_OK);
+  ASSERT_EQ(on->start(law, 40, 1), BUSHD_OK);
   ASSERT_EQ(start(*on, 40), BUSHD_OK);
   on->pins({0xFFFE, 0xFF});
   on->pass(20);
@@ -310,8 +309,7 @@ TEST_P(Inputs, NoStepIsLostHoweverSwitchesBounce) {
 }
 
 class SystemInputs : public Inputs {};
-INSTANTIATE_TEST_SUITE_P(Formats, SystemInputs,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(SystemInputs);
 
 TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
   for (const bushd_stop_mode mode : {BUSHD_STOP_RAMP, BUSHD_STOP_IMMEDIATE, BUSHD_STOP_DISABLE}) {
@@ -324,7 +322,7 @@ TEST_P(SystemInputs, TheEmergencyInputStopsAllMotorsAsEmergencyDoes) {
       stopped->control(BUSHD_CONTROL_ENABLE);
       for (Rig* on : {stopped.get(), twin.get()}) {
         ASSERT_EQ(start(*on, 50), BUSHD_OK);
-        ASSERT_EQ(on->take(on->part(plan(-50), on->first_open(), 0, 100, 2)), BUSHD_OK);
+        ASSERT_EQ(on->start(law, -50, 2), BUSHD_OK);
         on->pass(25);
       }
       stopped->pins({0, static_cast<std::uint8_t>(1 - rests_at)});
@@ -408,8 +406,7 @@ TEST_P(SystemInputs, OvercurrentTakesEnAwayUntilItIsClearedAndGone) {
 }
 
 TEST(EnableAfterWatchdog, IsKeptWhileDriversAreOnAndAskedFor) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   EXPECT_FALSE(rig.enable_kept());
   EXPECT_EQ(rig.set_inputs({.enable_after_watchdog = true}), BUSHD_OK);
   EXPECT_TRUE(rig.enable_kept());

@@ -39,8 +39,7 @@ class KeptProgram : public Programs {
     EXPECT_TRUE(made.empty());
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, KeptProgram,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(KeptProgram);
 
 TEST_P(KeptProgram, IsThereAfterAResetAndWaitsToBeRun) {
   ASSERT_EQ(load(to_and_fro(kKept)), BUSHD_OK);
@@ -59,8 +58,7 @@ TEST_P(KeptProgram, IsThereAfterAResetAndWaitsToBeRun) {
 }
 
 TEST_P(KeptProgram, IsRefusedWhereNothingOutlivesAReset) {
-  Rig none({.keeps_programs = false});
-  none.make_ready(law, format);
+  ReadyRig none(law, format, {.keeps_programs = false});
   const Bytes bytes = bytes_of(to_and_fro(kKept));
   Bytes payload;
   append(payload, 0, 2);

@@ -52,8 +52,7 @@ class Keypad : public Streams {
     expect_rest_as_counted();
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Keypad, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Keypad);
 
 TEST_P(Keypad, ADirectionCountsUntilTheNextKeyWithTheFirstSpeed) {
   for (const auto& [key, direction] : {std::pair{kKeyForward, 1}, std::pair{kKeyReverse, -1}}) {

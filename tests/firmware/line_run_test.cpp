@@ -8,8 +8,7 @@ namespace bushd::test {
 namespace {
 
 using LineRun = OfLines;
-INSTANTIATE_TEST_SUITE_P(Formats, LineRun, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(LineRun);
 
 const std::vector<LineMotor> kOnLine = {{0, 333}, {1, -118}, {2, 1}, {3, 332}};
 
@@ -46,8 +45,7 @@ TEST_P(LineRun, IsExactInTicksThatAreNoWholeUnits) {
   for (std::uint16_t* code : {&odd.cruise}) *code = static_cast<std::uint16_t>(*code * 11);
   for (std::uint16_t& code : odd.accel) code = static_cast<std::uint16_t>(code * 11);
   for (std::uint16_t& code : odd.decel) code = static_cast<std::uint16_t>(code * 11);
-  Rig other({.queue_ticks = 256});
-  other.make_ready(odd, format);
+  ReadyRig other(odd, format, {.queue_ticks = 256});
   const Frame line{.first = other.first_open() + 3, .motors = kOnLine, .longest = 333};
   ASSERT_EQ(start(other, line), BUSHD_OK);
   expect_slots(other, Reference::move(odd, 333), line);
@@ -103,8 +101,7 @@ TEST_P(LineRun, RulesOfAStartHold) {
 }
 
 TEST_P(LineRun, IsUnknownWhereItIsDenied) {
-  Rig denied({.disabled_capabilities = BUSHD_CAN_LINE_RUN});
-  denied.make_ready(law, format);
+  ReadyRig denied(law, format, {.disabled_capabilities = BUSHD_CAN_LINE_RUN});
   EXPECT_EQ(denied.identify().capabilities & BUSHD_CAN_LINE_RUN, 0);
   EXPECT_EQ(start(denied, {.first = denied.first_open(), .motors = {{0, 5}}, .longest = 5}),
             BUSHD_E_UNKNOWN_MESSAGE);
@@ -118,8 +115,7 @@ TEST_P(LineRun, OfASlowMcuIsSlow) {
   fast.cruise = 269;
   for (const std::uint32_t disabled : std::array<std::uint32_t, 2>{0, BUSHD_CAN_TABLE_TICKS}) {
     const bool slow = disabled != 0;
-    Rig other({.queue_ticks = 256, .disabled_capabilities = disabled});
-    other.make_ready(fast, format);
+    ReadyRig other(fast, format, {.queue_ticks = 256, .disabled_capabilities = disabled});
     Frame line{
         .first = other.first_open() + 3, .motors = kOnLine, .longest = 333, .shortest_delay = 269};
     ASSERT_EQ(start(other, line), slow ? BUSHD_E_CAPACITY : BUSHD_OK);
@@ -148,8 +144,7 @@ TEST_P(LineRun, IsReplacedByTicksAtEveryTick) {
     return format == BUSHD_FORMAT_FINE ? position : position / 256 * 256;
   };
   for (std::size_t k = 0; k + 1 < run.ticks(); k += format == BUSHD_FORMAT_FINE ? 1 : 5) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     const std::uint32_t first = fresh.first_open();
     ASSERT_EQ(start(fresh, {.first = first, .motors = motors, .longest = kLongest}), BUSHD_OK);
     fresh.pass(static_cast<int>(k) / 2);
@@ -235,8 +230,7 @@ TEST_P(LineRun, ThatWaitsIsCancelledBySilence) {
 
 TEST_P(LineRun, EmergencyRampLeadsAlongTheLine) {
   for (const int wait : {0, 3, 12, 40, 90}) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     const std::uint32_t first = fresh.first_open();
     ASSERT_EQ(start(fresh, {.first = first, .motors = kOnLine, .longest = 333}), BUSHD_OK);
     fresh.pass(wait);

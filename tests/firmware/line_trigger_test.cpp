@@ -34,8 +34,7 @@ class LineTrigger : public OfLines {
 
   const std::vector<LineMotor> motors_ = {{0, 97}, {1, -31}, {2, 1}, {3, 96}};
 };
-INSTANTIATE_TEST_SUITE_P(Formats, LineTrigger,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(LineTrigger);
 
 TEST_P(LineTrigger, EveryStepFallsIntoItsSlotCountedFromTheEdge) {
   std::mt19937 random(5);

@@ -18,8 +18,7 @@ class Local : public Streams {
   }
   void release() { hold(0, 1); }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Local, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Local);
 
 TEST_P(Local, WhileHeldMotorsFollowTheirTableAndThenRampDown) {
   for (const auto& [button, direction] :
@@ -36,12 +35,8 @@ TEST_P(Local, WhileHeldMotorsFollowTheirTableAndThenRampDown) {
     // tick after the 130th.
     auto reference = Reference::move(law, 100000);
     reference.ramp_down_at(128 * std::uint64_t{Rig::kTickNs});
-    std::vector<int> expected = steps_by_tick(reference, Rig::kTickNs);
-    for (int& n : expected) n *= direction;
-    std::vector<int> seen(rig.history(2).begin() + 4, rig.history(2).end());
-    ASSERT_GE(seen.size(), expected.size());
-    expected.resize(seen.size());
-    EXPECT_EQ(seen, expected);
+    ASSERT_NO_FATAL_FAILURE(expect_steps({rig.history(2).begin() + 4, rig.history(2).end()},
+                                         steps_by_tick(reference, Rig::kTickNs), direction));
     EXPECT_EQ(rig.history(0), rig.history(2));
     EXPECT_EQ(rig.pulses(1), 0) << "not one of these";
     expect_rest_as_counted();

@@ -21,8 +21,7 @@ class OutOfOrder : public Streams {
     EXPECT_EQ(std::vector<int>(seen.begin() + 2, seen.end()), expected);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, OutOfOrder,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(OutOfOrder);
 
 TEST_P(OutOfOrder, FrameBehindALostOneIsKeptAndJoinedWhenThatComesAgain) {
   const Plan moves = plan(-90);

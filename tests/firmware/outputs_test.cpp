@@ -43,8 +43,7 @@ TEST(Outputs, OfAMasterThatTellsNoneAreActiveHigh) {
 }
 
 TEST(Outputs, ChangeDisablesTheDriversFirst) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE);
   ASSERT_TRUE(rig.enabled());
   ASSERT_EQ(rig.outputs(kLow), BUSHD_OK);
   EXPECT_FALSE(rig.enabled());
@@ -54,8 +53,7 @@ TEST(Outputs, ChangeDisablesTheDriversFirst) {
 }
 
 TEST(Outputs, DoNotChangeWhileAMotorMoves) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE);
   step_forward(rig);
   EXPECT_EQ(rig.outputs(kLow), BUSHD_E_STATE);
   EXPECT_EQ(rig.levels().enabled, BUSHD_ENABLED_HIGH);
@@ -66,8 +64,7 @@ TEST(Outputs, DoNotChangeWhileAMotorMoves) {
 
 TEST(Outputs, DirIsLowInThePositiveDirectionIfTheySaySo) {
   for (const bool low : {false, true}) {
-    Rig rig;
-    rig.make_ready(ramp_law(), BUSHD_FORMAT_COARSE);
+    ReadyRig rig(ramp_law(), BUSHD_FORMAT_COARSE);
     if (low) {
       ASSERT_EQ(rig.outputs(kLow), BUSHD_OK);
       ASSERT_EQ(rig.control(BUSHD_CONTROL_ENABLE), BUSHD_OK);

@@ -53,8 +53,7 @@ class PositionCompare : public Streams {
   std::vector<std::pair<std::int64_t, std::int64_t>> arrivals_;
   std::int64_t position_ = 0;
 };
-INSTANTIATE_TEST_SUITE_P(Formats, PositionCompare,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(PositionCompare);
 
 TEST_P(PositionCompare, FollowsTheArrivalAfterItsDelayWithinASlot) {
   std::mt19937 random(5);

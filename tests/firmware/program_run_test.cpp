@@ -7,8 +7,7 @@ namespace bushd::test {
 namespace {
 
 using ProgramRun = Programs;
-INSTANTIATE_TEST_SUITE_P(Formats, ProgramRun,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(ProgramRun);
 
 ProgramFrame move_by(std::uint8_t motor, std::int32_t steps) {
   return {.kind = Kind::kMoveBy, .motors = {motor}, .to = {{steps}}};

@@ -4,10 +4,6 @@
 namespace bushd::test {
 namespace {
 
-using Program = Programs;
-INSTANTIATE_TEST_SUITE_P(Formats, Program, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
-
 ProgramFrame move_by(std::vector<std::uint8_t> motors, std::vector<std::int32_t> steps) {
   return {.kind = Kind::kMoveBy, .motors = std::move(motors), .to = {std::move(steps)}};
 }
@@ -20,6 +16,29 @@ ProgramText endless(std::uint8_t flags = 0) {
                      {.kind = Kind::kNext},
                      kProgramEnd}};
 }
+
+class Program : public Programs {
+ protected:
+  void expect_stops() {
+    ASSERT_EQ(control(BUSHD_PROGRAM_STOP), BUSHD_OK);
+    expect_ended(BUSHD_PROGRAM_STOPPED);
+  }
+  // One that goes on without a host begins, of motors 0 and 1. Returns ticks of motor 2 that end
+  // while it moves.
+  Ticks begin_beside_another() {
+    ProgramText text = endless(BUSHD_PROGRAM_WITHOUT_HOST);
+    text.motors = 3;
+    begin(text);
+    pass(5);
+    return {.flags = kStart,
+            .first = rig.first_open(),
+            .count = 2,
+            .mask = 4,
+            .displacements = {one(), one()},
+            .delays = {64}};
+  }
+};
+BUSHD_IN_BOTH_FORMATS(Program);
 
 TEST_P(Program, NothingRunsFromHalfAnUpload) {
   const Bytes bytes = bytes_of(endless());
@@ -151,8 +170,7 @@ TEST_P(Program, ItsMotorsAreNobodyElses) {
                     .displacements = {one()},
                     .delays = {0}};
   EXPECT_EQ(rig.take(other), BUSHD_OK) << "another motor is free";
-  ASSERT_EQ(control(BUSHD_PROGRAM_STOP), BUSHD_OK);
-  expect_ended(BUSHD_PROGRAM_STOPPED);
+  expect_stops();
   EXPECT_EQ(rig.pulses(2), 1);
 }
 
@@ -247,30 +265,17 @@ TEST_P(Program, GoesOnInSilenceIfItSaysSo) {
 
 // The stream of another motor starves, and its MCU says so; that is no matter of the program.
 TEST_P(Program, AStreamThatStarvesDoesNotEndOneWithoutHost) {
-  ProgramText text = endless(BUSHD_PROGRAM_WITHOUT_HOST);
-  text.motors = 3;
-  begin(text);
-  pass(5);
-  Ticks other{.flags = kStart, .first = rig.first_open(), .count = 2, .mask = 4};
-  other.displacements = {one(), one()};
-  other.delays = {64};
+  Ticks other = begin_beside_another();
   ASSERT_EQ(rig.take(other), BUSHD_OK);
   pass(300);
   EXPECT_EQ(rig.poll().faults, BUSHD_FAULT_LINK);
   EXPECT_EQ(state().stage, BUSHD_PROGRAM_RUNS);
-  ASSERT_EQ(control(BUSHD_PROGRAM_STOP), BUSHD_OK);
-  expect_ended(BUSHD_PROGRAM_STOPPED);
+  expect_stops();
 }
 
 // Faults that end no program are not kept from other motors for as long as one goes on.
 TEST_P(Program, FaultsThatEndNoneAreClearedBesideOneWithoutHost) {
-  ProgramText text = endless(BUSHD_PROGRAM_WITHOUT_HOST);
-  text.motors = 3;
-  begin(text);
-  pass(5);
-  Ticks other{.flags = kStart, .first = rig.first_open(), .count = 2, .mask = 4};
-  other.displacements = {one(), one()};
-  other.delays = {64};
+  Ticks other = begin_beside_another();
   ASSERT_EQ(rig.take(other), BUSHD_OK);
   while (rig.poll().faults == 0) pass();
   EXPECT_EQ(rig.clear(BUSHD_FAULT_LINK), BUSHD_E_STATE) << "the other motor ramps down";
@@ -288,8 +293,7 @@ TEST_P(Program, FaultsThatEndNoneAreClearedBesideOneWithoutHost) {
   EXPECT_EQ(rig.take(other), BUSHD_OK) << "the other motor is free again";
   pass(300);
   EXPECT_EQ(state().stage, BUSHD_PROGRAM_RUNS);
-  ASSERT_EQ(control(BUSHD_PROGRAM_STOP), BUSHD_OK);
-  expect_ended(BUSHD_PROGRAM_STOPPED);
+  expect_stops();
 }
 
 TEST_P(Program, FaultsAreNotClearedBesideOneThatNeedsItsHost) {
@@ -383,8 +387,7 @@ TEST_P(Program, ALineWaitsForNobodyElses) {
 }
 
 TEST_P(Program, AnMcuWithoutTheCapabilityKnowsNoneOfIt) {
-  Rig none({.disabled_capabilities = BUSHD_CAN_PROGRAM});
-  none.make_ready(law, format);
+  ReadyRig none(law, format, {.disabled_capabilities = BUSHD_CAN_PROGRAM});
   EXPECT_EQ(none.identify().capabilities & BUSHD_CAN_PROGRAM, 0u);
   EXPECT_EQ(none.request(BUSHD_MSG_PROGRAM_PUT, {0, 0, 9, 0, 1}), BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(none.request(BUSHD_MSG_PROGRAM, {0, 0, 0, 0, 0, 0}), BUSHD_E_UNKNOWN_MESSAGE);

@@ -54,8 +54,7 @@ class ProgramTravel : public Programs {
   std::set<MadeStep> expected;
   std::int64_t end_ns = 0;
 };
-INSTANTIATE_TEST_SUITE_P(Formats, ProgramTravel,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(ProgramTravel);
 
 TEST_P(ProgramTravel, EveryEdgeThereAndBackIsWhereItBelongs) {
   ASSERT_EQ(

@@ -35,16 +35,14 @@ class RampDown : public Streams {
     return {on.history(motor).begin() + 2, on.history(motor).end()};
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, RampDown, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(RampDown);
 
 TEST_P(RampDown, FollowsTheTableFromEveryTickOfALongMove) {
   for (const std::int64_t steps : {260, -260}) {
     const Plan moves = plan(steps);
     ASSERT_GT(moves.ticks(), 120u);
     for (std::size_t cut = 1; cut < moves.ticks(); ++cut) {
-      Rig fresh;
-      fresh.make_ready(law, format, 5);
+      ReadyRig fresh(law, format, {}, 5);
       std::vector<int> seen = cut_off(fresh, moves, cut, 1);
       ASSERT_EQ(fresh.poll().faults, BUSHD_FAULT_LINK) << "cut " << cut;
       ASSERT_EQ(fresh.poll().state, BUSHD_STATE_FAULT);
@@ -114,8 +112,7 @@ TEST_P(RampDown, OthersFinishWhatIsQueued) {
 
 // Each motor by itself, all at once, each with another table and cut in another place.
 TEST_P(RampDown, SixteenMotorsByFourTables) {
-  Rig all({.motors = 16, .slots = 128, .code_count = 1000});
-  all.make_ready(law, format, 0xFFFFFFD0u);
+  ReadyRig all(law, format, {.motors = 16, .slots = 128, .code_count = 1000}, 0xFFFFFFD0u);
   std::vector<Law> laws(4, law);
   for (std::uint8_t i = 0; i < 4; ++i) {
     for (std::size_t k = 0; k < laws[i].decel.size(); ++k) {
@@ -174,8 +171,7 @@ TEST_P(RampDown, SlowMoveRampsDownFromATickWithoutAStep) {
   Law slow = law;
   slow.accel = slow.decel = {3000, 2500, 2000};
   slow.cruise = 2000;
-  Rig fresh;
-  fresh.make_ready(slow, format, 5);
+  ReadyRig fresh(slow, format, {}, 5);
   const Plan moves = plan_move(slow, -20, Rig::kTickNs, format);
   const std::vector<int> seen = cut_off(fresh, moves, 110, 0);
   ASSERT_EQ(moves.made[109], 2);
@@ -191,8 +187,7 @@ TEST_P(RampDown, DelayThatNoMoveHasIsTakenAsCruise) {
   steep.decel[0] = 100;
   steep.cruise = 60;
   for (const std::uint16_t delay : std::initializer_list<std::uint16_t>{1, 2, 59, 60}) {
-    Rig fresh({.slots = 128});
-    fresh.make_ready(steep, format, 5);
+    ReadyRig fresh(steep, format, {.slots = 128}, 5);
     fresh.forget_history();
     ASSERT_EQ(fresh.take({.flags = kStart,
                           .first = fresh.first_open(),

@@ -5,8 +5,7 @@ namespace bushd::test {
 namespace {
 
 class Replacement : public Streams {};
-INSTANTIATE_TEST_SUITE_P(Formats, Replacement,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(Replacement);
 
 TEST_P(Replacement, TakesTheTailAndRaisesTheEpoch) {
   const std::uint32_t start = rig.first_open();
@@ -114,8 +113,7 @@ TEST_P(Replacement, EpochWrapsAt256) {
 TEST_P(Replacement, TickNumbersWrapInMotion) {
   const Plan moves = plan(60);
   for (std::uint32_t before = 5; before < moves.ticks() + 12; before += 3) {
-    Rig wrapping;
-    wrapping.make_ready(law, format, 0u - before - 30);
+    ReadyRig wrapping(law, format, {}, 0u - before - 30);
     while (wrapping.tick() != 0u - before) wrapping.pass();
     wrapping.run_plan(moves, 3);
     EXPECT_EQ(wrapping.pulses(3), 60);
@@ -129,8 +127,7 @@ TEST_P(Replacement, TickNumbersWrapInMotion) {
 TEST_P(Replacement, ReplacedAndRampedDownAcrossTheWrap) {
   const Plan moves = plan(200);
   for (std::uint32_t before = 1; before < 40; ++before) {
-    Rig wrapping;
-    wrapping.make_ready(law, format, 0u - before - 30);
+    ReadyRig wrapping(law, format, {}, 0u - before - 30);
     while (wrapping.tick() != 0u - before) wrapping.pass();
     const std::uint32_t start = wrapping.first_open();
     ASSERT_EQ(wrapping.take(wrapping.part(moves, start, 0, 20)), BUSHD_OK);

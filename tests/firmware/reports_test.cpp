@@ -106,8 +106,7 @@ class Reports : public Streams {
   std::mt19937 random{81};
   std::uint32_t sync_id = 1000;
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Reports, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Reports);
 
 TEST_P(Reports, AnyPatternOfLossesLeavesAMasterWithWhatTheMcuTells) {
   limits_at_own_inputs();

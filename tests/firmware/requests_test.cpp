@@ -94,11 +94,9 @@ TEST(Requests, AddressIsSetByUniqueIdAndKept) {
 
 TEST(Requests, AddressStaysWhileAMotorMovesAndWhereItCannotBeKept) {
   for (const bool stores : {true, false}) {
-    Rig rig({.stores_address = stores});
-    rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+    ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE, {.stores_address = stores});
     if (stores) {
-      const Plan plan = plan_move(ramp_law(), 5, Rig::kTickNs, BUSHD_FORMAT_FINE);
-      ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+      ASSERT_EQ(rig.start(ramp_law(), 5), BUSHD_OK);
     }
     rig.frame(0, BUSHD_MSG_SET_ADDRESS, address_of(Rig::unique_id(), 20));
     const auto got = rig.answer();
@@ -110,12 +108,10 @@ TEST(Requests, AddressStaysWhileAMotorMovesAndWhereItCannotBeKept) {
 }
 
 TEST(Requests, AnotherSilenceAloneKeepsStepAndTables) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE, Rig::kTickNs, 12), BUSHD_OK);
   EXPECT_EQ(rig.poll().state, BUSHD_STATE_READY);
-  const Plan plan = plan_move(ramp_law(), 5, Rig::kTickNs, BUSHD_FORMAT_FINE);
-  ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+  ASSERT_EQ(rig.start(ramp_law(), 5), BUSHD_OK);
   EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE, Rig::kTickNs, 20), BUSHD_OK) << "in motion too";
   rig.pass_until_rest();
   EXPECT_EQ(rig.pulses(0), 5);
@@ -170,8 +166,7 @@ TEST_F(TwoMasters, OneAfterTheOtherAreNoTrouble) {
 }
 
 TEST(Requests, LowWaterIsThatOfMovingMotorsSinceTheReportBefore) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   const Plan plan = plan_move(ramp_law(), 100, Rig::kTickNs, BUSHD_FORMAT_FINE);
   static_cast<void>(rig.poll());
   rig.pass(5);

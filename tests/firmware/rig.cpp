@@ -31,6 +31,13 @@ std::vector<std::uint16_t> codes_of(const Law& law) {
   return codes;
 }
 
+void append(Bytes& bytes, const std::vector<std::uint16_t>& codes) {
+  for (const std::uint16_t code : codes) {
+    bytes.push_back(static_cast<std::uint8_t>(code));
+    bytes.push_back(static_cast<std::uint8_t>(code >> 8));
+  }
+}
+
 std::uint32_t crc32(const Bytes& bytes) {
   std::uint32_t crc = 0xFFFFFFFF;
   for (const std::uint8_t byte : bytes) {
@@ -245,43 +252,21 @@ bushd_identity Rig::identify() {
 
 bushd_status Rig::configure(bushd_format format, std::uint32_t tick_ns,
                             std::uint16_t comm_timeout_ticks) {
-  const bushd_configure message = {tick_ns, format, comm_timeout_ticks};
-  const auto status = request(BUSHD_MSG_CONFIGURE, payload_of(message, bushd_encode_configure));
+  const auto status = request(bushd_configure{tick_ns, format, comm_timeout_ticks});
   if (status == BUSHD_OK) format_ = format;
   return status;
 }
 
 bushd_status Rig::set_inputs(const InputSettings& settings) {
-  const bushd_set_inputs message = {.limit_positive = settings.limit_positive,
-                                    .limit_negative = settings.limit_negative,
-                                    .limit_immediate = settings.limit_immediate,
-                                    .inverted = settings.inverted,
-                                    .debounce_ticks = settings.debounce_ticks,
-                                    .system_inverted = settings.system_inverted,
-                                    .emergency = settings.emergency,
-                                    .overcurrent = settings.overcurrent,
-                                    .enable_after_watchdog = settings.enable_after_watchdog};
-  return request(BUSHD_MSG_INPUTS, payload_of(message, bushd_encode_set_inputs));
-}
-
-bushd_status Rig::motor_inputs(const bushd_motor_inputs& message) {
-  return request(BUSHD_MSG_MOTOR_INPUTS, payload_of(message, bushd_encode_motor_inputs));
-}
-
-bushd_status Rig::outputs(const bushd_set_outputs& message) {
-  return request(BUSHD_MSG_OUTPUTS, payload_of(message, bushd_encode_set_outputs));
-}
-
-bushd_status Rig::currents(const bushd_currents& message) {
-  return request(BUSHD_MSG_CURRENTS, payload_of(message, bushd_encode_currents));
-}
-
-bushd_status Rig::velocity(const bushd_set_velocity& message) {
-  return request(BUSHD_MSG_VELOCITY, payload_of(message, bushd_encode_set_velocity));
-}
-
-bushd_status Rig::home(const bushd_home& message) {
-  return request(BUSHD_MSG_HOME, payload_of(message, bushd_encode_home));
+  return request(bushd_set_inputs{.limit_positive = settings.limit_positive,
+                                  .limit_negative = settings.limit_negative,
+                                  .limit_immediate = settings.limit_immediate,
+                                  .inverted = settings.inverted,
+                                  .debounce_ticks = settings.debounce_ticks,
+                                  .system_inverted = settings.system_inverted,
+                                  .emergency = settings.emergency,
+                                  .overcurrent = settings.overcurrent,
+                                  .enable_after_watchdog = settings.enable_after_watchdog});
 }
 
 std::string Rig::keypad_display() {
@@ -292,13 +277,8 @@ std::string Rig::keypad_display() {
   return text;
 }
 
-bushd_status Rig::local(std::uint16_t motors, std::uint16_t keypad, std::uint16_t keypad_ticks) {
-  const bushd_local message = {motors, keypad, keypad_ticks};
-  return request(BUSHD_MSG_LOCAL, payload_of(message, bushd_encode_local));
-}
-
 void Rig::sync(const bushd_sync& message) {
-  frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, payload_of(message, bushd_encode_sync));
+  frame(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_SYNC, request_of(message).payload);
   EXPECT_FALSE(answer()) << "SYNC is not answered";
 }
 
@@ -333,12 +313,8 @@ bushd_status Rig::data(std::uint8_t bank, std::uint16_t offset,
 
 bushd_status Rig::end(std::uint8_t bank, const std::vector<std::uint16_t>& codes) {
   Bytes bytes = table_head_[bank];
-  for (const std::uint16_t code : codes) {
-    bytes.push_back(static_cast<std::uint8_t>(code));
-    bytes.push_back(static_cast<std::uint8_t>(code >> 8));
-  }
-  const bushd_table_end message = {bank, crc32(bytes)};
-  return request(BUSHD_MSG_TABLE_END, payload_of(message, bushd_encode_table_end));
+  append(bytes, codes);
+  return request(bushd_table_end{bank, crc32(bytes)});
 }
 
 bushd_status Rig::upload(std::uint8_t bank, const Law& law) {
@@ -354,10 +330,6 @@ bushd_status Rig::upload(std::uint8_t bank, const Law& law) {
   return end(bank, codes);
 }
 
-bushd_status Rig::assign(std::uint8_t motor, std::uint8_t bank) {
-  return request(BUSHD_MSG_ASSIGN, {motor, bank});
-}
-
 bushd_tables Rig::tables() {
   frame(BUSHD_MSG_TABLES, {});
   return decoded(answer(), bushd_decode_tables);
@@ -371,30 +343,9 @@ bushd_status Rig::arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_
                  }));
 }
 
-bushd_status Rig::position_compare(const bushd_position_compare& message) {
-  return request(BUSHD_MSG_POSITION_COMPARE, payload_of(message, bushd_encode_position_compare));
-}
-
 void Rig::emergency(bushd_stop_mode mode, std::uint8_t address) {
   frame(address, BUSHD_MSG_EMERGENCY, {static_cast<std::uint8_t>(mode)});
   EXPECT_FALSE(answer()) << "EMERGENCY is not answered";
-}
-
-bushd_status Rig::control(std::uint8_t actions) {
-  return request(BUSHD_MSG_CONTROL, {actions});
-}
-
-bushd_status Rig::clear(std::uint8_t faults) {
-  return request(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_CLEAR_FAULTS, faults});
-}
-
-bushd_status Rig::emission(const bushd_emission& message) {
-  return request(BUSHD_MSG_EMISSION, payload_of(message, bushd_encode_emission));
-}
-
-bushd_status Rig::set_position(std::uint8_t motor, std::int32_t position_steps) {
-  const bushd_set_position message = {motor, position_steps};
-  return request(BUSHD_MSG_SET_POSITION, payload_of(message, bushd_encode_set_position));
 }
 
 void Rig::make_ready(const Law& law, bushd_format format, std::uint32_t tick) {
@@ -406,22 +357,9 @@ void Rig::make_ready(const Law& law, bushd_format format, std::uint32_t tick) {
   EXPECT_EQ(poll().state, BUSHD_STATE_READY);
 }
 
-Bytes Rig::encode(const Ticks& ticks) const {
-  const bool fine = format_ == BUSHD_FORMAT_FINE;
-  return payload_of([&](std::uint8_t* p) {
-    const auto flags = static_cast<std::uint8_t>(ticks.flags | (fine ? BUSHD_TICKS_FINE : 0));
-    std::size_t size = bushd_encode_ticks_head(ticks.epoch, flags, ticks.first, ticks.count,
-                                               ticks.mask, ticks.delays.data(), p);
-    for (const std::int16_t displacement : ticks.displacements) {
-      if (fine) {
-        bushd_put_i16(p + size, displacement);
-        size += 2;
-      } else {
-        p[size++] = static_cast<std::uint8_t>(displacement);
-      }
-    }
-    return size;
-  });
+Bytes Rig::encode(Ticks ticks) const {
+  if (format_ == BUSHD_FORMAT_FINE) ticks.flags |= BUSHD_TICKS_FINE;
+  return ticks_payload(ticks);
 }
 
 bushd_status Rig::take(std::uint8_t type, const Bytes& payload) {

@@ -16,6 +16,7 @@
 #include "engine/payload.h"
 #include "engine/reference.h"
 #include "firmware/core/nvm.h"
+#include "sim/requests.h"
 
 namespace bushd::test {
 
@@ -62,18 +63,10 @@ Plan plan_move(const Law& law, std::int64_t steps, std::uint32_t tick_ns, bushd_
 // Steps in each tick of a reference that begins at a tick's beginning.
 std::vector<int> steps_by_tick(const Reference& reference, std::uint32_t tick_ns);
 
+// Codes as a checksum and a frame have them.
+void append(Bytes& bytes, const std::vector<std::uint16_t>& codes);
 // CRC-32/ISO-HDLC, bit by bit.
 std::uint32_t crc32(const Bytes& bytes);
-
-struct Ticks {
-  std::uint8_t flags = 0;  // BUSHD_TICKS_FINE is added as needed
-  std::uint32_t first = 0;
-  std::uint8_t count = 1;
-  std::uint16_t mask = 1;
-  std::vector<std::int16_t> displacements{};  // count x motors of the mask
-  std::vector<std::uint16_t> delays{};        // one a motor
-  std::uint8_t epoch = 0;
-};
 
 // bushd_set_inputs, all of it off.
 struct InputSettings {
@@ -113,6 +106,11 @@ class Rig {
   std::uint8_t last_sequence() const { return sequence_; }
   // Sends a request to this MCU and returns the status that it acknowledges with.
   bushd_status request(std::uint8_t type, const Bytes& payload);
+  template <class Message>
+  bushd_status request(const Message& message) {
+    const Request request = request_of(message);
+    return this->request(static_cast<std::uint8_t>(request.type), request.payload);
+  }
   // What reports have told, this one included.
   bushd_report poll();
   // The answer to a POLL of its own kind; `before`: what is known already.
@@ -133,17 +131,23 @@ class Rig {
                     const std::vector<std::uint16_t>& codes);
   bushd_status end(std::uint8_t bank, const std::vector<std::uint16_t>& codes);
   bushd_status upload(std::uint8_t bank, const Law& law);
-  bushd_status assign(std::uint8_t motor, std::uint8_t bank);
-  bushd_status control(std::uint8_t actions);
-  bushd_status clear(std::uint8_t faults);
-  bushd_status set_position(std::uint8_t motor, std::int32_t position_steps);
-  bushd_status emission(const bushd_emission& message);
+  bushd_status assign(std::uint8_t motor, std::uint8_t bank) {
+    return request(BUSHD_MSG_ASSIGN, {motor, bank});
+  }
+  bushd_status control(std::uint8_t actions) { return request(BUSHD_MSG_CONTROL, {actions}); }
+  bushd_status clear(std::uint8_t faults) {
+    return request(BUSHD_MSG_CONTROL, {BUSHD_CONTROL_CLEAR_FAULTS, faults});
+  }
+  bushd_status set_position(std::uint8_t motor, std::int32_t position_steps) {
+    return request(bushd_set_position{motor, position_steps});
+  }
+  bushd_status emission(const bushd_emission& message) { return request(message); }
   bushd_tables tables();
   bushd_status set_inputs(const InputSettings& settings);
-  bushd_status motor_inputs(const bushd_motor_inputs& message);
-  bushd_status outputs(const bushd_set_outputs& message);
-  bushd_status currents(const bushd_currents& message);
-  bushd_status velocity(const bushd_set_velocity& message);
+  bushd_status motor_inputs(const bushd_motor_inputs& message) { return request(message); }
+  bushd_status outputs(const bushd_set_outputs& message) { return request(message); }
+  bushd_status currents(const bushd_currents& message) { return request(message); }
+  bushd_status velocity(const bushd_set_velocity& message) { return request(message); }
   // What the port was told, in order of time.
   struct Winding {
     std::uint8_t motor;
@@ -151,9 +155,11 @@ class Rig {
     bool fast_decay;
   };
   const std::vector<Winding>& windings() const { return windings_; }
-  bushd_status home(const bushd_home& message);
+  bushd_status home(const bushd_home& message) { return request(message); }
   bushd_status local(std::uint16_t motors, std::uint16_t keypad = 0,
-                     std::uint16_t keypad_ticks = 0);
+                     std::uint16_t keypad_ticks = 0) {
+    return request(bushd_local{motors, keypad, keypad_ticks});
+  }
   void keypad(std::uint8_t byte) { bushd_mcu_keypad_byte(&mcu_, byte); }
   void keypad_break() { bushd_mcu_keypad_break(&mcu_); }
   // What is due for its display now.
@@ -166,7 +172,7 @@ class Rig {
   bushd_status arm(std::uint8_t number, bushd_edge edge, std::uint32_t delay_us,
                    const std::vector<bushd_table_run_entry>& entries);
   bushd_status disarm() { return arm(0, BUSHD_EDGE_NONE, 0, {}); }
-  bushd_status position_compare(const bushd_position_compare& message);
+  bushd_status position_compare(const bushd_position_compare& message) { return request(message); }
   // What the port was told to wait for, and the edge noticed in the present tick.
   bushd_edge awaited_edge() const { return awaited_edge_; }
   void trigger(std::int32_t time_in_tick_ns) { bushd_mcu_trigger(&mcu_, time_in_tick_ns); }
@@ -175,13 +181,25 @@ class Rig {
   // Everything up to READY, with this table for all motors.
   void make_ready(const Law& law, bushd_format format, std::uint32_t tick = 1000);
 
-  Bytes encode(const Ticks& ticks) const;
+  // BUSHD_TICKS_FINE is added as needed.
+  Bytes encode(Ticks ticks) const;
   // What the MCU made of it, as its reports tell.
   bushd_status take(const Ticks& ticks) { return take(BUSHD_MSG_TICKS, encode(ticks)); }
   bushd_status take(std::uint8_t type, const Bytes& payload);
   // Ticks [from, from + count) of a plan that starts at `start`, with the delay at their end.
   Ticks part(const Plan& plan, std::uint32_t start, std::size_t from, std::size_t count,
              std::uint8_t motor = 0) const;
+  // A move of no more than 100 ticks, in one frame from the first open tick on.
+  bushd_status start(const Law& law, std::int64_t steps, std::uint8_t motor = 0) {
+    return take(part(plan_move(law, steps, kTickNs, format_), first_open(), 0, 100, motor));
+  }
+  // The first `ticks` ticks of a plan, in frames of `part`.
+  void take_plan(const Plan& plan, std::uint32_t start, std::size_t ticks, std::size_t part_ticks,
+                 std::uint8_t motor = 0) {
+    for (std::size_t from = 0; from < std::min(ticks, plan.ticks()); from += part_ticks) {
+      ASSERT_EQ(take(part(plan, start, from, part_ticks, motor)), BUSHD_OK);
+    }
+  }
   // Keeps the queue filled with a plan and lets time pass until the motor is at rest.
   void run_plan(const Plan& plan, std::uint8_t motor);
 
@@ -264,6 +282,15 @@ class Rig {
   std::array<std::vector<int>, BUSHD_MOTORS_PER_MCU> history_;
   int steps_with_dir_ = 0;
   int steps_while_disabled_ = 0;
+};
+
+class ReadyRig : public Rig {
+ public:
+  ReadyRig(const Law& law, bushd_format format, const RigOptions& options = {},
+           std::uint32_t tick = 1000)
+      : Rig(options) {
+    make_ready(law, format, tick);
+  }
 };
 
 // A ramp of 24 codes with unequal sides: 40 us units, 10 ms down to 0.8 ms.

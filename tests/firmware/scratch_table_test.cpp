@@ -6,12 +6,25 @@
 namespace bushd::test {
 namespace {
 
-using ScratchTable = OfLines;
-INSTANTIATE_TEST_SUITE_P(Formats, ScratchTable,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
-
 constexpr std::uint8_t kScratch = BUSHD_SCRATCH_BANK;
-const std::vector<LineMotor> kLineMotors = {{0, 333}, {1, -118}, {3, 332}};
+
+class ScratchTable : public OfLines {
+ protected:
+  static Frame line_of(const Rig& on, std::uint8_t bank) {
+    return {.first = on.first_open() + 3,
+            .motors = {{0, 333}, {1, -118}, {3, 332}},
+            .longest = 333,
+            .bank = bank};
+  }
+  bushd_status start_line(std::uint8_t bank) { return start(rig, line_of(rig, bank)); }
+  // Its motors go by the law that this bank has.
+  void expect_line_by(std::uint8_t bank, const Law& of_bank) {
+    const Frame line = line_of(rig, bank);
+    ASSERT_EQ(start(rig, line), BUSHD_OK);
+    expect_slots(rig, Reference::move(of_bank, 333), line);
+  }
+};
+BUSHD_IN_BOTH_FORMATS(ScratchTable);
 
 // Slower than the motors' own, and with unequal sides.
 Law envelope_law() {
@@ -27,14 +40,9 @@ TEST_P(ScratchTable, LinesGoByItExactToASlot) {
     Law slower = envelope_law();
     slower.cruise = static_cast<std::uint16_t>(slower.cruise + i);
     ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
-    const Frame line{
-        .first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch};
-    ASSERT_EQ(start(rig, line), BUSHD_OK);
-    expect_slots(rig, Reference::move(slower, 333), line);
+    ASSERT_NO_FATAL_FAILURE(expect_line_by(kScratch, slower));
   }
-  const Frame line{.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333};
-  ASSERT_EQ(start(rig, line), BUSHD_OK);
-  expect_slots(rig, Reference::move(law, 333), line);
+  ASSERT_NO_FATAL_FAILURE(expect_line_by(0, law));
 }
 
 // A motor that leaves the line goes by its own.
@@ -50,20 +58,15 @@ TEST_P(ScratchTable, IsNoMotorsTable) {
 
 TEST_P(ScratchTable, NoLineGoesByOneThatHasNotComeWhole) {
   const Law slower = envelope_law();
-  const auto refused = [&] {
-    return start(
-        rig,
-        {.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch});
-  };
-  EXPECT_EQ(refused(), BUSHD_E_NO_TABLE);
+  EXPECT_EQ(start_line(kScratch), BUSHD_E_NO_TABLE);
   EXPECT_EQ(rig.data(kScratch, 0, slower.accel), BUSHD_E_STATE);
   ASSERT_EQ(rig.begin(kScratch, slower), BUSHD_OK);
   ASSERT_EQ(rig.data(kScratch, 0, codes_of(slower)), BUSHD_OK);
-  EXPECT_EQ(refused(), BUSHD_E_NO_TABLE);
+  EXPECT_EQ(start_line(kScratch), BUSHD_E_NO_TABLE);
   EXPECT_EQ(rig.end(kScratch, slower.accel), BUSHD_E_CRC);
-  EXPECT_EQ(refused(), BUSHD_E_NO_TABLE);
+  EXPECT_EQ(start_line(kScratch), BUSHD_E_NO_TABLE);
   EXPECT_EQ(rig.end(kScratch, codes_of(slower)), BUSHD_OK);
-  EXPECT_EQ(refused(), BUSHD_OK);
+  EXPECT_EQ(start_line(kScratch), BUSHD_OK);
 }
 
 // Its codes lie behind all others.
@@ -76,20 +79,12 @@ TEST_P(ScratchTable, MakesRoomForTablesThatAreKept) {
   ASSERT_EQ(rig.upload(1, kept), BUSHD_OK);
   EXPECT_GT(rig.mcu().tables.codes_used, used);
   ASSERT_EQ(rig.assign(0, 1), BUSHD_OK);
-  Frame line{
-      .first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch};
-  EXPECT_EQ(start(rig, line), BUSHD_E_NO_TABLE) << "discarded";
+  EXPECT_EQ(start_line(kScratch), BUSHD_E_NO_TABLE) << "discarded";
   ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
-  line.first = rig.first_open() + 3;
-  ASSERT_EQ(start(rig, line), BUSHD_OK);
-  expect_slots(rig, Reference::move(slower, 333), line);
+  ASSERT_NO_FATAL_FAILURE(expect_line_by(kScratch, slower));
   // And both others are what they were.
-  line = {.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = 1};
-  ASSERT_EQ(start(rig, line), BUSHD_OK);
-  expect_slots(rig, Reference::move(kept, 333), line);
-  line = {.first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333};
-  ASSERT_EQ(start(rig, line), BUSHD_OK);
-  expect_slots(rig, Reference::move(law, 333), line);
+  ASSERT_NO_FATAL_FAILURE(expect_line_by(1, kept));
+  ASSERT_NO_FATAL_FAILURE(expect_line_by(0, law));
 }
 
 TEST_P(ScratchTable, HasTheRoomThatOthersLeave) {
@@ -106,8 +101,7 @@ TEST_P(ScratchTable, HasTheRoomThatOthersLeave) {
 TEST_P(ScratchTable, IsTakenAtRestOnly) {
   const Law slower = envelope_law();
   ASSERT_EQ(rig.upload(kScratch, slower), BUSHD_OK);
-  const Frame line{
-      .first = rig.first_open() + 3, .motors = kLineMotors, .longest = 333, .bank = kScratch};
+  const Frame line = line_of(rig, kScratch);
   ASSERT_EQ(start(rig, line), BUSHD_OK);
   for (const std::uint8_t bank : {kScratch, std::uint8_t{0}, std::uint8_t{5}}) {
     EXPECT_EQ(rig.begin(bank, slower), BUSHD_E_STATE) << int{bank};
@@ -116,8 +110,7 @@ TEST_P(ScratchTable, IsTakenAtRestOnly) {
   expect_slots(rig, Reference::move(slower, 333), line);
   // A motor that begins to move between its parts.
   ASSERT_EQ(rig.begin(kScratch, slower), BUSHD_OK);
-  const Plan plan = this->plan(5);
-  ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+  ASSERT_EQ(rig.start(law, 5), BUSHD_OK);
   EXPECT_EQ(rig.data(kScratch, 0, codes_of(slower)), BUSHD_OK);
   EXPECT_EQ(rig.end(kScratch, codes_of(slower)), BUSHD_E_STATE) << "checks take a while";
   rig.pass_until_rest();
@@ -158,17 +151,12 @@ TEST_P(ScratchTable, IsNoPartOfWhatAPortKeeps) {
 }
 
 TEST_P(ScratchTable, IsNoBankOfAnMcuWithoutIt) {
-  Rig none({.disabled_capabilities = BUSHD_CAN_SCRATCH});
-  none.make_ready(law, format);
+  ReadyRig none(law, format, {.disabled_capabilities = BUSHD_CAN_SCRATCH});
   EXPECT_EQ(none.identify().capabilities & BUSHD_CAN_SCRATCH, 0u);
   EXPECT_EQ(none.begin(kScratch, law), BUSHD_E_FORMAT);
   EXPECT_EQ(none.data(kScratch, 0, law.accel), BUSHD_E_FORMAT);
   EXPECT_EQ(none.end(kScratch, codes_of(law)), BUSHD_E_FORMAT);
-  EXPECT_EQ(start(none, {.first = none.first_open() + 3,
-                         .motors = kLineMotors,
-                         .longest = 333,
-                         .bank = kScratch}),
-            BUSHD_E_NO_TABLE);
+  EXPECT_EQ(start(none, line_of(none, kScratch)), BUSHD_E_NO_TABLE);
   EXPECT_NE(rig.identify().capabilities & BUSHD_CAN_SCRATCH, 0u);
 }
 

@@ -28,8 +28,7 @@ class Settle : public Streams {
     return steps;
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Settle, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Settle);
 
 TEST_P(Settle, AMotorThatMayGoBothWaysMakesTheStep) {
   measure({.limit_positive = 0b0001, .limit_negative = 0b0010}, 0b0011);

@@ -34,6 +34,14 @@ class Streams : public testing::TestWithParam<bushd_format> {
     EXPECT_EQ(rig.poll().motor[motor].position_steps, steps);
     EXPECT_EQ(rig.poll().faults, 0);
   }
+  // By tick; behind the ticks that are expected nothing has moved.
+  static void expect_steps(const std::vector<int>& seen, std::vector<int> expected,
+                           int direction = 1) {
+    for (int& n : expected) n *= direction;
+    ASSERT_LE(expected.size(), seen.size());
+    expected.resize(seen.size());
+    EXPECT_EQ(seen, expected);
+  }
   void expect_rest_as_counted() {
     rig.pass_until_rest();
     const bushd_report report = rig.poll();
@@ -52,5 +60,8 @@ class Streams : public testing::TestWithParam<bushd_format> {
 inline std::string format_name(const testing::TestParamInfo<bushd_format>& format) {
   return format.param == BUSHD_FORMAT_FINE ? "Fine" : "Coarse";
 }
+#define BUSHD_IN_BOTH_FORMATS(suite)       \
+  INSTANTIATE_TEST_SUITE_P(Formats, suite, \
+                           testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name)
 
 }  // namespace bushd::test

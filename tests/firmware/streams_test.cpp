@@ -6,8 +6,7 @@
 namespace bushd::test {
 namespace {
 
-INSTANTIATE_TEST_SUITE_P(Formats, Streams, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Streams);
 
 TEST_P(Streams, MovesMakeTheStepsOfTheirTicks) {
   std::int64_t position = 0;
@@ -234,8 +233,7 @@ TEST_P(Streams, PositionCounterWrapsWithoutHarm) {
 // Fine displacements carry more than a tick can hold; the protocol allows 127 steps.
 TEST(StreamsFine, DisplacementsBeyond127StepsAreRefused) {
   for (const std::uint16_t slots : std::initializer_list<std::uint16_t>{128, 200, 256}) {
-    Rig rig({.slots = slots});
-    rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+    ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE, {.slots = slots});
     for (const int displacement : {32767, -32768, 32513, -32513}) {
       const Ticks ticks = {.flags = kStart,
                            .first = rig.first_open(),
@@ -258,8 +256,7 @@ TEST(StreamsFine, DisplacementsBeyond127StepsAreRefused) {
 
 // Jitter around a border makes no steps: after a reversal a whole step must be gone back.
 TEST(StreamsFine, JitterMakesNoSteps) {
-  Rig rig;
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE);
   Ticks ticks = {.flags = kStart, .first = rig.first_open(), .count = 60, .delays = {0}};
   ticks.displacements = {255, 2};
   while (ticks.displacements.size() < 60) {
@@ -276,8 +273,7 @@ TEST(StreamsFine, JitterMakesNoSteps) {
 TEST(StreamsAll, SixteenMotorsMakeTheirOwnMoves) {
   for (const bushd_format format : {BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE}) {
     for (const std::uint16_t slots : std::initializer_list<std::uint16_t>{128, 131, 256}) {
-      Rig rig({.motors = 16, .slots = slots});
-      rig.make_ready(ramp_law(), format);
+      ReadyRig rig(ramp_law(), format, {.motors = 16, .slots = slots});
       std::vector<Plan> plans;
       std::size_t longest = 0;
       for (int m = 0; m < 16; ++m) {

@@ -28,9 +28,7 @@ class Switches : public Streams {
   static InputSettings both() {
     return {.limit_positive = kSwitchedBit, .limit_negative = kSwitchedBit};
   }
-  bushd_status start(std::uint8_t motor, int steps) {
-    return rig.take(rig.part(plan(steps), rig.first_open(), 0, 100, motor));
-  }
+  bushd_status start(std::uint8_t motor, int steps) { return rig.start(law, steps, motor); }
   void pins(unsigned inputs) { rig.pins({static_cast<std::uint16_t>(inputs), 0}); }
   // Half a move of 60 steps, and then the switch.
   void run_into(unsigned inputs) {

@@ -7,8 +7,7 @@
 namespace bushd::test {
 namespace {
 
-INSTANTIATE_TEST_SUITE_P(Formats, Switches, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Switches);
 
 TEST_P(Switches, EachEndHasItsOwn) {
   wire();

@@ -10,10 +10,10 @@ class TableRun : public Streams {
  protected:
   static Bytes run_frame(std::uint32_t first, std::vector<bushd_table_run_entry> entries,
                          std::uint8_t epoch = 0) {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_table_run(
-        epoch, first, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
-    return payload;
+    return payload_of([&](std::uint8_t* to) {
+      return bushd_encode_table_run(epoch, first, entries.data(),
+                                    static_cast<std::uint8_t>(entries.size()), to);
+    });
   }
   static bushd_status start(Rig& on, std::uint32_t first, std::uint32_t steps, int direction = 1,
                             std::uint16_t shortest_delay = 0) {
@@ -24,16 +24,11 @@ class TableRun : public Streams {
   // The steps of each tick of what motor 0 has done since the history was forgotten, from the tick
   // that was open then on.
   static void expect_steps(const Rig& of, const Reference& reference, int direction) {
-    std::vector<int> expected = steps_by_tick(reference, Rig::kTickNs);
-    for (int& n : expected) n *= direction;
-    std::vector<int> seen(of.history(0).begin() + 2, of.history(0).end());
-    ASSERT_GE(seen.size(), expected.size());
-    expected.resize(seen.size());
-    EXPECT_EQ(seen, expected);
+    Streams::expect_steps({of.history(0).begin() + 2, of.history(0).end()},
+                          steps_by_tick(reference, Rig::kTickNs), direction);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, TableRun, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(TableRun);
 
 TEST_P(TableRun, EveryStepFallsIntoTheSlotOfTheSumOfItsDelays) {
   const auto cruise = law.cruise;
@@ -142,8 +137,7 @@ TEST_P(TableRun, RulesOfAStartHold) {
 TEST_P(TableRun, IsReplacedByTicksAtEveryTick) {
   const Plan moves = plan(-120);
   for (std::size_t k = 0; k + 1 < moves.ticks(); ++k) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     fresh.forget_history();
     const std::uint32_t first = fresh.first_open();
     ASSERT_EQ(start(fresh, first, 120, -1), BUSHD_OK);

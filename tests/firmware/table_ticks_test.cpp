@@ -35,8 +35,7 @@ class TableTicks : public Streams {
   }
   const TestTable table{law, false};
 };
-INSTANTIATE_TEST_SUITE_P(Formats, TableTicks,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(TableTicks);
 
 TEST_P(TableTicks, EqualTicksForAnyRunFromAnyTick) {
   holds("two MCUs, one hears displacements, the other run states", [this] {

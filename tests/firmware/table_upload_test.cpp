@@ -29,9 +29,7 @@ void expect_runs_down_by(Rig& rig, std::uint8_t motor, const Law& law) {
   const Plan plan = plan_move(law, 500, Rig::kTickNs, BUSHD_FORMAT_FINE);
   const std::size_t cut = 120;
   const std::uint32_t start = rig.first_open();
-  for (std::size_t from = 0; from < cut; from += 40) {
-    ASSERT_EQ(rig.take(rig.part(plan, start, from, 40, motor)), BUSHD_OK);
-  }
+  ASSERT_NO_FATAL_FAILURE(rig.take_plan(plan, start, cut, 40, motor));
   rig.forget_history();
   rig.pass_until_rest();
   const auto rest = steps_by_tick(
@@ -48,6 +46,18 @@ class TableUpload : public testing::Test {
     EXPECT_EQ(rig.configure(BUSHD_FORMAT_FINE), BUSHD_OK);
     rig.sync_to(1000);
     EXPECT_EQ(rig.control(BUSHD_CONTROL_ENABLE), BUSHD_OK);
+  }
+  // To motor 0.
+  void give(const Law& law) {
+    ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
+    ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  }
+  // Whole and checked, the same on both sides.
+  void upload_symmetric(std::uint8_t bank, const Law& law, std::uint32_t revision = 0) {
+    ASSERT_EQ(rig.begin(bank, law, true, revision), BUSHD_OK);
+    ASSERT_EQ(rig.data(bank, 0, law.accel), BUSHD_OK);
+    EXPECT_FALSE(rig.tables().bank[bank].valid) << "not yet checked";
+    ASSERT_EQ(rig.end(bank, law.accel), BUSHD_OK);
   }
   Rig rig{RigOptions{.code_count = 150}};
 };
@@ -146,8 +156,7 @@ TEST_F(TableUpload, MemoryIsFilledToTheLastCodeAndNoFurther) {
   expect_runs_down_by(rig, 1, flat_law(250, 40, 11));
   // What the bank held before is given up even if the new table does not fit.
   EXPECT_EQ(rig.begin(0, flat_law(250, 70, 30)), BUSHD_E_CAPACITY);
-  const Plan plan = plan_move(flat_law(250, 60, 39), 5, Rig::kTickNs, BUSHD_FORMAT_FINE);
-  EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100, 0)), BUSHD_E_NO_TABLE);
+  EXPECT_EQ(rig.start(flat_law(250, 60, 39), 5), BUSHD_E_NO_TABLE);
   expect_runs_down_by(rig, 1, flat_law(250, 40, 11));
   EXPECT_EQ(rig.upload(2, flat_law(250, 59, 40)), BUSHD_OK) << "its place is free";
 }
@@ -161,9 +170,7 @@ TEST_F(TableUpload, LargestAnnouncementIsRefusedNotWrapped) {
 
 TEST_F(TableUpload, SymmetricTableIsKeptOnce) {
   Law law = flat_law(250, 70, 0);
-  ASSERT_EQ(rig.begin(0, law, true), BUSHD_OK);
-  ASSERT_EQ(rig.data(0, 0, law.accel), BUSHD_OK);
-  ASSERT_EQ(rig.end(0, law.accel), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(upload_symmetric(0, law));
   ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
   EXPECT_EQ(rig.upload(1, flat_law(250, 40, 40)), BUSHD_OK) << "80 codes are left";
   law.decel = law.accel;
@@ -176,17 +183,14 @@ TEST_F(TableUpload, TablesSentAgainLeaveTheOthersUnharmed) {
                             flat_law(220, 15, 0)};
   law[3].decel = law[3].accel;
   for (std::uint8_t i = 0; i < 3; ++i) ASSERT_EQ(rig.upload(i, law[i]), BUSHD_OK);
-  ASSERT_EQ(rig.begin(3, law[3], true), BUSHD_OK);
-  ASSERT_EQ(rig.data(3, 0, law[3].accel), BUSHD_OK);
-  ASSERT_EQ(rig.end(3, law[3].accel), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(upload_symmetric(3, law[3]));
   for (std::uint8_t i = 0; i < 4; ++i) ASSERT_EQ(rig.assign(i, i), BUSHD_OK);
   const std::size_t sizes[][2] = {{3, 2}, {30, 11}, {12, 7}, {1, 1}, {40, 20}};
   for (const std::uint8_t again : std::initializer_list<std::uint8_t>{0, 1, 2, 1, 0}) {
     for (const auto& size : sizes) {
       law[again] = flat_law(250, size[0], size[1]);
       ASSERT_EQ(rig.upload(again, law[again]), BUSHD_OK);
-      const Plan plan = plan_move(law[again], 5, Rig::kTickNs, BUSHD_FORMAT_FINE);
-      EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100, again)), BUSHD_E_NO_TABLE)
+      EXPECT_EQ(rig.start(law[again], 5, again), BUSHD_E_NO_TABLE)
           << "its motors must be assigned anew";
       ASSERT_EQ(rig.assign(again, again), BUSHD_OK);
       for (std::uint8_t i = 0; i < 4; ++i) {
@@ -216,8 +220,7 @@ TEST_F(TableUpload, HalfSentTableMovesWithTheOthers) {
 
 TEST_F(TableUpload, RefusedWhileAMotorMoves) {
   const Law law = flat_law(250, 20, 10);
-  ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
-  ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(give(law));
   ASSERT_EQ(rig.assign(1, 0), BUSHD_OK);
   const Plan plan = plan_move(law, 4, Rig::kTickNs, BUSHD_FORMAT_FINE);
   ASSERT_EQ(rig.take(rig.part(plan, rig.first_open() + 5, 0, 100)), BUSHD_OK);
@@ -239,20 +242,14 @@ TEST_F(TableUpload, WhatIsHeldIsTold) {
   const Law law = flat_law(250, 20, 10);
   ASSERT_EQ(rig.upload(2, law), BUSHD_OK);
   const Law flat = flat_law(240, 8, 0);
-  ASSERT_EQ(rig.begin(5, flat, true, 0xCAFE1234), BUSHD_OK);
-  ASSERT_EQ(rig.data(5, 0, flat.accel), BUSHD_OK);
-  EXPECT_FALSE(rig.tables().bank[5].valid) << "not yet checked";
-  ASSERT_EQ(rig.end(5, flat.accel), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(upload_symmetric(5, flat, 0xCAFE1234));
   const bushd_tables tables = rig.tables();
   for (std::uint8_t i = 0; i < BUSHD_TABLE_BANKS; ++i) {
     EXPECT_EQ(tables.bank[i].valid, i == 2 || i == 5) << int{i};
   }
   EXPECT_EQ(tables.bank[5].revision, 0xCAFE1234);
   Bytes whole = {8, 0, 0, 0, 25, 0, 0x40, 0x9C, 0, 0};
-  for (const std::uint16_t code : flat.accel) {
-    whole.push_back(static_cast<std::uint8_t>(code));
-    whole.push_back(static_cast<std::uint8_t>(code >> 8));
-  }
+  append(whole, flat.accel);
   EXPECT_EQ(tables.bank[5].crc, crc32(whole));
 }
 
@@ -262,10 +259,7 @@ TEST_F(TableUpload, AnotherCruiseThanTheMastersIsFound) {
   ASSERT_EQ(rig.begin(0, law), BUSHD_OK);
   ASSERT_EQ(rig.data(0, 0, codes_of(law)), BUSHD_OK);
   Bytes whole = {6, 0, 4, 0, 26, 0, 0x40, 0x9C, 0, 0};
-  for (const std::uint16_t code : codes_of(law)) {
-    whole.push_back(static_cast<std::uint8_t>(code));
-    whole.push_back(static_cast<std::uint8_t>(code >> 8));
-  }
+  append(whole, codes_of(law));
   Bytes end(5);
   bushd_put_u32(&end[1], crc32(whole));
   EXPECT_EQ(rig.request(BUSHD_MSG_TABLE_END, end), BUSHD_E_CRC);
@@ -274,16 +268,14 @@ TEST_F(TableUpload, AnotherCruiseThanTheMastersIsFound) {
 
 TEST_F(TableUpload, AllAreForgottenAtOnceAndTheirMemoryIsFree) {
   const Law law = flat_law(250, 80, 40);
-  ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
-  ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(give(law));
   EXPECT_EQ(rig.begin(1, law), BUSHD_E_CAPACITY);
-  const Plan plan = plan_move(law, 4, Rig::kTickNs, BUSHD_FORMAT_FINE);
-  ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+  ASSERT_EQ(rig.start(law, 4), BUSHD_OK);
   EXPECT_EQ(rig.control(BUSHD_CONTROL_FORGET_TABLES), BUSHD_E_STATE) << "a motor moves";
   rig.pass_until_rest();
   EXPECT_EQ(rig.control(BUSHD_CONTROL_FORGET_TABLES), BUSHD_OK);
   EXPECT_FALSE(rig.tables().bank[0].valid);
-  EXPECT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_E_NO_TABLE);
+  EXPECT_EQ(rig.start(law, 4), BUSHD_E_NO_TABLE);
   EXPECT_EQ(rig.upload(1, law), BUSHD_OK);
   ASSERT_EQ(rig.assign(0, 1), BUSHD_OK);
   expect_runs_down_by(rig, 0, law);
@@ -292,12 +284,10 @@ TEST_F(TableUpload, AllAreForgottenAtOnceAndTheirMemoryIsFree) {
 // Its checks may take longer than a tick, and local motion begins when people want it.
 TEST_F(TableUpload, IsNotEndedWhileAMotorMoves) {
   const Law law = flat_law(250, 20, 10);
-  ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
-  ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(give(law));
   ASSERT_EQ(rig.begin(1, law), BUSHD_OK);
   ASSERT_EQ(rig.data(1, 0, codes_of(law)), BUSHD_OK);
-  const Plan plan = plan_move(law, 4, Rig::kTickNs, BUSHD_FORMAT_FINE);
-  ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 100)), BUSHD_OK);
+  ASSERT_EQ(rig.start(law, 4), BUSHD_OK);
   EXPECT_EQ(rig.end(1, codes_of(law)), BUSHD_E_STATE);
   EXPECT_FALSE(rig.tables().bank[1].valid);
   rig.pass_until_rest();
@@ -306,8 +296,7 @@ TEST_F(TableUpload, IsNotEndedWhileAMotorMoves) {
 
 TEST_F(TableUpload, RefusedDuringARampDown) {
   const Law law = flat_law(250, 20, 10);
-  ASSERT_EQ(rig.upload(0, law), BUSHD_OK);
-  ASSERT_EQ(rig.assign(0, 0), BUSHD_OK);
+  ASSERT_NO_FATAL_FAILURE(give(law));
   const Plan plan = plan_move(law, 200, Rig::kTickNs, BUSHD_FORMAT_FINE);
   ASSERT_EQ(rig.take(rig.part(plan, rig.first_open(), 0, 50)), BUSHD_OK);
   rig.pass(55);

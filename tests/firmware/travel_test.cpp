@@ -107,8 +107,7 @@ class Travel : public Streams {
   std::vector<Made> expected;
   std::int64_t end_ns = 0;  // of the last run
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Travel, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Travel);
 
 TEST_P(Travel, GoesThereAndBack) {
   const std::uint32_t first = rig.first_open();
@@ -373,8 +372,7 @@ TEST_P(Travel, Refusals) {
 }
 
 TEST(TravelOfASmallMcu, IsUnknown) {
-  Rig rig({.disabled_capabilities = BUSHD_CAN_TRAVEL});
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE, {.disabled_capabilities = BUSHD_CAN_TRAVEL});
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_TRAVEL, 0);
   const bushd_travel message = {1, BUSHD_TRAVEL_STEP, 0, 1, BUSHD_EDGE_NONE, 0, 1, 0, 50};
   EXPECT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload_of(message, bushd_encode_travel)),

@@ -40,8 +40,7 @@ class Trigger : public Streams {
     return table_run_payload(0, first, entry);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Trigger, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Trigger);
 
 TEST_P(Trigger, StepsFallIntoTheSlotsOfTheTableCountedFromTheEdge) {
   std::mt19937 random(4);
@@ -288,8 +287,7 @@ TEST_P(Trigger, AfterTheEdgeItIsATableRun) {
 TEST_P(Trigger, ItsRunIsReplacedByTicks) {
   constexpr std::int32_t kLateNs = 1'000'001;
   for (std::uint32_t k = 1; k < 12; ++k) {
-    Rig fresh({.queue_ticks = 256});
-    fresh.make_ready(law, format);
+    ReadyRig fresh(law, format, {.queue_ticks = 256});
     ASSERT_EQ(fresh.arm(1, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 60, 0}}), BUSHD_OK);
     fresh.trigger(kLateNs - 50'000);
     const std::uint32_t start = fresh.poll().start_tick;
@@ -318,8 +316,7 @@ TEST_P(Trigger, ItsRunIsReplacedByTicks) {
 }
 
 TEST(TriggerInput, IsNotForAPortWithoutOne) {
-  Rig rig({.disabled_capabilities = BUSHD_CAN_TRIGGER});
-  rig.make_ready(ramp_law(), BUSHD_FORMAT_FINE);
+  ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE, {.disabled_capabilities = BUSHD_CAN_TRIGGER});
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_TRIGGER, 0);
   EXPECT_EQ(rig.arm(1, BUSHD_EDGE_RISING, 50, {{0, 0, 1, 5, 0}}), BUSHD_E_UNKNOWN_MESSAGE);
   EXPECT_EQ(rig.disarm(), BUSHD_E_UNKNOWN_MESSAGE);

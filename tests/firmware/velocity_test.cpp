@@ -79,8 +79,7 @@ class Velocity : public Streams {
     EXPECT_EQ(rig.steps_with_dir(), 0);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Formats, Velocity, testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE),
-                         format_name);
+BUSHD_IN_BOTH_FORMATS(Velocity);
 
 TEST_P(Velocity, WhileHeldItSpeedsUpAndWhenReleasedItBrakesAtTheSameRate) {
   hold(BUSHD_INPUT_REVERSE, 400);
@@ -334,10 +333,7 @@ TEST_P(Velocity, WithoutSettingsItsTableCountsAgain) {
   rig.pass_until_rest();
   auto reference = Reference::move(law, 100000);
   reference.ramp_down_at(128 * std::uint64_t{Rig::kTickNs});
-  std::vector<int> expected = steps_by_tick(reference, Rig::kTickNs);
-  const std::vector<int> seen = made(4);
-  expected.resize(seen.size());
-  EXPECT_EQ(seen, expected);
+  expect_steps(made(4), steps_by_tick(reference, Rig::kTickNs));
   expect_counted();
 }
 

@@ -98,8 +98,7 @@ class WrittenCodes : public Programs {
 
   std::set<MadeStep> expected;
 };
-INSTANTIATE_TEST_SUITE_P(Formats, WrittenCodes,
-                         testing::Values(BUSHD_FORMAT_FINE, BUSHD_FORMAT_COARSE), format_name);
+BUSHD_IN_BOTH_FORMATS(WrittenCodes);
 
 TEST_P(WrittenCodes, EveryEdgeOfALineIsWhereTheyPutIt) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
