@@ -5,17 +5,24 @@ extern "C" {
 #include <avr_extint.h>
 #include <avr_ioport.h>
 #include <sim_avr.h>
+#include <sim_elf.h>
 #include <sim_interrupts.h>
 #include <sim_io.h>
 }
 
+#include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 
 namespace bushd::sim {
 namespace {
+
+constexpr std::uint32_t kHz = 16'000'000;
+constexpr std::uint8_t kPowerOn = 1;
+constexpr std::uint16_t kJumpToItself = 0xCFFF;
 
 constexpr AvrChip kAtmega2560{.name = "atmega2560",
                               .ram_begin = 0x200,
@@ -113,10 +120,39 @@ void print_errors(avr_t*, const int level, const char* format, va_list arguments
   if (level <= LOG_ERROR) std::vfprintf(stderr, format, arguments);
 }
 
+// Busy waiting is all that an image does; the simulator must not sleep for it in real time.
+void no_sleep(avr_t*, avr_cycle_count_t) {}
+
 }  // namespace
 
-void log_errors_only() {
+LoadedAvr load_avr(const std::string& image, const std::string& chip) {
   avr_global_logger_set(print_errors);
+  elf_firmware_t firmware{};
+  if (elf_read_firmware(image.c_str(), &firmware) != 0) {
+    throw std::runtime_error(image + ": not an image for an AVR");
+  }
+  avr_t* const avr = avr_make_mcu_by_name(chip.c_str());
+  if (avr == nullptr) throw std::runtime_error("simavr: no " + chip);
+  avr_init(avr);
+  avr->frequency = firmware.frequency = kHz;
+  avr_load_firmware(avr, &firmware);
+  avr->sleep = no_sleep;
+  avr->log = LOG_ERROR;
+  avr->data[kAvrMcusr] = kPowerOn;
+  return {avr, std::size_t{firmware.datasize} + firmware.bsssize};
+}
+
+void free_avr(avr_t* avr) {
+  avr_terminate(avr);
+  std::free(avr);
+}
+
+void jump_into_endless_loop(avr_t* avr) {
+  const auto* const flash = reinterpret_cast<const std::uint16_t*>(avr->flash);
+  const auto* const end = flash + (avr->flashend + 1) / 2;
+  const auto* const loop = std::find(flash, end, kJumpToItself);
+  if (loop == end) throw std::runtime_error("the image has no endless loop");
+  avr->pc = static_cast<avr_flashaddr_t>((loop - flash) * 2);
 }
 
 void mend(avr_t* avr, const AvrChip& chip) {

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <string>
 
+#include "sim/edge.h"
+
 struct avr_t;
 
 namespace bushd::sim {
@@ -43,10 +45,32 @@ struct AvrChip {
 // Throws std::runtime_error for another one than "atmega2560" and "atmega1284p".
 const AvrChip& avr_chip(const std::string& name);
 
-// simavr writes errors only, to stderr.
-void log_errors_only();
+// Cause of the reset, in the address space of data, of all of them.
+constexpr std::size_t kAvrMcusr = 0x54;
+
+// All run at 16 MHz.
+constexpr TimeNs ns_of_cycles(std::uint64_t cycles) {
+  return static_cast<TimeNs>(cycles) * 125 / 2;
+}
+// Rounded up.
+constexpr std::uint64_t cycles_of_ns(TimeNs ns) {
+  return static_cast<std::uint64_t>((ns * 2 + 124) / 125);
+}
+
+struct LoadedAvr {
+  avr_t* avr;
+  std::size_t variables_bytes;
+};
+// A chip of this name whose supply has just come, with the image in its flash. simavr writes errors
+// only, to stderr, and does not sleep. Throws std::runtime_error if the image cannot be read.
+LoadedAvr load_avr(const std::string& image, const std::string& chip);
+void free_avr(avr_t* avr);
 
 // What simavr has otherwise than the data sheet of this chip.
 void mend(avr_t* avr, const AvrChip& chip);
+
+// Jumps into an endless loop; interrupts stay as they are. Throws std::runtime_error if the image
+// has none.
+void jump_into_endless_loop(avr_t* avr);
 
 }  // namespace bushd::sim

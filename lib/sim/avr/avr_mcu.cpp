@@ -1,10 +1,6 @@
 #include "sim/avr/avr_mcu.h"
 
 #include <algorithm>
-#include <cstdarg>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <stdexcept>
 
 extern "C" {
@@ -12,12 +8,9 @@ extern "C" {
 #include <avr_eeprom.h>
 #include <avr_extint.h>
 #include <avr_ioport.h>
-#include <avr_uart.h>
 #include <sim_avr.h>
-#include <sim_elf.h>
 #include <sim_interrupts.h>
 #include <sim_io.h>
-#include <sim_regbit.h>
 }
 
 #include "engine/frame.h"
@@ -25,13 +18,9 @@ extern "C" {
 namespace bushd::sim {
 namespace {
 
-constexpr std::uint32_t kFrequency = 16'000'000;
 constexpr std::uint8_t kPaint = 0xC5;  // firmware/ports/atmega2560/boot_tests.h
-// Behind the one that simavr holds: the chip's buffer has two, its shift register one more.
-constexpr std::size_t kHardwareFifo = 2;
 constexpr std::size_t kMostDisplay = 256;
 // In the address space of data.
-constexpr std::size_t kMcusr = 0x54;
 constexpr std::size_t kEecr = 0x3F;
 constexpr std::size_t kEear = 0x41;
 constexpr std::uint16_t kPink = 0x106;
@@ -40,23 +29,9 @@ constexpr std::uint16_t kDdrk = 0x107;
 constexpr std::uint32_t kSupplyMv = 5000;
 constexpr std::size_t kTimsk1 = 0x6F;
 constexpr std::uint8_t kEerie = 1 << 3;
-constexpr std::uint8_t kPowerOn = 1;
 constexpr std::uint8_t kExternalReset = 2;
-constexpr std::uint16_t kJumpToItself = 0xCFFF;
 constexpr std::size_t kAddressAt = 8;
 constexpr std::size_t kBootNumberAt = 16;
-
-// Busy waiting is all that the image does; the simulator must not sleep for it in real time.
-void no_sleep(avr_t*, avr_cycle_count_t) {}
-
-avr_uart_t* find_uart(avr_t* avr) {
-  for (avr_io_t* io = avr->io_port; io != nullptr; io = io->next) {
-    if (std::strcmp(io->kind, "uart") != 0) continue;
-    auto* uart = reinterpret_cast<avr_uart_t*>(io);
-    if (uart->name == '0') return uart;
-  }
-  throw std::runtime_error("simavr: no UART 0");
-}
 
 avr_irq_t* irq_of(avr_t* avr, AvrPin pin) {
   return avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(pin.port)), pin.bit);
@@ -71,27 +46,16 @@ struct AvrMcu::ResetHook {
 
 AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, EdgeSink* sink)
     : chip_(avr_chip(options.chip)), index_(index), driver_(driver), sink_(sink) {
-  log_errors_only();
-  elf_firmware_t firmware{};
-  if (elf_read_firmware(options.image.c_str(), &firmware) != 0) {
-    throw std::runtime_error(options.image + ": not an image for an AVR");
-  }
-  avr_ = avr_make_mcu_by_name(chip_.name);
-  if (avr_ == nullptr) throw std::runtime_error("simavr: no " + options.chip);
-  avr_init(avr_);
+  const LoadedAvr loaded = load_avr(options.image, options.chip);
+  avr_ = loaded.avr;
   mend(avr_, chip_);
-  avr_->frequency = firmware.frequency = kFrequency;
-  avr_load_firmware(avr_, &firmware);
-  avr_->sleep = no_sleep;
-  avr_->log = LOG_ERROR;
   avr_->vcc = avr_->avcc = avr_->aref = kSupplyMv;
   // Pins that are low would be looked at in every cycle, for interrupts that the image does not
   // use.
   for (std::uint8_t i = 0; i < chip_.external_interrupts; ++i) {
     avr_extint_set_strict_lvl_trig(avr_, i, 0);
   }
-  stack_begin_ = chip_.ram_begin + firmware.datasize + firmware.bsssize;
-  avr_->data[kMcusr] = kPowerOn;
+  stack_begin_ = chip_.ram_begin + loaded.variables_bytes;
 
   std::array<std::uint8_t, 18> memory{};
   for (std::size_t i = 0; i < kAddressAt; ++i) {
@@ -104,16 +68,12 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   }
   memory[kBootNumberAt] = static_cast<std::uint8_t>(options.boots);
   memory[kBootNumberAt + 1] = static_cast<std::uint8_t>(options.boots >> 8);
-  avr_eeprom_desc_t written{memory.data(), 0, static_cast<std::uint32_t>(memory.size())};
-  avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &written);
+  write_eeprom(0, memory);
 
-  uart_ = find_uart(avr_);
-  std::uint32_t flags = 0;
-  avr_ioctl(avr_, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
-  avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_byte,
-                          this);
+  line_ = std::make_unique<AvrUartLine>(
+      avr_, '0', [this](std::uint64_t end_cycle, std::uint8_t byte) { on_byte(end_cycle, byte); });
   avr_irq_register_notify(avr_get_interrupt_irq(avr_, AVR_INT_ANY) + AVR_INT_IRQ_RUNNING,
-                          on_interrupt, this);
+                          call<&AvrMcu::on_interrupt>, this);
   for (std::size_t half = 0; half < chip_.step.size(); ++half) {
     const auto first = static_cast<std::uint8_t>(8 * half);
     watch_port(chip_.step[half], Signal::kStep, first);
@@ -122,21 +82,21 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
   watch_signal(chip_.enable, Signal::kEnable);
   watch_signal(chip_.compare, Signal::kPositionCompare);
   watch_signal(chip_.common_dir, Signal::kCommonDir);
-  watch_pin(chip_.driver_enable, on_driver_enable, this);
+  watch_pin(chip_.driver_enable, call<&AvrMcu::on_driver_enable>, this);
   if (chip_.spi_data != 0) {
     first_dir_ = pin_count_;
     for (std::uint8_t i = 0; i < 8; ++i) pins_[pin_count_++] = {this, Signal::kDir, i, false, {}};
     avr_register_io_write(avr_, chip_.spi_data, on_spi, this);
-    watch_pin(chip_.dir_latch, on_dir_latch, this);
+    watch_pin(chip_.dir_latch, call<&AvrMcu::on_dir_latch>, this);
   }
-  avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER), on_adc,
-                          this);
+  avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER),
+                          call<&AvrMcu::on_adc>, this);
 
   if (chip_.keypad_uart != 0) {
     keypad_ = std::make_unique<AvrUartLine>(
         avr_, chip_.keypad_uart, [this](std::uint64_t cycle, std::uint8_t byte) {
           if (on_keypad_display) {
-            on_keypad_display(cycle_0_ns_ + static_cast<TimeNs>(cycle) * 125 / 2, byte);
+            on_keypad_display(cycle_0_ns_ + ns_of_cycles(cycle), byte);
           } else if (display_.size() < kMostDisplay) {
             display_ += static_cast<char>(byte);
           }
@@ -157,8 +117,7 @@ AvrMcu::AvrMcu(const AvrOptions& options, std::size_t index, Driver& driver, Edg
 
 AvrMcu::~AvrMcu() {
   watch_.reset();
-  avr_terminate(avr_);
-  std::free(avr_);
+  free_avr(avr_);
 }
 
 void AvrMcu::watch_port(char port, Signal signal, std::uint8_t first_index) {
@@ -176,7 +135,7 @@ void AvrMcu::watch_signal(AvrPin pin, Signal signal) {
   watch_pin(pin, on_pin, &pins_[pin_count_++]);
 }
 
-void AvrMcu::watch_pin(AvrPin pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param) {
+void AvrMcu::watch_pin(AvrPin pin, Notify notify, void* param) {
   avr_irq_t* irq = irq_of(avr_, pin);
   if (irq == nullptr) throw std::runtime_error("simavr: a pin is missing");
   avr_irq_register_notify(irq, notify, param);
@@ -195,9 +154,7 @@ void AvrMcu::drive(AvrPin pin, bool level) {
   external.mask = port.mask;
   external.value = port.levels;
   avr_ioctl(avr_, AVR_IOCTL_IOPORT_SET_EXTERNAL(static_cast<unsigned>(pin.port)), &external);
-  avr_raise_irq(
-      avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ(static_cast<unsigned>(pin.port)), pin.bit),
-      level);
+  avr_raise_irq(irq_of(avr_, pin), level);
 }
 
 // Switches to ground.
@@ -217,13 +174,12 @@ void AvrMcu::set_current(std::uint16_t reading) {
   avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0), mv);
 }
 
-void AvrMcu::on_adc(avr_irq_t*, std::uint32_t, void* param) {
-  auto& self = *static_cast<AvrMcu*>(param);
-  if (self.on_conversion) self.set_current(self.on_conversion(self.time_ns()));
+void AvrMcu::on_adc(std::uint32_t) {
+  if (on_conversion) set_current(on_conversion(time_ns()));
 }
 
 TimeNs AvrMcu::time_ns() const {
-  return cycle_0_ns_ + static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+  return cycle_0_ns_ + ns_of_cycles(avr_->cycle);
 }
 
 // An edge calls twice, with other bits above the level.
@@ -248,33 +204,29 @@ void AvrMcu::on_spi(avr_t* avr, std::uint16_t address, std::uint8_t value, void*
   static_cast<AvrMcu*>(param)->shifted_ = value;
 }
 
-void AvrMcu::on_dir_latch(avr_irq_t*, std::uint32_t value, void* param) {
-  auto& self = *static_cast<AvrMcu*>(param);
-  if ((value & 1) == 0) return;
+void AvrMcu::on_dir_latch(std::uint32_t level) {
+  if ((level & 1) == 0) return;
   for (std::size_t i = 0; i < 8; ++i) {
-    self.set_pin(self.pins_[self.first_dir_ + i], (self.shifted_ >> i & 1) != 0);
+    set_pin(pins_[first_dir_ + i], (shifted_ >> i & 1) != 0);
   }
 }
 
-void AvrMcu::on_driver_enable(avr_irq_t*, std::uint32_t value, void* param) {
-  AvrMcu& self = *static_cast<AvrMcu*>(param);
-  self.driver_enable_ = (value & 1) != 0;
-  if (!self.driver_enable_ && self.time_ns() < self.byte_end_ns_) ++self.bytes_cut_;
+void AvrMcu::on_driver_enable(std::uint32_t level) {
+  driver_enable_ = (level & 1) != 0;
+  if (!driver_enable_ && time_ns() < byte_end_ns_) ++bytes_cut_;
 }
 
-void AvrMcu::on_byte(avr_irq_t*, std::uint32_t value, void* param) {
-  AvrMcu& self = *static_cast<AvrMcu*>(param);
-  const auto byte = static_cast<std::uint8_t>(value);
-  const TimeNs byte_ns = static_cast<TimeNs>(self.byte_cycles_) * 125 / 2;
+void AvrMcu::on_byte(std::uint64_t end_cycle, std::uint8_t byte) {
+  const TimeNs byte_ns = ns_of_cycles(end_cycle - avr_->cycle);
   // The chip takes the next byte while the last one is being sent, so that they follow each other
   // closely. simavr asks for it at the end of that one, but counts from there all the same.
-  const TimeNs now_ns = self.time_ns();
-  const bool joined = now_ns < self.byte_end_ns_ + byte_ns;
-  self.byte_end_ns_ = (joined ? self.byte_end_ns_ : now_ns) + byte_ns;
-  if (self.driver_enable_) {
-    self.driver_.transmit(self.index_, now_ns, &byte, 1);
+  const TimeNs now_ns = time_ns();
+  const bool joined = now_ns < byte_end_ns_ + byte_ns;
+  byte_end_ns_ = (joined ? byte_end_ns_ : now_ns) + byte_ns;
+  if (driver_enable_) {
+    driver_.transmit(index_, now_ns, &byte, 1);
   } else {
-    ++self.bytes_cut_;
+    ++bytes_cut_;
   }
 }
 
@@ -288,7 +240,7 @@ void AvrMcu::on_reset(avr_io_t* io) {
 
 void AvrMcu::drop_outputs() {
   driver_enable_ = false;
-  received_.clear();
+  line_->reset();
   if (keypad_) keypad_->reset();
   for (std::size_t i = 0; i < pin_count_; ++i) {
     Pin& pin = pins_[i];
@@ -298,27 +250,33 @@ void AvrMcu::drop_outputs() {
   }
 }
 
-// Its vector, or 0 at the end of the last one.
-void AvrMcu::on_interrupt(avr_irq_t*, std::uint32_t value, void* param) {
-  auto& self = *static_cast<AvrMcu*>(param);
-  if (value != 0) ++self.interrupts_;
-  if (value == self.chip_.eeprom_ready) ++self.eeprom_writes_;
+// 0: at the end of the last one.
+void AvrMcu::on_interrupt(std::uint32_t vector) {
+  if (vector != 0) ++interrupts_;
+  if (vector == chip_.eeprom_ready) ++eeprom_writes_;
 }
 
-std::array<std::uint8_t, 18> AvrMcu::eeprom() const {
-  std::array<std::uint8_t, 18> memory{};
-  avr_eeprom_desc_t read{memory.data(), 0, static_cast<std::uint32_t>(memory.size())};
+void AvrMcu::read_eeprom(std::uint16_t address, std::span<std::uint8_t> bytes) const {
+  avr_eeprom_desc_t read{bytes.data(), address, static_cast<std::uint32_t>(bytes.size())};
   avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &read);
-  return memory;
+}
+
+void AvrMcu::write_eeprom(std::uint16_t address, std::span<const std::uint8_t> bytes) {
+  avr_eeprom_desc_t written{const_cast<std::uint8_t*>(bytes.data()), address,
+                            static_cast<std::uint32_t>(bytes.size())};
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &written);
 }
 
 std::uint8_t AvrMcu::address() const {
-  return eeprom()[kAddressAt];
+  std::array<std::uint8_t, 1> byte{};
+  read_eeprom(kAddressAt, byte);
+  return byte[0];
 }
 
 std::uint16_t AvrMcu::boot_number() const {
-  const auto memory = eeprom();
-  return static_cast<std::uint16_t>(memory[kBootNumberAt] | memory[kBootNumberAt + 1] << 8);
+  std::array<std::uint8_t, 2> bytes{};
+  read_eeprom(kBootNumberAt, bytes);
+  return static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
 }
 
 TimeNs AvrMcu::next_event_ns() const {
@@ -328,10 +286,7 @@ TimeNs AvrMcu::next_event_ns() const {
 void AvrMcu::advance(TimeNs now_ns) {
   now_ns_ = now_ns;
   while (time_ns() < now_ns) {
-    if (uart_->cycles_per_byte != byte_cycles_) {
-      byte_cycles_ = uart_->cycles_per_byte = uart_->cycles_per_byte * 10 / 11;
-    }
-    feed();
+    line_->step();
     if (keypad_) keypad_->step();
     auto left = static_cast<avr_cycle_count_t>((now_ns - time_ns()) * 2 / 125 + 1);
     if (stuck_) {
@@ -354,13 +309,7 @@ void AvrMcu::advance(TimeNs now_ns) {
 
 void AvrMcu::receive(std::uint8_t byte, TimeNs now_ns) {
   advance(now_ns);
-  if (avr_regbit_get(avr_, uart_->rxen) == 0) return;
-  if (received_.size() == kHardwareFifo) {
-    ++overruns_;
-    return;
-  }
-  received_.push_back(byte);
-  feed();
+  line_->receive(byte);
 }
 
 void AvrMcu::keypad_byte(std::uint8_t byte, TimeNs now_ns) {
@@ -373,30 +322,16 @@ void AvrMcu::keypad_break(TimeNs now_ns) {
   keypad_->receive_break();
 }
 
-// simavr forgets the interrupt of a byte that waits behind another one: it gets one at a time.
-void AvrMcu::feed() {
-  uart_fifo_t& fifo = uart_->input;
-  if (received_.empty() || fifo.read != fifo.write) return;
-  fifo.buffer[fifo.write] = received_.front();
-  fifo.write = static_cast<std::uint16_t>((fifo.write + 1) % uart_fifo_fifo_size);
-  received_.pop_front();
-  avr_raise_interrupt(avr_, &uart_->rxc);
-}
-
 void AvrMcu::reset(TimeNs now_ns, TimeNs boot_ns, std::uint16_t) {
   advance(now_ns);
   avr_reset(avr_);
-  avr_->data[kMcusr] = kExternalReset;
+  avr_->data[kAvrMcusr] = kExternalReset;
   out_of_reset_ns_ = boot_ns;
-  cycle_0_ns_ = boot_ns - static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+  cycle_0_ns_ = boot_ns - ns_of_cycles(avr_->cycle);
 }
 
 void AvrMcu::hang() {
-  const auto* const flash = reinterpret_cast<const std::uint16_t*>(avr_->flash);
-  const auto* const end = flash + (avr_->flashend + 1) / 2;
-  const auto* const loop = std::find(flash, end, kJumpToItself);
-  if (loop == end) throw std::runtime_error("the image has no endless loop");
-  avr_->pc = static_cast<avr_flashaddr_t>((loop - flash) * 2);
+  jump_into_endless_loop(avr_);
 }
 
 void AvrMcu::stop_ticks() {
@@ -408,11 +343,10 @@ void AvrMcu::flip_flash_bit(std::uint32_t address, int bit) {
 }
 
 void AvrMcu::flip_eeprom_bit(std::uint16_t address, int bit) {
-  std::uint8_t byte = 0;
-  avr_eeprom_desc_t at{&byte, address, 1};
-  avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &at);
-  byte ^= static_cast<std::uint8_t>(1 << bit);
-  avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &at);
+  std::array<std::uint8_t, 1> byte{};
+  read_eeprom(address, byte);
+  byte[0] ^= static_cast<std::uint8_t>(1 << bit);
+  write_eeprom(address, byte);
 }
 
 void AvrMcu::wear_eeprom_byte(std::uint16_t address, std::uint8_t value) {
@@ -422,11 +356,9 @@ void AvrMcu::wear_eeprom_byte(std::uint16_t address, std::uint8_t value) {
 }
 
 // simavr has written what it was to.
-void AvrMcu::on_eeprom_control(avr_t* avr, std::uint16_t, std::uint8_t, void* param) {
-  for (auto [address, value] : static_cast<AvrMcu*>(param)->worn_) {
-    avr_eeprom_desc_t at{&value, address, 1};
-    avr_ioctl(avr, AVR_IOCTL_EEPROM_SET, &at);
-  }
+void AvrMcu::on_eeprom_control(avr_t*, std::uint16_t, std::uint8_t, void* param) {
+  auto& self = *static_cast<AvrMcu*>(param);
+  for (const auto& [address, value] : self.worn_) self.write_eeprom(address, {&value, 1});
 }
 
 void AvrMcu::tear_eeprom_byte() {

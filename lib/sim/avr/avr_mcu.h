@@ -1,18 +1,14 @@
 // An MCU on the virtual bus that is an ATmega2560 or ATmega1284P: its image runs in simavr,
 // instruction by instruction, and its pins and bytes are taken with the time of the CPU cycle.
-//
-// What simavr does otherwise than the chip, and what is made up for here:
-// - bytes take 11 bit times: set to 10
-// - receives into 64 bytes: a byte is lost if three wait already, as in the chip
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -25,7 +21,6 @@
 struct avr_t;
 struct avr_io_t;
 struct avr_irq_t;
-struct avr_uart_t;
 
 namespace bushd::sim {
 
@@ -98,7 +93,7 @@ class AvrMcu final : public Mcu {
   // Bytes written to its EEPROM while it ran.
   std::uint64_t eeprom_writes() const { return eeprom_writes_; }
   // Bytes lost in its receiver.
-  std::uint64_t overruns() const { return overruns_; }
+  std::uint64_t overruns() const { return line_->overruns(); }
   // Bytes whose last stop bit was not over when driver-enable fell, or that began without it.
   std::uint64_t bytes_cut() const { return bytes_cut_; }
 
@@ -113,26 +108,32 @@ class AvrMcu final : public Mcu {
 
   void watch_port(char port, Signal signal, std::uint8_t first_index);
   void watch_signal(AvrPin pin, Signal signal);
-  void watch_pin(AvrPin pin, void (*notify)(avr_irq_t*, std::uint32_t, void*), void* param);
+  using Notify = void (*)(avr_irq_t*, std::uint32_t, void*);
+  void watch_pin(AvrPin pin, Notify notify, void* param);
+  // A member function as what simavr calls.
+  template <void (AvrMcu::*kMember)(std::uint32_t value)>
+  static void call(avr_irq_t*, std::uint32_t value, void* param) {
+    (static_cast<AvrMcu*>(param)->*kMember)(value);
+  }
   void set_pin(Pin& pin, bool level);
-  void feed();
   void drop_outputs();
   void drive(AvrPin pin, bool level);
-  std::array<std::uint8_t, 18> eeprom() const;
+  void read_eeprom(std::uint16_t address, std::span<std::uint8_t> bytes) const;
+  void write_eeprom(std::uint16_t address, std::span<const std::uint8_t> bytes);
   TimeNs time_ns() const;
   static void on_pin(avr_irq_t* irq, std::uint32_t value, void* param);
   void begin_stage(const PowerStageRules& rules);
   void stage_output(std::uint8_t winding, bool level);
   void follow_stage();
-  static void on_decay(avr_irq_t* irq, std::uint32_t value, void* param);
-  static void on_reference(avr_irq_t* irq, std::uint32_t value, void* param);
+  void on_decay(std::uint32_t level);
+  void on_reference(std::uint32_t);
   static std::uint64_t on_stage_time(avr_t* avr, std::uint64_t when, void* param);
   static void on_spi(avr_t* avr, std::uint16_t address, std::uint8_t value, void* param);
-  static void on_dir_latch(avr_irq_t* irq, std::uint32_t value, void* param);
-  static void on_driver_enable(avr_irq_t* irq, std::uint32_t value, void* param);
-  static void on_byte(avr_irq_t* irq, std::uint32_t value, void* param);
-  static void on_adc(avr_irq_t* irq, std::uint32_t value, void* param);
-  static void on_interrupt(avr_irq_t* irq, std::uint32_t value, void* param);
+  void on_dir_latch(std::uint32_t level);
+  void on_driver_enable(std::uint32_t level);
+  void on_byte(std::uint64_t end_cycle, std::uint8_t byte);
+  void on_adc(std::uint32_t);
+  void on_interrupt(std::uint32_t vector);
   static void on_reset(avr_io_t* io);
   static void on_eeprom_control(avr_t* avr, std::uint16_t address, std::uint8_t value, void* param);
   static std::uint8_t read_shorted(avr_t* avr, std::uint16_t address, void* param);
@@ -145,11 +146,9 @@ class AvrMcu final : public Mcu {
   struct ResetHook;
   std::unique_ptr<ResetHook> reset_hook_;
   std::unique_ptr<AvrMemoryWatch> watch_;
-  avr_uart_t* uart_ = nullptr;
+  std::unique_ptr<AvrUartLine> line_;
   std::unique_ptr<AvrUartLine> keypad_;  // if the chip has it
   std::string display_;                  // sent to it and not taken; no more than some lines
-  std::uint64_t byte_cycles_ = 0;
-  std::deque<std::uint8_t> received_;  // that the image has not been given yet
   TimeNs cycle_0_ns_ = 0;
   TimeNs now_ns_ = 0;
   TimeNs out_of_reset_ns_ = 0;
@@ -165,7 +164,6 @@ class AvrMcu final : public Mcu {
   TimeNs byte_end_ns_ = 0;
   std::uint64_t interrupts_ = 0;
   std::uint64_t eeprom_writes_ = 0;
-  std::uint64_t overruns_ = 0;
   std::uint64_t bytes_cut_ = 0;
   std::array<Pin, 35> pins_{};
   std::size_t pin_count_ = 0;

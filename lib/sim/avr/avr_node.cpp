@@ -1,7 +1,6 @@
 #include "sim/avr/avr_node.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
@@ -11,19 +10,11 @@ extern "C" {
 #include <avr_ioport.h>
 #include <sim_avr.h>
 #include <sim_cycle_timers.h>
-#include <sim_elf.h>
 #include <sim_io.h>
 }
 
 namespace bushd::sim {
 namespace {
-
-constexpr std::uint32_t kNodeHz = 16'000'000;
-constexpr std::uint16_t kNodeJumpToItself = 0xCFFF;
-constexpr std::size_t kNodeMcusr = 0x54;
-constexpr std::uint8_t kNodePowerOn = 1;
-
-void never_sleep(avr_t*, avr_cycle_count_t) {}
 
 avr_cycle_count_t stop_here(avr_t*, avr_cycle_count_t, void*) {
   return 0;
@@ -31,33 +22,19 @@ avr_cycle_count_t stop_here(avr_t*, avr_cycle_count_t, void*) {
 
 }  // namespace
 
-AvrNode::AvrNode(const std::string& image, Sent sent) {
-  log_errors_only();
-  elf_firmware_t firmware{};
-  if (elf_read_firmware(image.c_str(), &firmware) != 0) {
-    throw std::runtime_error(image + ": not an image for an AVR");
-  }
-  avr_ = avr_make_mcu_by_name("atmega328p");
-  if (avr_ == nullptr) throw std::runtime_error("simavr: no atmega328p");
-  avr_init(avr_);
-  avr_->frequency = firmware.frequency = kNodeHz;
-  avr_load_firmware(avr_, &firmware);
-  avr_->sleep = never_sleep;
-  avr_->log = LOG_ERROR;
-  avr_->data[kNodeMcusr] = kNodePowerOn;
-  line_ = std::make_unique<AvrUartLine>(
-      avr_, '0', [sent = std::move(sent)](std::uint64_t cycle, std::uint8_t byte) {
-        sent(static_cast<TimeNs>(cycle) * 125 / 2, byte);
-      });
-}
+AvrNode::AvrNode(const std::string& image, Sent sent)
+    : avr_(load_avr(image, "atmega328p").avr),
+      line_(std::make_unique<AvrUartLine>(
+          avr_, '0', [sent = std::move(sent)](std::uint64_t end_cycle, std::uint8_t byte) {
+            sent(ns_of_cycles(end_cycle), byte);
+          })) {}
 
 AvrNode::~AvrNode() {
-  avr_terminate(avr_);
-  std::free(avr_);
+  free_avr(avr_);
 }
 
 TimeNs AvrNode::time_ns() const {
-  return static_cast<TimeNs>(avr_->cycle) * 125 / 2;
+  return ns_of_cycles(avr_->cycle);
 }
 
 void AvrNode::advance(TimeNs now_ns) {
@@ -82,8 +59,7 @@ void AvrNode::watch(char port, int bit, Notify notify, void* param) {
 
 void AvrNode::wake_at(TimeNs time_ns, Wake wake, void* param) {
   const TimeNs wait_ns = std::max(time_ns - this->time_ns(), TimeNs{0});
-  const auto cycles = static_cast<avr_cycle_count_t>((wait_ns * 2 + 124) / 125);
-  avr_cycle_timer_register(avr_, std::max(cycles, avr_cycle_count_t{1}), wake, param);
+  avr_cycle_timer_register(avr_, std::max(cycles_of_ns(wait_ns), std::uint64_t{1}), wake, param);
 }
 
 // For what the image reads, and for what simavr makes of the pins when the image writes to them.
@@ -105,11 +81,7 @@ void AvrNode::drive(char port, std::uint8_t mask, std::uint8_t levels, std::uint
 }
 
 void AvrNode::hang() {
-  const auto* const flash = reinterpret_cast<const std::uint16_t*>(avr_->flash);
-  const auto* const end = flash + (avr_->flashend + 1) / 2;
-  const auto* const loop = std::find(flash, end, kNodeJumpToItself);
-  if (loop == end) throw std::runtime_error("the image has no endless loop");
-  avr_->pc = static_cast<avr_flashaddr_t>((loop - flash) * 2);
+  jump_into_endless_loop(avr_);
 }
 
 }  // namespace bushd::sim

@@ -42,9 +42,9 @@ double high_share(const avr_t& avr) {
 
 void AvrMcu::begin_stage(const PowerStageRules& rules) {
   stage_.emplace(Stage{PowerStage(rules)});
-  watch_pin(kDecay, on_decay, this);
+  watch_pin(kDecay, call<&AvrMcu::on_decay>, this);
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_TIMER_GETIRQ('2'), TIMER_IRQ_OUT_PWM0),
-                          on_reference, this);
+                          call<&AvrMcu::on_reference>, this);
   for (const AvrPin& pin : kComparators) drive(pin, true);
   avr_cycle_timer_register(avr_, 1, on_stage_time, this);
 }
@@ -98,19 +98,17 @@ std::uint64_t AvrMcu::on_stage_time(avr_t*, std::uint64_t when, void* param) {
     const auto trip_ns = stage.next_trip_ns(pair, kSampleNs);
     if (trip_ns) next_ns = std::min(next_ns, *trip_ns - self.stage_->followed_ns);
   }
-  return when + static_cast<std::uint64_t>(std::max<TimeNs>(1, (next_ns * 2 + 124) / 125));
+  return when + std::max(std::uint64_t{1}, cycles_of_ns(std::max(next_ns, TimeNs{0})));
 }
 
-void AvrMcu::on_decay(avr_irq_t*, std::uint32_t value, void* param) {
-  auto& self = *static_cast<AvrMcu*>(param);
-  self.follow_stage();
-  self.stage_->stage.set_fast_decay(self.stage_->followed_ns, (value & 1) != 0);
+void AvrMcu::on_decay(std::uint32_t level) {
+  follow_stage();
+  stage_->stage.set_fast_decay(stage_->followed_ns, (level & 1) != 0);
 }
 
-void AvrMcu::on_reference(avr_irq_t*, std::uint32_t, void* param) {
-  auto& self = *static_cast<AvrMcu*>(param);
-  self.follow_stage();
-  self.stage_->high_share = high_share(*self.avr_);
+void AvrMcu::on_reference(std::uint32_t) {
+  follow_stage();
+  stage_->high_share = high_share(*avr_);
 }
 
 }  // namespace bushd::sim

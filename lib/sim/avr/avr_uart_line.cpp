@@ -43,6 +43,7 @@ void AvrUartLine::step() {
   if (uart_->cycles_per_byte != byte_cycles_) {
     byte_cycles_ = uart_->cycles_per_byte = uart_->cycles_per_byte * 10 / 11;
   }
+  // simavr forgets the interrupt of a byte that waits behind another one: it gets one at a time.
   uart_fifo_t& fifo = uart_->input;
   if (received_.empty() || fifo.read != fifo.write) return;
   const std::uint16_t value = received_.front();
@@ -62,7 +63,11 @@ void AvrUartLine::receive_break() {
 }
 
 void AvrUartLine::take(std::uint16_t value) {
-  if (avr_regbit_get(avr_, uart_->rxen) == 0 || received_.size() == kRoom) return;
+  if (avr_regbit_get(avr_, uart_->rxen) == 0) return;
+  if (received_.size() == kRoom) {
+    ++overruns_;
+    return;
+  }
   received_.push_back(value);
   step();
 }

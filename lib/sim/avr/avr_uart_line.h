@@ -31,6 +31,8 @@ class AvrUartLine {
   void receive(std::uint8_t byte);
   void receive_break();
   void reset() { received_.clear(); }
+  // Bytes that had no room.
+  std::uint64_t overruns() const { return overruns_; }
 
  private:
   void take(std::uint16_t value);
@@ -40,7 +42,8 @@ class AvrUartLine {
   avr_uart_t* uart_;
   Sent sent_;
   std::uint64_t byte_cycles_ = 0;
-  std::deque<std::uint16_t> received_;
+  std::deque<std::uint16_t> received_;  // that the program has not been given yet
+  std::uint64_t overruns_ = 0;
 };
 
 }  // namespace bushd::sim
