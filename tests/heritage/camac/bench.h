@@ -74,6 +74,10 @@ class Commands {
   void set_control(std::uint32_t control) { cycle(2, 16, control); }
   void forbid() { cycle(0, 24); }
   void permit() { cycle(0, 26); }
+  void permit(std::uint32_t control) {
+    set_control(control);
+    permit();
+  }
   void write_at(std::uint32_t address, const std::vector<int>& bytes) {
     set_address(address);
     for (const int byte : bytes) write(static_cast<std::uint32_t>(byte));

@@ -45,8 +45,7 @@ class Bushd1Bench : public Commands<Bushd1> {
   void depart(std::uint32_t mode = kAutomatic) {
     load({300, 200, 100, 200});
     module.limits(true, false);
-    set_control(mode | kLeft | kAllEnabled);
-    permit();
+    permit(mode | kLeft | kAllEnabled);
   }
   // A run of four steps that ends at the limit switch of its direction.
   void run(bool left) {
@@ -129,8 +128,7 @@ TEST(Bushd1, TheAdjustableDelayMayBeThatOfTheOpening) {  // S7, S18
 TEST(Bushd1, DelaysAreFrom50UsTo1500Ms) {  // S18, U9
   Bushd1Bench bench;
   bench.load({65535, 0, 0, 30'001}, 0);
-  bench.set_control(kAutomatic);
-  bench.permit();
+  bench.permit(kAutomatic);
   const Travel& travel = bench.shutter.travels.at(0);
   EXPECT_EQ(travel.codes, (std::vector<std::uint16_t>{30'000, 1, 1, 30'000}));
   EXPECT_EQ(travel.step_us(0), 1'500'000);
@@ -143,10 +141,7 @@ TEST(Bushd1, EachRequestHasItsEnable) {  // S9, S10, S12
     std::uint32_t enable;
     std::function<void(Bushd1Bench&)> cause;
   };
-  const auto step = [](Bushd1Bench& bench) {
-    bench.set_control(kSecondMode);
-    bench.permit();
-  };
+  const auto step = [](Bushd1Bench& bench) { bench.permit(kSecondMode); };
   const Case cases[]{{kRightLimit, 0x01,
                       [&](Bushd1Bench& b) {
                         step(b);
@@ -171,8 +166,7 @@ TEST(Bushd1, EachRequestHasItsEnable) {  // S9, S10, S12
                       }},
                      {kTravelFailed, 0x10,
                       [](Bushd1Bench& b) {
-                        b.set_control(kAutomatic);
-                        b.permit();  // no steps
+                        b.permit(kAutomatic);  // no steps
                       }},
                      {kOverflow, 0x20, [](Bushd1Bench& b) {
                         b.set_address(255);
@@ -196,8 +190,7 @@ TEST(Bushd1, Modes) {  // S11, U6
   const auto permitted = [](std::uint32_t mode) {
     Bushd1Bench bench;
     bench.load({9});
-    bench.set_control(mode);
-    bench.permit();
+    bench.permit(mode);
     return std::pair{bench.shutter.steps, bench.shutter.travels};
   };
   const auto [plain, none] = permitted(0);
@@ -229,8 +222,7 @@ TEST(Bushd1, MemoryHasStepsDelayAndCodes) {  // S13, D1
   std::vector<int> codes(Bushd1::kMostSteps, 1000);
   bench.load(codes, 258);
   EXPECT_EQ(bench.address(), 0U) << "126 codes fill the memory";
-  bench.set_control(kAutomatic);
-  bench.permit();
+  bench.permit(kAutomatic);
   EXPECT_EQ(bench.shutter.travels.at(0).codes.size(), 126U);
   EXPECT_EQ(bench.shutter.travels.at(0).delay, 258);
 }
@@ -239,8 +231,7 @@ TEST(Bushd1, StepsOutOfRangeAreAFailure) {  // S13, U9
   for (const int steps : {0, 127, 255}) {
     Bushd1Bench bench;
     bench.write_at(0, {steps});
-    bench.set_control(kAutomatic);
-    bench.permit();
+    bench.permit(kAutomatic);
     EXPECT_EQ(bench.requests(), kTravelFailed);
     EXPECT_TRUE(bench.shutter.travels.empty());
   }
@@ -255,8 +246,7 @@ TEST(Bushd1, CodesMayFollowAnyLaw) {  // S14
   EXPECT_FALSE(rise_and_fall_once(std::vector<std::uint16_t>{1, 2, 1}));
   Bushd1Bench bench;
   bench.load({5, 4, 5, 4});
-  bench.set_control(kAutomatic);
-  bench.permit();
+  bench.permit(kAutomatic);
   EXPECT_EQ(bench.requests(), 0u);
   EXPECT_EQ(bench.shutter.travels.at(0).codes, (std::vector<std::uint16_t>{5, 4, 5, 4}));
 }
@@ -345,8 +335,7 @@ TEST(Bushd1, ErrorsOfATravelStopIt) {  // S15, S17, U15
 TEST(Bushd1, ErrorsAreToldWhateverIsEnabled) {  // S17, U3
   Bushd1Bench bench;
   bench.write_at(0, {127});
-  bench.set_control(kAutomatic);
-  bench.permit();
+  bench.permit(kAutomatic);
   EXPECT_FALSE(bench.lam());
   EXPECT_EQ(bench.requests(), kTravelFailed);
   bench.set_control(0x10);
@@ -357,8 +346,7 @@ TEST(Bushd1, DestinationThatIsActiveIsAFailure) {  // U15
   Bushd1Bench bench;
   bench.module.limits(false, true);
   bench.load({5, 5});
-  bench.set_control(kAutomatic | kLeft);
-  bench.permit();
+  bench.permit(kAutomatic | kLeft);
   EXPECT_EQ(bench.requests(), kTravelFailed | kLeftLevel);
   EXPECT_TRUE(bench.shutter.travels.empty());
 }
@@ -366,8 +354,7 @@ TEST(Bushd1, DestinationThatIsActiveIsAFailure) {  // U15
 TEST(Bushd1, SingleStepsEndByThemselves) {  // S11: 00, 01; U11
   EXPECT_EQ(SingleStep::kSensorUs, 1'500'000);
   Bushd1Bench bench;
-  bench.set_control(kSecondMode | kLeft);
-  bench.permit();
+  bench.permit(kSecondMode | kLeft);
   EXPECT_TRUE(bench.shutter.steps.at(0).left);
   bench.permit();
   EXPECT_EQ(bench.shutter.steps.size(), 1U);
@@ -382,8 +369,7 @@ TEST(Bushd1, AStepIntoAnActiveLimitIsRefused) {  // U11
   Bushd1Bench bench;
   bench.module.limits(true, true);
   bench.permit();
-  bench.set_control(kLeft);
-  bench.permit();
+  bench.permit(kLeft);
   EXPECT_TRUE(bench.shutter.steps.empty());
   EXPECT_EQ(bench.requests(), kRightLimit | kLeftLimit | kRightLevel | kLeftLevel);
 }
@@ -394,8 +380,7 @@ TEST(Bushd1, WhatCannotBeMadeIsAFailure) {
   bench.permit();
   EXPECT_EQ(bench.requests(), kStepNotDone);
   bench.load({5});
-  bench.set_control(kAutomatic);
-  bench.permit();
+  bench.permit(kAutomatic);
   EXPECT_EQ(bench.requests(), kStepNotDone | kTravelFailed);
   EXPECT_FALSE(bench.module.is_moving());
 }
@@ -410,8 +395,7 @@ TEST(Bushd1, ForbidRaisesNoRequest) {  // U16
   bench.module.run_ends();
   bench.module.stands();
   EXPECT_EQ(bench.requests(), 0U);
-  bench.set_control(0);
-  bench.permit();
+  bench.permit(0);
   bench.forbid();
   bench.module.step_done();
   EXPECT_EQ(bench.requests(), 0U);

@@ -35,8 +35,7 @@ class Bushd2Bench : public Commands<Bushd2> {
 TEST(Bushd2, RunsWithoutTheComputer) {  // S1, S24
   Bushd2Bench bench;
   bench.load(0, 3);
-  bench.set_control(kEnableEnd);
-  bench.permit();
+  bench.permit(kEnableEnd);
   ASSERT_EQ(bench.motors.moves.size(), 1U);
   bench.answer(1);
   bench.answer(1);
@@ -120,8 +119,7 @@ TEST(Bushd2, HoldsFourProgramsAndThePositionsOfMotors) {  // S20, S28, U19
   for (int page = 0; page < 4; ++page) bench.load(page, 10 * (page + 1));
   bench.write_at(240, {1, 2});
   for (int motor = 0; motor < 32; ++motor) {
-    bench.set_control(static_cast<std::uint32_t>(motor));
-    bench.permit();
+    bench.permit(static_cast<std::uint32_t>(motor));
     const Program& program = bench.motors.moves.back();
     EXPECT_EQ(program.motor, motor);
     EXPECT_EQ(program.page, motor / 8);
@@ -147,14 +145,12 @@ TEST(Bushd2, CountsThePositionOfItsMotorUpAndDown) {  // S20, U28
     const std::uint32_t low = bench.read().data;
     return low + 256 * bench.read().data;
   };
-  bench.set_control(3);
-  bench.permit();
+  bench.permit(3);
   bench.answer(100);
   EXPECT_EQ(position(), 100U) << "as statuses come";
   bench.answer(200);
   EXPECT_EQ(position(), 300U);
-  bench.set_control(3 | kLeft);
-  bench.permit();
+  bench.permit(3 | kLeft);
   bench.answer(300);
   EXPECT_EQ(position(), 0U);
   bench.permit();
@@ -172,8 +168,7 @@ TEST(Bushd2, CountsThePositionOfItsMotorUpAndDown) {  // S20, U28
 TEST(Bushd2, SendsNumberDirectionAndCodes) {  // S21, S30, U7
   Bushd2Bench bench;
   bench.load(1, 4);
-  bench.set_control(13 | kLeft);
-  bench.permit();
+  bench.permit(13 | kLeft);
   const Program& program = bench.motors.moves.at(0);
   EXPECT_EQ(program.motor, 13);
   EXPECT_EQ(program.motor % Bushd2::kMotorsPerPage, 5) << "the channel of its commutator";
@@ -195,8 +190,7 @@ TEST(Bushd2, ReceivesTheStatusAfterEachStep) {  // S22, S27, S34, U23
 TEST(Bushd2, WatchesStepsAndState) {  // S24: PU
   Bushd2Bench bench;
   bench.load(0, 6);
-  bench.set_control(kEnableMotor);
-  bench.permit();
+  bench.permit(kEnableMotor);
   bench.answer(1);
   EXPECT_FALSE(bench.lam());
   bench.module.ends({.not_connected = true});
@@ -237,8 +231,7 @@ TEST(Bushd2, ControlRegisterBits) {  // S26
   Bushd2Bench bench;
   bench.load(0, 2);
   bench.load(3, 2);
-  bench.set_control(0x1F | kLeft);
-  bench.permit();
+  bench.permit(0x1F | kLeft);
   EXPECT_EQ(bench.motors.moves.back().motor, 31);
   EXPECT_TRUE(bench.motors.moves.back().left);
   bench.answer(2);
@@ -259,8 +252,7 @@ TEST(Bushd2, ControlRegisterBits) {  // S26
 TEST(Bushd2, AddressOverflowIsSilentInMotion) {  // S26: bit 5, U20
   Bushd2Bench bench;
   bench.load(2, 3);
-  bench.set_control(kEnableAddress);  // motor 16
-  bench.permit();
+  bench.permit(kEnableAddress);  // motor 16
   bench.set_address(1023);
   bench.write(0);
   EXPECT_FALSE(bench.lam());
@@ -272,8 +264,7 @@ TEST(Bushd2, MotorsMoveOneAfterAnother) {  // S28, U16
   Bushd2Bench bench;
   bench.load(0, 3);
   bench.permit();
-  bench.set_control(1);
-  bench.permit();
+  bench.permit(1);
   EXPECT_EQ(bench.motors.moves.size(), 1U);
   bench.answer(3);
   bench.permit();
@@ -296,8 +287,7 @@ TEST(Bushd2, StateOfTheMotorEndsTheMotion) {  // S33, U23
       const bool barred = left ? each.bars_left : each.bars_right;
       Bushd2Bench bench;
       bench.load(0, 5);
-      bench.set_control(kEnableMotor | (left ? kLeft : 0));
-      bench.permit();
+      bench.permit(kEnableMotor | (left ? kLeft : 0));
       bench.answer(2, each.status);
       EXPECT_EQ(bench.lam(), barred) << each.bits;
       EXPECT_EQ(bench.module.is_moving(), !barred);
@@ -306,8 +296,7 @@ TEST(Bushd2, StateOfTheMotorEndsTheMotion) {  // S33, U23
       Bushd2Bench before;
       before.load(0, 5);
       before.motors.statuses[0] = each.status;
-      before.set_control(left ? kLeft : 0);
-      before.permit();
+      before.permit(left ? kLeft : 0);
       EXPECT_EQ(before.motors.moves.empty(), barred);
       EXPECT_EQ(before.requests(), barred ? each.bits | 1U << 8 : 0);
     }
@@ -317,8 +306,7 @@ TEST(Bushd2, StateOfTheMotorEndsTheMotion) {  // S33, U23
 TEST(Bushd2, ForbidStopsWithoutARequest) {  // S4: F24A0, U16
   Bushd2Bench bench;
   bench.load(0, 5);
-  bench.set_control(kEnableMotor | kEnableEnd);
-  bench.permit();
+  bench.permit(kEnableMotor | kEnableEnd);
   bench.answer(2);
   bench.forbid();
   bench.forbid();
@@ -335,8 +323,7 @@ TEST(Bushd2, ForbidStopsWithoutARequest) {  // S4: F24A0, U16
 TEST(Bushd2, AMotionThatSomebodyElseEndsIsAFault) {
   Bushd2Bench bench;
   bench.load(0, 5);
-  bench.set_control(kEnableMotor);
-  bench.permit();
+  bench.permit(kEnableMotor);
   bench.answer(2);
   bench.module.ends({});
   EXPECT_TRUE(bench.lam());
@@ -357,8 +344,7 @@ TEST(Bushd2, AProgramThatCannotBeMadeIsAFault) {
 TEST(Bushd2, MotorAndDirectionAreLatchedEnablesAreNot) {  // U17
   Bushd2Bench bench;
   bench.load(0, 5);
-  bench.set_control(3);
-  bench.permit();
+  bench.permit(3);
   bench.set_control(9 | kLeft | kEnableEnd);
   bench.set_address(77);
   bench.answer(5);
@@ -370,8 +356,7 @@ TEST(Bushd2, MotorAndDirectionAreLatchedEnablesAreNot) {  // U17
 
 TEST(Bushd2, NoStepsEndAtOnceAndCodeZeroIsOne) {  // U25
   Bushd2Bench bench;
-  bench.set_control(kEnableEnd);
-  bench.permit();
+  bench.permit(kEnableEnd);
   EXPECT_TRUE(bench.lam());
   EXPECT_TRUE(bench.motors.moves.empty());
   bench.write_at(0, {1});
@@ -382,8 +367,7 @@ TEST(Bushd2, NoStepsEndAtOnceAndCodeZeroIsOne) {  // U25
 TEST(Bushd2, InitialiseClearAndInhibit) {  // U18
   Bushd2Bench bench;
   bench.load(0, 5);
-  bench.set_control(kEnableEnd | 2);
-  bench.permit();
+  bench.permit(kEnableEnd | 2);
   bench.answer(1);
   bench.crate.initialise();
   EXPECT_EQ(bench.motors.stops, std::vector<int>{2});
@@ -393,8 +377,7 @@ TEST(Bushd2, InitialiseClearAndInhibit) {  // U18
   EXPECT_EQ(bench.read().data, 5U) << "the memory stays";
   bench.module.ends({});
 
-  bench.set_control(kEnableEnd);
-  bench.permit();
+  bench.permit(kEnableEnd);
   bench.answer(5);
   EXPECT_TRUE(bench.lam());
   bench.crate.clear();
@@ -416,8 +399,7 @@ TEST(Bushd2, MemoryIsKeptByWhoeverKeepsIt) {
   bench.load(2, 999);
   Bushd2Bench next;
   next.module.load_memory(bench.module.memory());
-  next.set_control(17);
-  next.permit();
+  next.permit(17);
   EXPECT_EQ(next.motors.moves.at(0).steps, 999U);
 }
 

@@ -55,14 +55,26 @@ class EsoneTest : public ::testing::Test, public Port {
     EXPECT_EQ(cdlam(&lam, 1, 1, 5, 0, nullptr), 0);
     return lam;
   }
+  static std::int32_t read(int a) {
+    std::int32_t data = 0;
+    std::int32_t q = 0;
+    cfsa(0, ext(5, a), &data, &q);
+    return data;
+  }
+  static void clear_lam() {
+    std::int32_t data = 0;
+    std::int32_t q = 0;
+    cfsa(10, ext(5, 0), &data, &q);
+  }
+  static void write(int a, std::int32_t data) {
+    std::int32_t q = 0;
+    cfsa(16, ext(5, a), &data, &q);
+  }
   // An address overflow, which is enabled.
   static void raise_lam() {
-    std::int32_t data = 0x10;
-    std::int32_t q = 0;
-    cfsa(16, ext(5, 2), &data, &q);
-    data = 1023;
-    cfsa(16, ext(5, 1), &data, &q);
-    cfsa(0, ext(5, 0), &data, &q);
+    write(2, 0x10);
+    write(1, 1023);
+    read(0);
   }
 
   std::mutex mutex_;
@@ -157,15 +169,11 @@ TEST_F(EsoneTest, CrateControls) {
   EXPECT_EQ(l, 1);
   EXPECT_EQ(ctgl(ext(5, 0), &l), 0);
   EXPECT_EQ(l, 0);
-  std::int32_t data = 0x21;
-  std::int32_t q = 0;
-  cfsa(16, ext(5, 2), &data, &q);
+  write(2, 0x21);
   EXPECT_EQ(cccc(ext(5, 0)), 0);
-  cfsa(0, ext(5, 2), &data, &q);
-  EXPECT_EQ(data, 0x21);
+  EXPECT_EQ(read(2), 0x21);
   EXPECT_EQ(cccz(ext(5, 0)), 0);
-  cfsa(0, ext(5, 2), &data, &q);
-  EXPECT_EQ(data, 0);
+  EXPECT_EQ(read(2), 0);
 }
 
 TEST_F(EsoneTest, LamHandles) {
@@ -287,18 +295,14 @@ TEST_F(EsoneTest, AWordForEachLam) {
 }
 
 TEST_F(EsoneTest, StopOnWordTakesTheWordWithoutQ) {
-  std::int32_t data = 0x10;
-  std::int32_t q = 0;
-  cfsa(16, ext(5, 2), &data, &q);  // address overflow ends a block
-  data = 1022;
-  cfsa(16, ext(5, 1), &data, &q);
+  write(2, 0x10);  // address overflow ends a block
+  write(1, 1022);
   std::int32_t words[5] = {7, 8, 9, 10, 11};
   std::int32_t cb[4] = {5, -1, 0, Calls::kStopOnWord};
   EXPECT_EQ(cfubc(16, ext(5, 0), words, cb), 1);
   EXPECT_EQ(cb[1], 3) << "after the overflow one more is written";
-  cfsa(10, ext(5, 0), &data, &q);
-  data = 1022;
-  cfsa(16, ext(5, 1), &data, &q);
+  clear_lam();
+  write(1, 1022);
   std::int32_t back[5] = {-1, -1, -1, -1, -1};
   EXPECT_EQ(cfubc(0, ext(5, 0), back, cb), 1);
   EXPECT_EQ(cb[1], 3);
@@ -310,13 +314,11 @@ TEST_F(EsoneTest, StopOnWordTakesTheWordWithoutQ) {
 
 TEST_F(EsoneTest, BlocksOfOneRegister) {
   std::vector<std::int32_t> words(1500, 7);
-  std::int32_t data = 0x10;
-  std::int32_t q = 0;
-  cfsa(16, ext(5, 2), &data, &q);  // address overflow ends a block
+  write(2, 0x10);  // address overflow ends a block
   std::int32_t cb[4] = {1500, -1, 0, 0};
   EXPECT_EQ(cfubc(16, ext(5, 0), words.data(), cb), 1);
   EXPECT_EQ(cb[1], 1024);
-  cfsa(10, ext(5, 0), &data, &q);
+  clear_lam();
   std::vector<std::int32_t> read(1500, -1);
   EXPECT_EQ(cfubc(0, ext(5, 0), read.data(), cb), 1);
   EXPECT_EQ(cb[1], 1023) << "the cycle without Q has written a byte and counted";
