@@ -103,4 +103,19 @@ std::string quoted(const std::string& path) {
   return "'" + path + "'";
 }
 
+std::string hex(std::uint32_t value, int digits) {
+  char text[16];
+  std::snprintf(text, sizeof text, "0x%0*x", digits, value);
+  return text;
+}
+
+std::optional<CodePlace> code_place(const std::string& addr2line, const std::string& image,
+                                    std::uint32_t pc) {
+  std::vector<std::string> lines;
+  for_lines(addr2line + " -f -e " + quoted(image) + " " + hex(pc, 1),
+            [&](const std::string& line) { lines.push_back(line); });
+  if (lines.size() != 2) return std::nullopt;
+  return CodePlace{lines[0], lines[1]};
+}
+
 }  // namespace bushd::sim

@@ -13,6 +13,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -69,5 +72,25 @@ class MemoryMap {
 void for_lines(const std::string& command, const std::function<void(const std::string&)>& take);
 // For a shell; without quotes in it.
 std::string quoted(const std::string& path);
+
+// 0x00ff with 4 digits.
+std::string hex(std::uint32_t value, int digits);
+
+struct CodePlace {
+  std::string function;
+  std::string line;
+};
+// Where the code at `pc` comes from, as this tool says; nothing if it cannot be run.
+std::optional<CodePlace> code_place(const std::string& addr2line, const std::string& image,
+                                    std::uint32_t pc);
+
+// The map of an image and its owners; each is read once.
+template <typename Map>
+std::shared_ptr<const Map> map_of(const std::string& image, const std::string& owners) {
+  static std::map<std::pair<std::string, std::string>, std::shared_ptr<const Map>> maps;
+  auto& map = maps[{image, owners}];
+  if (!map) map = std::make_shared<const Map>(image, owners);
+  return map;
+}
 
 }  // namespace bushd::sim

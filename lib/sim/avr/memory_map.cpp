@@ -123,13 +123,9 @@ const AvrMemoryMap::Object* AvrMemoryMap::object_at(std::uint16_t address) const
 }
 
 std::string AvrMemoryMap::place_of(std::uint32_t pc) const {
-  char command[32];
-  std::snprintf(command, sizeof command, " -f 0x%x", static_cast<unsigned>(pc));
-  std::vector<std::string> lines;
-  for_lines("avr-addr2line -s -e " + quoted(image()) + command,
-            [&](const std::string& line) { lines.push_back(line); });
-  if (lines.size() != 2) return std::string(command + 4);
-  return lines[0] + " (" + lines[1].substr(0, lines[1].find(' ')) + ")";
+  const auto place = code_place("avr-addr2line -s", image(), pc);
+  if (!place) return hex(pc, 1);
+  return place->function + " (" + place->line.substr(0, place->line.find(' ')) + ")";
 }
 
 }  // namespace bushd::sim

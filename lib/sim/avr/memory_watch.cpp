@@ -1,9 +1,5 @@
 #include "sim/avr/memory_watch.h"
 
-#include <cstdio>
-#include <map>
-#include <utility>
-
 extern "C" {
 #include <sim_avr.h>
 #include <sim_io.h>
@@ -24,19 +20,6 @@ constexpr std::size_t kUcsr0b = 0xC1;
 constexpr std::uint8_t kSends = 1 << 5 | 1 << 6;  // UDRIE0, TXCIE0
 // What a frame holds that nobody has written: as an address, it is beyond RAM.
 constexpr std::uint8_t kNeverWritten = 0xA5;
-
-std::shared_ptr<const AvrMemoryMap> map_of(const std::string& image, const std::string& owners) {
-  static std::map<std::pair<std::string, std::string>, std::shared_ptr<const AvrMemoryMap>> maps;
-  auto& map = maps[{image, owners}];
-  if (!map) map = std::make_shared<const AvrMemoryMap>(image, owners);
-  return map;
-}
-
-std::string hex(std::uint16_t address) {
-  char text[8];
-  std::snprintf(text, sizeof text, "0x%04x", unsigned{address});
-  return text;
-}
 
 // LD and LDD: through a pointer. LDS, IN and POP are not.
 bool is_pointer_load(std::uint16_t opcode) {
@@ -69,7 +52,6 @@ struct AvrMemoryWatch::Borrowed {
         reply(map.object("mcu.reply")),
         rows_next(map.address_of("mcu.rows.next")),
         rows_count(map.address_of("mcu.rows.count")),
-        answer(map.address_of("mcu.answer.size")),
         line(map.unit_named("atmega2560/line.c")),
         decoder(map.unit_named("atmega2560/receive.S")),
         frames(map.unit_named("engine/frame.c")) {}
@@ -77,7 +59,6 @@ struct AvrMemoryWatch::Borrowed {
   const AvrMemoryMap::Object& reply;
   std::uint16_t rows_next;
   std::uint16_t rows_count;
-  std::uint16_t answer;
   AvrMemoryMap::Unit line;
   AvrMemoryMap::Unit decoder;
   AvrMemoryMap::Unit frames;
@@ -87,7 +68,7 @@ AvrMemoryWatch::AvrMemoryWatch(avr_t* avr, const AvrChip& chip, const std::strin
                                const std::string& owners)
     : avr_(avr),
       chip_(chip),
-      map_(map_of(image, owners)),
+      map_(map_of<AvrMemoryMap>(image, owners)),
       borrowed_(std::make_unique<Borrowed>(*map_)),
       main_(map_->unit_named("atmega2560/main.c")),
       inputs_(map_->unit_named(std::string(chip.name) + "/inputs.c")) {
@@ -136,8 +117,8 @@ AvrMemoryMap::Unit AvrMemoryWatch::writer() const {
 void AvrMemoryWatch::check_stack(std::uint16_t address) {
   const std::uint16_t bound = map_->variables_end() + kReserve;
   if (address < bound) {
-    violate("writes to " + hex(address) + ", which is no variable's, nor the stack's above " +
-            hex(bound));
+    violate("writes to " + hex(address, 4) + ", which is no variable's, nor the stack's above " +
+            hex(bound, 4));
   }
 }
 
@@ -147,11 +128,11 @@ void AvrMemoryWatch::check_borrowed(AvrMemoryMap::Unit unit, std::uint16_t addre
   const std::uint8_t* const data = avr_->data;
   const bool sends = (data[kTimsk3] & kWaits) != 0 || (data[kUcsr0b] & kSends) != 0;
   if (sends && address >= b.reply.address && address < b.reply.address + b.reply.size) {
-    violate("writes to " + hex(address) + " in the reply, which the line is sending");
+    violate("writes to " + hex(address, 4) + " in the reply, which the line is sending");
   }
   if (unit != b.line && unit != b.decoder && unit != b.frames) return;
   if (data[b.rows_next] < data[b.rows_count]) {
-    violate("writes to " + hex(address) + " in a frame of which rows are still to be taken");
+    violate("writes to " + hex(address, 4) + " in a frame of which rows are still to be taken");
   }
 }
 
@@ -160,14 +141,14 @@ void AvrMemoryWatch::write(std::uint16_t address, std::uint8_t) {
   if (address < chip_.ram_begin) return;
   if (!in_main_) in_main_ = writer() == main_;
   if (!in_main_) return;
-  if (address > avr_->ramend) return violate("writes to " + hex(address) + ", beyond RAM");
+  if (address > avr_->ramend) return violate("writes to " + hex(address, 4) + ", beyond RAM");
   const AvrMemoryMap::Object* const object = map_->object_at(address);
   if (object == nullptr && address > map_->variables_end() && address <= map_->stack_top()) {
     return check_stack(address);
   }
   const AvrMemoryMap::Unit unit = writer();
   if (!map_->may_write(unit, address)) {
-    return violate("of " + map_->name_of(unit) + " writes to " + hex(address) + ", in " +
+    return violate("of " + map_->name_of(unit) + " writes to " + hex(address, 4) + ", in " +
                    (object != nullptr ? object->name : "no object"));
   }
   check_borrowed(unit, address);
@@ -175,12 +156,12 @@ void AvrMemoryWatch::write(std::uint16_t address, std::uint8_t) {
 
 void AvrMemoryWatch::read(std::uint16_t address) {
   if (violation_ || !in_main_) return;
-  if (address > avr_->ramend) return violate("reads " + hex(address) + ", beyond RAM");
+  if (address > avr_->ramend) return violate("reads " + hex(address, 4) + ", beyond RAM");
   if (address < kIoBegin || address >= chip_.ram_begin) return;
   if (!is_pointer_load(opcode())) return;
   const AvrMemoryMap::Unit unit = writer();
   if (unit == inputs_) return;
-  violate("of " + map_->name_of(unit) + " reads the I/O register " + hex(address) +
+  violate("of " + map_->name_of(unit) + " reads the I/O register " + hex(address, 4) +
           " through a pointer");
 }
 
@@ -201,7 +182,7 @@ void AvrMemoryWatch::stack_pointer(std::uint16_t address, std::uint8_t value) {
 void AvrMemoryWatch::eeprom_control(std::uint8_t value) {
   if (violation_ || (value & kEepromAccess) == 0) return;
   const auto address = static_cast<std::uint16_t>(avr_->data[kEear] | avr_->data[kEear + 1] << 8);
-  if (address >= kEepromEnd) violate("uses " + hex(address) + " of the EEPROM, beyond its end");
+  if (address >= kEepromEnd) violate("uses " + hex(address, 4) + " of the EEPROM, beyond its end");
 }
 
 }  // namespace bushd::sim

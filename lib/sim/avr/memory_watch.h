@@ -3,7 +3,7 @@
 // - a write outside of the objects that the writer's source file owns (AvrMemoryMap)
 // - a write, or a stack, in the last kReserve bytes between variables and stack
 // - a write to what is borrowed: the reply while the line sends it or is to send it, a frame while
-//   rows of it are still to be taken, and a receiver that goes on while an answer is being made
+//   rows of it are still to be taken
 // - an address beyond RAM, and one of an I/O register through a pointer, but by inputs.c
 // - an address of the EEPROM beyond its end
 //

@@ -18,7 +18,6 @@
 #define WRITTEN 0x27800u
 #define WRITTEN_SIZE (98 * FLASH_PAGE)
 static struct {
-  MemoryRegion region;
   uint32_t address;
   uint32_t data;
   uint32_t words[WRITTEN_SIZE / 4];
@@ -28,19 +27,14 @@ static struct {
 } flash;
 
 static struct {
-  MemoryRegion region;
   uint32_t result;
   uint32_t averaging; /* of 2 to the power of it samples */
   int64_t ready_ns;
 } adc;
 
-static struct {
-  MemoryRegion region;
-  uint32_t flags;
-} reset_cause;
+static uint32_t reset_cause;
 
 static struct {
-  MemoryRegion region;
   QEMUTimer timer;
   uint32_t load;
   uint32_t control;
@@ -60,37 +54,31 @@ void flash_wear(void) {
 }
 
 void reset_cause_set(uint32_t flags) {
-  reset_cause.flags = flags;
+  reset_cause = flags;
 }
 
 /* A word of RAM with a bit that is always 1. */
 static uint32_t stuck;
 
-static uint64_t stuck_read(void* opaque, hwaddr address, unsigned size) {
-  (void)opaque;
+static uint32_t stuck_read(uint32_t address) {
   (void)address;
-  (void)size;
+  (void)address;
   return stuck | 1u;
 }
 
-static void stuck_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
-  (void)opaque;
+static void stuck_write(uint32_t address, uint32_t data) {
   (void)address;
-  (void)size;
-  stuck = (uint32_t)data;
+  (void)address;
+  stuck = data;
 }
 
 void ram_stick(uint32_t address) {
-  static MemoryRegion region;
-  static const MemoryRegionOps kStuck = {
-      .read = stuck_read, .write = stuck_write, .endianness = DEVICE_LITTLE_ENDIAN};
-  cover(&region, address, 4, &kStuck);
+  static device word = {.read = stuck_read, .write = stuck_write};
+  cover(&word, address, 4);
 }
 
-static uint64_t adc_read(void* opaque, hwaddr address, unsigned size) {
-  (void)opaque;
-  (void)size;
-  if (address == 0xACu) return qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) < adc.ready_ns ? 1u << 8 : 0;
+static uint32_t adc_read(uint32_t address) {
+  if (address == 0xACu) return now() < adc.ready_ns ? 1u << 8 : 0;
   if (address != 0xA8u) return 0;
   adc.ready_ns = INT64_MAX;
   return adc.result;
@@ -103,34 +91,29 @@ static void adc_convert(void) {
   get_all(&answer, sizeof answer);
   if (answer.kind != LOCKSTEP_CURRENT) give_up();
   adc.result = answer.value;
-  adc.ready_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) + (ADC_SAMPLE_NS << adc.averaging);
+  adc.ready_ns = now() + (ADC_SAMPLE_NS << adc.averaging);
 }
 
-static void adc_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
-  (void)opaque;
-  (void)size;
-  if (address == 0x30u) adc.averaging = (uint32_t)data & 7u;
+static void adc_write(uint32_t address, uint32_t data) {
+  if (address == 0x30u) adc.averaging = data & 7u;
   if (address == 0x28u && (data & 8u) != 0) adc_convert();
 }
 
-static uint64_t cause_read(void* opaque, hwaddr address, unsigned size) {
-  (void)opaque;
+static uint32_t cause_read(uint32_t address) {
   (void)address;
-  (void)size;
-  return reset_cause.flags;
+  (void)address;
+  return reset_cause;
 }
 
-static void cause_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
-  (void)opaque;
+static void cause_write(uint32_t address, uint32_t data) {
   (void)address;
-  (void)size;
-  reset_cause.flags = (uint32_t)data;
+  (void)address;
+  reset_cause = data;
 }
 
 static void watchdog_reload(void) {
   if ((watchdog.control & 1u) == 0) return;
-  timer_mod(&watchdog.timer,
-            qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) + (int64_t)watchdog.load * CYCLE_NS);
+  timer_mod(&watchdog.timer, now() + (int64_t)watchdog.load * CYCLE_NS);
 }
 
 static void on_watchdog(void* opaque) {
@@ -146,31 +129,25 @@ static void on_watchdog(void* opaque) {
   watchdog_reload();
 }
 
-static uint64_t watchdog_read(void* opaque, hwaddr address, unsigned size) {
-  (void)opaque;
-  (void)size;
+static uint32_t watchdog_read(uint32_t address) {
   return address == 0x8u ? watchdog.control : 0;
 }
 
-static void watchdog_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
-  (void)opaque;
-  (void)size;
-  if (address == 0x0u) watchdog.load = (uint32_t)data;
-  if (address == 0x8u) watchdog.control |= (uint32_t)data;
+static void watchdog_write(uint32_t address, uint32_t data) {
+  if (address == 0x0u) watchdog.load = data;
+  if (address == 0x8u) watchdog.control |= data;
   if (address == 0xCu) watchdog.interrupt = false;
   watchdog_reload();
 }
 
-static uint64_t flash_read(void* opaque, hwaddr address, unsigned size) {
-  (void)opaque;
-  (void)size;
-  const bool busy = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) < flash.busy_until_ns;
+static uint32_t flash_read(uint32_t address) {
+  const bool busy = now() < flash.busy_until_ns;
   return address == 0x8u && busy ? flash.command : 0;
 }
 
 static void flash_takes(uint32_t command, int64_t ns) {
   flash.command = command;
-  flash.busy_until_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) + ns;
+  flash.busy_until_ns = now() + ns;
 }
 
 static void flash_store(uint32_t address, uint32_t word) {
@@ -178,11 +155,9 @@ static void flash_store(uint32_t address, uint32_t word) {
   tell(LOCKSTEP_STORED, word, address);
 }
 
-static void flash_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
-  (void)opaque;
-  (void)size;
-  if (address == 0x0u) flash.address = (uint32_t)data;
-  if (address == 0x4u) flash.data = (uint32_t)data;
+static void flash_write(uint32_t address, uint32_t data) {
+  if (address == 0x0u) flash.address = data;
+  if (address == 0x4u) flash.data = data;
   if (address != 0x8u || data >> 16 != FLASH_KEY) return;
   if (data & 1u) {
     const uint32_t word = (flash.address - WRITTEN) / 4 % (WRITTEN_SIZE / 4);
@@ -197,19 +172,15 @@ static void flash_write(void* opaque, hwaddr address, uint64_t data, unsigned si
 }
 
 void devices_init(void) {
-  static const MemoryRegionOps kFlash = {
-      .read = flash_read, .write = flash_write, .endianness = DEVICE_LITTLE_ENDIAN};
-  static const MemoryRegionOps kWatchdog = {
-      .read = watchdog_read, .write = watchdog_write, .endianness = DEVICE_LITTLE_ENDIAN};
-  static const MemoryRegionOps kCause = {
-      .read = cause_read, .write = cause_write, .endianness = DEVICE_LITTLE_ENDIAN};
-  static const MemoryRegionOps kAdc = {
-      .read = adc_read, .write = adc_write, .endianness = DEVICE_LITTLE_ENDIAN};
-  cover(&adc.region, ADC_AT, PAGE, &kAdc);
-  cover(&flash.region, FLASH_CONTROL, PAGE, &kFlash);
-  cover(&watchdog.region, WATCHDOG_AT, PAGE, &kWatchdog);
-  cover(&reset_cause.region, RESET_CAUSE_AT, 4, &kCause);
-  timer_init_full(&watchdog.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_watchdog, NULL);
+  static device control = {.read = flash_read, .write = flash_write};
+  static device dog = {.read = watchdog_read, .write = watchdog_write};
+  static device cause = {.read = cause_read, .write = cause_write};
+  static device converter = {.read = adc_read, .write = adc_write};
+  cover(&converter, ADC_AT, PAGE);
+  cover(&control, FLASH_CONTROL, PAGE);
+  cover(&dog, WATCHDOG_AT, PAGE);
+  cover(&cause, RESET_CAUSE_AT, 4);
+  begin_timer(&watchdog.timer, on_watchdog);
   memset(flash.words, 0xFF, sizeof flash.words);
   address_space_write_rom(&address_space_memory, WRITTEN, NO_ATTRIBUTES, flash.words,
                           sizeof flash.words);

@@ -68,6 +68,10 @@ void get_all(void* bytes, size_t size) {
   }
 }
 
+int64_t now(void) {
+  return qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL);
+}
+
 void flush(void) {
   put_all(lockstep.events, lockstep.event_count * sizeof lockstep.events[0]);
   lockstep.event_count = 0;
@@ -76,10 +80,7 @@ void flush(void) {
 void tell(uint32_t kind, uint32_t value, uint32_t address) {
   if (lockstep.event_count == EVENTS) flush();
   lockstep.events[lockstep.event_count++] =
-      (lockstep_message){.time_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL),
-                         .kind = kind,
-                         .value = value,
-                         .address = address};
+      (lockstep_message){.time_ns = now(), .kind = kind, .value = value, .address = address};
 }
 
 /* Within a block of translated code QEMU's clock cannot be read: the event has no time. */
@@ -105,15 +106,31 @@ uint32_t register_of(MemoryRegion* region, hwaddr address) {
   return (uint32_t)data;
 }
 
-void cover(MemoryRegion* region, hwaddr at, uint64_t size, const MemoryRegionOps* ops) {
-  memory_region_init_io(region, NULL, ops, NULL, "bushd", size);
-  memory_region_add_subregion_overlap(get_system_memory(), at, region, 1);
+static uint64_t read_device(void* opaque, hwaddr address, unsigned size) {
+  (void)size;
+  return ((const device*)opaque)->read((uint32_t)address);
+}
+
+static void write_device(void* opaque, hwaddr address, uint64_t data, unsigned size) {
+  (void)size;
+  ((const device*)opaque)->write((uint32_t)address, (uint32_t)data);
+}
+
+void cover(device* d, hwaddr at, uint64_t size) {
+  static const MemoryRegionOps kOps = {
+      .read = read_device, .write = write_device, .endianness = DEVICE_LITTLE_ENDIAN};
+  memory_region_init_io(&d->region, NULL, &kOps, d, "bushd", size);
+  memory_region_add_subregion_overlap(get_system_memory(), at, &d->region, 1);
+}
+
+void begin_timer(QEMUTimer* timer, void (*callback)(void* opaque)) {
+  timer_init_full(timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, callback, NULL);
 }
 
 MemoryRegion* find(hwaddr at, const char* type) {
   MemoryRegion* const found = memory_region_find(get_system_memory(), at, 4).region;
-  Object* const device = found == NULL ? NULL : memory_region_owner(found);
-  if (device == NULL || strcmp(object_get_typename(device), type) != 0) {
+  Object* const owner = found == NULL ? NULL : memory_region_owner(found);
+  if (owner == NULL || strcmp(object_get_typename(owner), type) != 0) {
     fprintf(stderr, "QEMU's board has no %s at 0x%" PRIx64 "\n", type, at);
     give_up();
   }
@@ -129,7 +146,7 @@ static void set_timer(void) {
 void byte_sent(uint8_t byte) {
   tell(LOCKSTEP_SENT, byte, 0);
   if (lockstep.until_sent) {
-    lockstep.until_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL);
+    lockstep.until_ns = now();
     timer_mod(&lockstep.timer, lockstep.until_ns);
   }
 }
@@ -194,7 +211,7 @@ static void on_time(void* opaque) {
   (void)opaque;
   /* Also the first time: QEMU resets its devices when they have been told. */
   pins_show_system_inputs();
-  const int64_t now_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL);
+  const int64_t now_ns = now();
   while (uart_next_byte() != NULL && uart_next_byte()->time_ns <= now_ns) uart_hear();
   if (now_ns >= lockstep.until_ns) {
     tell(LOCKSTEP_STOPPED, uart_timer_runs(), 0);
@@ -211,7 +228,7 @@ static void on_machine_done(Notifier* notifier, void* data) {
   uart_init();
   devices_init();
   tick_timer = find(TIMER_1, "stellaris-gptm");
-  timer_init_full(&lockstep.timer, NULL, QEMU_CLOCK_VIRTUAL, 1, 0, on_time, NULL);
+  begin_timer(&lockstep.timer, on_time);
   obey();
   timer_mod(&lockstep.timer, 0);
 }

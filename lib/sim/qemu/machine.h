@@ -20,8 +20,18 @@ void byte_sent(uint8_t byte);
 /* The image stores where it must not. Returns if nobody watches. */
 void store_violation(uint32_t address);
 
-/* machine.c: QEMU's devices. `size` bytes at `at` are those of `ops` from now on. */
-void cover(MemoryRegion* region, hwaddr at, uint64_t size, const MemoryRegionOps* ops);
+/* Since its first instruction. */
+int64_t now(void);
+
+/* machine.c: QEMU's devices. `size` bytes at `at` are this device's from now on. */
+typedef struct device {
+  uint32_t (*read)(uint32_t address);
+  void (*write)(uint32_t address, uint32_t value);
+  MemoryRegion region;
+} device;
+void cover(device* d, hwaddr at, uint64_t size);
+/* Its time is the machine's. */
+void begin_timer(QEMUTimer* timer, void (*callback)(void* opaque));
 /* The registers of QEMU's device of that type at `at`; before anything covers them. */
 MemoryRegion* find(hwaddr at, const char* type);
 uint32_t register_of(MemoryRegion* region, hwaddr address);

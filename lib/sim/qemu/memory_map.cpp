@@ -1,8 +1,6 @@
 #include "sim/qemu/memory_map.h"
 
-#include <array>
 #include <cctype>
-#include <cstdio>
 #include <sstream>
 #include <stdexcept>
 
@@ -13,12 +11,6 @@ constexpr std::uint32_t kRam = 0x20000000;
 constexpr std::uint32_t kRamSize = 0x10000;
 // QEMU's watch has a bit for each.
 constexpr std::size_t kMostUnits = 64;
-
-std::string hex(std::uint32_t value) {
-  std::array<char, 16> text;
-  std::snprintf(text.data(), text.size(), "0x%08x", value);
-  return text.data();
-}
 
 bool in_ram(std::uint32_t address) {
   return address - kRam < kRamSize;
@@ -68,18 +60,14 @@ void QemuMemoryMap::take_symbol(const std::string& line) {
 }
 
 std::string QemuMemoryMap::place_of(std::uint32_t pc) const {
-  std::vector<std::string> lines;
-  for_lines("arm-none-eabi-addr2line -f -e " + quoted(image()) + " " + hex(pc),
-            [&](const std::string& line) { lines.push_back(line); });
-  if (lines.size() != 2) return hex(pc);
-  const std::string& function = lines[0];
-  std::string line = lines[1];
-  line.erase(0, line.find_first_not_of("./"));
+  auto place = code_place("arm-none-eabi-addr2line", image(), pc);
+  if (!place) return hex(pc, 8);
+  place->line.erase(0, place->line.find_first_not_of("./"));
   std::string unit = "a library";
   for (const Code& code : codes_) {
     if (pc - code.address < code.size) unit = name_of(code.unit);
   }
-  return function + " (" + line + ", in " + unit + " at " + hex(pc) + ")";
+  return place->function + " (" + place->line + ", in " + unit + " at " + hex(pc, 8) + ")";
 }
 
 std::string QemuMemoryMap::thing_at(std::uint32_t address) const {
@@ -91,14 +79,14 @@ std::string QemuMemoryMap::thing_at(std::uint32_t address) const {
     return innermost->name + "+" + std::to_string(address - innermost->address);
   }
   if (in_ram(address) && address < stack_limit_ && address >= stack_limit_ - 4096) {
-    return hex(address) + ", below the stack's bound";
+    return hex(address, 8) + ", below the stack's bound";
   }
   const Object* before = nullptr;
   for (const Object& object : objects()) {
     if (object.address <= address) before = &object;
   }
-  if (!in_ram(address) || before == nullptr) return hex(address);
-  return hex(address) + ", " + std::to_string(address - before->address - before->size + 1) +
+  if (!in_ram(address) || before == nullptr) return hex(address, 8);
+  return hex(address, 8) + ", " + std::to_string(address - before->address - before->size + 1) +
          " bytes beyond " + before->name;
 }
 

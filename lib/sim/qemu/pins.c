@@ -41,22 +41,9 @@ static void on_step(void* opaque, int motor, int level) {
   tell(LOCKSTEP_STEP, (uint32_t)level, (uint32_t)motor);
 }
 
-static void on_enable(void* opaque, int n, int level) {
+static void on_line(void* opaque, int kind, int level) {
   (void)opaque;
-  (void)n;
-  tell(LOCKSTEP_ENABLE, (uint32_t)level, 0);
-}
-
-static void on_common_dir(void* opaque, int n, int level) {
-  (void)opaque;
-  (void)n;
-  tell(LOCKSTEP_COMMON_DIR, (uint32_t)level, 0);
-}
-
-static void on_compare(void* opaque, int n, int level) {
-  (void)opaque;
-  (void)n;
-  tell(LOCKSTEP_COMPARE, (uint32_t)level, 0);
+  tell((uint32_t)kind, (uint32_t)level, 0);
 }
 
 static void on_driver_enable(void* opaque, int n, int level) {
@@ -113,9 +100,9 @@ void pins_init(void) {
     wire(gpio(GPIO_B), i, on_step, i);
     wire(gpio(GPIO_D), i, on_step, 8 + i);
   }
-  wire(gpio(GPIO_A), 2, on_enable, 0);
-  wire(gpio(GPIO_F), 0, on_common_dir, 0);
-  wire(gpio(GPIO_F), 1, on_compare, 0);
+  wire(gpio(GPIO_A), 2, on_line, LOCKSTEP_ENABLE);
+  wire(gpio(GPIO_F), 0, on_line, LOCKSTEP_COMMON_DIR);
+  wire(gpio(GPIO_F), 1, on_line, LOCKSTEP_COMPARE);
   wire(gpio(GPIO_A), 3, on_driver_enable, 0);
   wire(gpio(GPIO_E), 0, on_shift_clock, 0);
   wire(gpio(GPIO_E), 1, on_direction_data, 0);

@@ -54,14 +54,6 @@ std::uint32_t record_of(std::uint32_t kind, std::uint32_t value) {
   ::_exit(127);
 }
 
-// Each image's is read once.
-std::shared_ptr<const QemuMemoryMap> map_of(const QemuOptions& options) {
-  static std::map<std::string, std::shared_ptr<const QemuMemoryMap>> maps;
-  auto& map = maps[options.image + '\n' + options.memory_owners];
-  if (!map) map = std::make_shared<QemuMemoryMap>(options.image, options.memory_owners);
-  return map;
-}
-
 const char* meaning_of(std::uint32_t violation) {
   switch (violation) {
     case LOCKSTEP_WRITES_FOREIGN:
@@ -91,7 +83,9 @@ QemuMcu::QemuMcu(const QemuOptions& options, std::size_t index, Driver& driver, 
   for (int boot = options.boots - options.recorded_boots + 1; boot <= options.boots; ++boot) {
     flash_[at += 4] = record_of(kKindBootNumber, static_cast<std::uint16_t>(boot));
   }
-  if (!options.memory_owners.empty()) map_ = map_of(options);
+  if (!options.memory_owners.empty()) {
+    map_ = map_of<QemuMemoryMap>(options.image, options.memory_owners);
+  }
   next_reset_ = kExternal;
   start(kPowerOn);
 }
@@ -229,28 +223,27 @@ bool QemuMcu::run() {
 void QemuMcu::take(const lockstep_message& event) {
   // It stops behind the instruction that has begun before the time given.
   const TimeNs time_ns = std::min(boot_ns_ + event.time_ns, now_ns_);
-  const auto bit = static_cast<std::uint16_t>(1u << event.address % 16);
   switch (event.kind) {
     case LOCKSTEP_STOPPED:
       line_timer_ = event.value != 0;
       now_ns_ = time_ns;
       break;
-    case LOCKSTEP_STEP:
-      drive(
-          time_ns, Signal::kStep, step_levels_,
-          static_cast<std::uint16_t>(event.value != 0 ? step_levels_ | bit : step_levels_ & ~bit));
+    case LOCKSTEP_STEP: {
+      const unsigned others = levels_of(Signal::kStep) & ~(1u << event.address);
+      drive(time_ns, Signal::kStep, others | event.value << event.address);
       break;
+    }
     case LOCKSTEP_DIRECTIONS:
-      drive(time_ns, Signal::kDir, direction_levels_, static_cast<std::uint16_t>(event.value));
+      drive(time_ns, Signal::kDir, event.value);
       break;
     case LOCKSTEP_ENABLE:
-      drive(time_ns, Signal::kEnable, enable_level_, event.value != 0);
+      drive(time_ns, Signal::kEnable, event.value);
       break;
     case LOCKSTEP_COMMON_DIR:
-      drive(time_ns, Signal::kCommonDir, common_dir_level_, event.value != 0);
+      drive(time_ns, Signal::kCommonDir, event.value);
       break;
     case LOCKSTEP_COMPARE:
-      drive(time_ns, Signal::kPositionCompare, compare_level_, event.value != 0);
+      drive(time_ns, Signal::kPositionCompare, event.value);
       break;
     case LOCKSTEP_CONVERTS:
       order(LOCKSTEP_CURRENT, on_conversion ? on_conversion(time_ns) : current_);
@@ -292,9 +285,8 @@ void QemuMcu::take(const lockstep_message& event) {
   }
 }
 
-void QemuMcu::drive(TimeNs time_ns, Signal signal, std::uint16_t& levels, std::uint16_t to) {
-  const auto changed = static_cast<unsigned>(levels ^ to);
-  levels = to;
+void QemuMcu::drive(TimeNs time_ns, Signal signal, unsigned to) {
+  const unsigned changed = std::exchange(levels_of(signal), to) ^ to;
   if (sink_ == nullptr) return;
   for (std::uint8_t i = 0; changed >> i != 0; ++i) {
     if ((changed >> i & 1) != 0) sink_->edge({time_ns, index_, signal, i, (to >> i & 1) != 0});
@@ -322,11 +314,10 @@ void QemuMcu::set_inputs(bushd_inputs inputs) {
 // All that it drove.
 void QemuMcu::fall(TimeNs now_ns) {
   end();
-  drive(now_ns, Signal::kStep, step_levels_, 0);
-  drive(now_ns, Signal::kDir, direction_levels_, 0);
-  drive(now_ns, Signal::kEnable, enable_level_, 0);
-  drive(now_ns, Signal::kCommonDir, common_dir_level_, 0);
-  drive(now_ns, Signal::kPositionCompare, compare_level_, 0);
+  for (const Signal signal : {Signal::kStep, Signal::kDir, Signal::kEnable, Signal::kCommonDir,
+                              Signal::kPositionCompare}) {
+    drive(now_ns, signal, 0);
+  }
   driver_enable_ = line_timer_ = false;
 }
 

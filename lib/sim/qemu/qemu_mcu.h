@@ -93,7 +93,9 @@ class QemuMcu final : public Mcu {
   void order(lockstep_command_kind kind, std::uint32_t value, std::uint32_t address = 0,
              TimeNs time_ns = 0);
   void take(const lockstep_message& event);
-  void drive(TimeNs time_ns, Signal signal, std::uint16_t& levels, std::uint16_t to);
+  // Bit per output.
+  unsigned& levels_of(Signal signal) { return levels_[static_cast<std::size_t>(signal)]; }
+  void drive(TimeNs time_ns, Signal signal, unsigned to);
   std::uint16_t kept(std::uint32_t kind) const;
 
   void order_watch();
@@ -119,11 +121,7 @@ class QemuMcu final : public Mcu {
   bool until_it_speaks_ = false;
   bushd_inputs inputs_{};
   std::uint16_t current_ = 0;
-  std::uint16_t step_levels_ = 0;
-  std::uint16_t direction_levels_ = 0;
-  std::uint16_t enable_level_ = 0;
-  std::uint16_t common_dir_level_ = 0;
-  std::uint16_t compare_level_ = 0;
+  std::array<unsigned, static_cast<std::size_t>(Signal::kPositionCompare) + 1> levels_{};
   bool driver_enable_ = false;
   std::uint64_t flash_writes_ = 0;
   std::uint64_t overruns_ = 0;

@@ -8,7 +8,6 @@
 #define BYTES 4096   /* on their way; a power of two */
 
 static struct {
-  MemoryRegion region;
   MemoryRegion* real;
   MemoryRegion* timer;
   Chardev* line;
@@ -43,24 +42,20 @@ bool uart_timer_runs(void) {
 }
 
 bool uart_busy(void) {
-  return qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL) < uart.busy_until_ns;
+  return now() < uart.busy_until_ns;
 }
 
-static uint64_t uart_read(void* opaque, hwaddr address, unsigned size) {
-  (void)opaque;
-  (void)size;
-  uint64_t data = register_of(uart.real, address);
+static uint32_t uart_read(uint32_t address) {
+  uint32_t data = register_of(uart.real, address);
   if (address == 0x18u && uart_busy()) data |= 1u << 3;
   return data;
 }
 
-static void uart_write(void* opaque, hwaddr address, uint64_t data, unsigned size) {
-  (void)opaque;
-  (void)size;
-  if (address == 0x24u) uart.divisor = (uint32_t)data << 6 | (uart.divisor & 0x3Fu);
-  if (address == 0x28u) uart.divisor = (uart.divisor & ~0x3Fu) | (uint32_t)data;
+static void uart_write(uint32_t address, uint32_t data) {
+  if (address == 0x24u) uart.divisor = data << 6 | (uart.divisor & 0x3Fu);
+  if (address == 0x28u) uart.divisor = (uart.divisor & ~0x3Fu) | data;
   if (address == 0x00u) {
-    const int64_t now_ns = qemu_clock_get_ns(QEMU_CLOCK_VIRTUAL);
+    const int64_t now_ns = now();
     const int64_t byte_ns = (int64_t)uart.divisor * 10 * CYCLE_NS / 4;
     uart.busy_until_ns = (uart.busy_until_ns > now_ns ? uart.busy_until_ns : now_ns) + byte_ns;
     byte_sent((uint8_t)data);
@@ -69,11 +64,10 @@ static void uart_write(void* opaque, hwaddr address, uint64_t data, unsigned siz
 }
 
 void uart_init(void) {
-  static const MemoryRegionOps kUart = {
-      .read = uart_read, .write = uart_write, .endianness = DEVICE_LITTLE_ENDIAN};
+  static device registers = {.read = uart_read, .write = uart_write};
   uart.line = qemu_chr_find("line");
   if (uart.line == NULL) give_up();
   uart.real = find(UART_0_AT, "pl011_luminary");
   uart.timer = find(TIMER_2, "stellaris-gptm");
-  cover(&uart.region, UART_0_AT, PAGE, &kUart);
+  cover(&registers, UART_0_AT, PAGE);
 }
