@@ -6,7 +6,6 @@
 namespace bushd::sim::nvm_test {
 namespace {
 
-constexpr TimeNs kBootNs = 300'000'000;
 constexpr std::size_t kCodes = 3;
 
 std::vector<std::uint16_t> long_ramp() {
@@ -17,12 +16,11 @@ std::vector<std::uint16_t> long_ramp() {
 
 class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
  protected:
-  Nvm() : McuAlone(kBaud, kBootNs), real_(GetParam().make()) {
+  Nvm() : McuAlone(kBaud, 300'000'000), real_(GetParam().make()) {
     bus_.add_mcu([this](std::size_t index, Mcu::Driver& driver, EdgeSink* sink) {
       return real_->make({kAddress, 1, 6}, index, driver, sink);
     });
     master_.patience_ns = 20'000'000;  // the CRC of a long table takes a while
-    pass(kBootNs);
   }
   void TearDown() override { real_->expect_unharmed(); }
 
@@ -35,6 +33,17 @@ class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
   void make_ready_and_kept() {
     ASSERT_NO_FATAL_FAILURE(make_ready());
     pass(real_->keeps_within_ns(kCodes));
+  }
+
+  // By the table in bank 0, once it is brought up. Where STEP rests high, pulses end with the
+  // edges.
+  void expect_motor_3_runs() {
+    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
+    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
+    const std::size_t before = steps_made(3);
+    run(3, 50);
+    pass(200 * TimeNs{kTickNs});
+    EXPECT_EQ(steps_made(3) - before, 50u);
   }
 
   template <class Message>
@@ -75,11 +84,7 @@ TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   bus_.node(0).set_inputs({});
 
   // And they move motors.
-  ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
-  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
-  run(3, 50);
-  pass(200 * TimeNs{kTickNs});
-  EXPECT_EQ(steps_made(3), 50u);
+  expect_motor_3_runs();
 }
 
 TEST_P(Nvm, LocalInputsMoveMotorsAfterAResetWithoutAHost) {
@@ -119,11 +124,7 @@ TEST_P(Nvm, LevelsOfOutputsOutliveAReset) {
   EXPECT_FALSE(level_of(Signal::kStep, 4));
   ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
   EXPECT_FALSE(level_of(Signal::kEnable, 0));
-  ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
-  const std::size_t before = steps_made(3);  // rising edges: here, ends of pulses
-  run(3, 50);
-  pass(200 * TimeNs{kTickNs});
-  EXPECT_EQ(steps_made(3) - before, 50u);
+  expect_motor_3_runs();
 }
 
 class NvmVelocity : public Nvm {};
@@ -231,6 +232,7 @@ TEST_P(NvmProgram, AProgramOutlivesAResetAndBeginsWhenThePowerComes) {
 class NvmScratch : public Nvm {
  protected:
   void SetUp() override {
+    Nvm::SetUp();
     ASSERT_NO_FATAL_FAILURE(make_ready_and_kept());
     written_ = real_->nvm_writes();
     before_ = master_.tables(kAddress);
@@ -248,11 +250,7 @@ class NvmScratch : public Nvm {
     }
     EXPECT_EQ(master_.poll(kAddress).faults, 0);
     EXPECT_NE(ask(bushd_table_end{BUSHD_SCRATCH_BANK, 0}), BUSHD_OK);
-    ASSERT_NO_FATAL_FAILURE(master_.bring_up(kTickNs, BUSHD_FORMAT_FINE));
-    ASSERT_NO_FATAL_FAILURE(master_.assign(kAddress, 3, 0));
-    run(3, 50);
-    pass(200 * TimeNs{kTickNs});
-    EXPECT_EQ(steps_made(3), 50u);
+    expect_motor_3_runs();
   }
 
  private:

@@ -15,47 +15,43 @@ namespace {
 struct Unsupported {
   const char* name;          // the protocol's, as far as names of tests can have it
   std::uint32_t capability;  // of docs/protocol.md; 0: `says_no` tells
-  bool (*says_no)(PulseBench& bench);
   const char* why;
+  bool (*says_no)(PulseBench& bench) = nullptr;
 };
-constexpr bool (*kByCapability)(PulseBench&) = nullptr;
 const std::vector<Unsupported> kUnsupported = {
-    {"TICKS", 0, [](PulseBench& bench) { return !bench.master().offers().streams; },
-     "no step can be put at a time: bytes leave when they leave"},
-    {"several_motors", 0,
-     [](PulseBench& bench) { return bench.master().view({0}).identity.motors == 1; },
-     "a port has one TXD; lines of several ports are tested with the daemon"},
-    {"CONTROL_disable_drivers", 0,
+    {"TICKS", 0, "no step can be put at a time: bytes leave when they leave",
+     [](PulseBench& bench) { return !bench.master().offers().streams; }},
+    {"several_motors", 0, "a port has one TXD; lines of several ports are tested with the daemon",
+     [](PulseBench& bench) { return bench.master().view({0}).identity.motors == 1; }},
+    {"CONTROL_disable_drivers", 0, "no line is left for EN",
      [](PulseBench& bench) {
        bench.master().control({0}, BUSHD_CONTROL_DISABLE);
        bench.run_for(0.1);
        return bench.count_of<link::RequestRefused>() == 1;
-     },
-     "no line is left for EN"},
-    {"EMERGENCY_disable", BUSHD_CAN_DISABLE, kByCapability, "no line is left for EN"},
-    {"CONTROL_named_faults", BUSHD_CAN_CLEAR_NAMED, kByCapability,
+     }},
+    {"EMERGENCY_disable", BUSHD_CAN_DISABLE, "no line is left for EN"},
+    {"CONTROL_named_faults", BUSHD_CAN_CLEAR_NAMED,
      "it clears at once: nothing comes up while that is on its way"},
-    {"TABLE_TICKS", BUSHD_CAN_TABLE_TICKS, kByCapability, "there are no slots"},
-    {"LOCAL", BUSHD_CAN_LOCAL, kByCapability, "nothing runs without the daemon"},
-    {"TRIGGER", BUSHD_CAN_TRIGGER, kByCapability,
-     "an edge at a modem line is seen milliseconds later"},
-    {"POSITION_COMPARE", BUSHD_CAN_POSITION_COMPARE, kByCapability, "no line is left for it"},
-    {"EMISSION_burst", BUSHD_CAN_BURST, kByCapability, "there are no slots"},
-    {"EMISSION_common_DIR", BUSHD_CAN_COMMON_DIR, kByCapability, "there is one motor"},
-    {"EMISSION_staggered", BUSHD_CAN_STAGGERED, kByCapability, "there is one motor"},
-    {"EMISSION_phases", BUSHD_CAN_PHASES, kByCapability, "TXD is one line"},
-    {"MOTOR_INPUTS", BUSHD_CAN_MOTOR_INPUTS, kByCapability,
+    {"TABLE_TICKS", BUSHD_CAN_TABLE_TICKS, "there are no slots"},
+    {"LOCAL", BUSHD_CAN_LOCAL, "nothing runs without the daemon"},
+    {"TRIGGER", BUSHD_CAN_TRIGGER, "an edge at a modem line is seen milliseconds later"},
+    {"POSITION_COMPARE", BUSHD_CAN_POSITION_COMPARE, "no line is left for it"},
+    {"EMISSION_burst", BUSHD_CAN_BURST, "there are no slots"},
+    {"EMISSION_common_DIR", BUSHD_CAN_COMMON_DIR, "there is one motor"},
+    {"EMISSION_staggered", BUSHD_CAN_STAGGERED, "there is one motor"},
+    {"EMISSION_phases", BUSHD_CAN_PHASES, "TXD is one line"},
+    {"MOTOR_INPUTS", BUSHD_CAN_MOTOR_INPUTS,
      "`inputs` of the bus names the modem lines that are switches; no request changes them"},
-    {"LINE_RUN", BUSHD_CAN_LINE_RUN, kByCapability, "no tick is common to two ports"},
-    {"LINE_RUN_elementary", BUSHD_CAN_ELEMENTARY, kByCapability, "there is one motor"},
-    {"TRAVEL", BUSHD_CAN_TRAVEL, kByCapability, "nothing runs without the daemon"},
-    {"PROGRAM", BUSHD_CAN_PROGRAM, kByCapability, "nothing runs without the daemon"},
-    {"CURRENTS", BUSHD_CAN_CURRENTS, kByCapability, "there is no chopper"},
-    {"VELOCITY", BUSHD_CAN_VELOCITY, kByCapability, "nothing runs without the daemon"},
-    {"LOCAL_keypad", BUSHD_CAN_KEYPAD, kByCapability, "RXD is not connected"},
-    {"OUTPUTS", BUSHD_CAN_OUTPUTS, kByCapability,
+    {"LINE_RUN", BUSHD_CAN_LINE_RUN, "no tick is common to two ports"},
+    {"LINE_RUN_elementary", BUSHD_CAN_ELEMENTARY, "there is one motor"},
+    {"TRAVEL", BUSHD_CAN_TRAVEL, "nothing runs without the daemon"},
+    {"PROGRAM", BUSHD_CAN_PROGRAM, "nothing runs without the daemon"},
+    {"CURRENTS", BUSHD_CAN_CURRENTS, "there is no chopper"},
+    {"VELOCITY", BUSHD_CAN_VELOCITY, "nothing runs without the daemon"},
+    {"LOCAL_keypad", BUSHD_CAN_KEYPAD, "RXD is not connected"},
+    {"OUTPUTS", BUSHD_CAN_OUTPUTS,
      "`direction_line` of the bus has the level of DIR, and TXD is what it is"},
-    {"volatile_table_bank", BUSHD_CAN_SCRATCH, kByCapability, "no table is uploaded to a port"},
+    {"volatile_table_bank", BUSHD_CAN_SCRATCH, "no table is uploaded to a port"},
 };
 
 // Words of the protocol by capability.

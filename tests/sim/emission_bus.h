@@ -9,6 +9,16 @@
 
 namespace bushd::sim {
 
+inline constexpr std::uint32_t kEightStepsNs = 16'384'000;  // eight T_step of the document
+inline constexpr TimeNs kStepNs = 2'048'000;
+
+inline bushd_emission of_mode(bushd_emission_mode mode, std::uint16_t step_us = 2048) {
+  bushd_emission settings{};
+  settings.mode = mode;
+  settings.step_us = step_us;
+  return settings;
+}
+
 class EmissionBus {
  public:
   explicit EmissionBus(std::uint32_t tick_ns, const McuOptions& options = {},
@@ -25,12 +35,12 @@ class EmissionBus {
     recorder.edges.clear();
   }
 
-  // One row of steps a tick, a column a motor; they begin together, from rest to rest. Fine ticks
-  // make the same steps.
-  void run(const std::vector<std::vector<int>>& rows) {
+  // One row of steps a tick, a column a motor; they begin together, now, from rest to rest. Fine
+  // ticks make the same steps.
+  void begin(const std::vector<std::vector<int>>& rows) {
     const std::size_t motors = rows.front().size();
     const bool fine = format_ == BUSHD_FORMAT_FINE;
-    first_tick = bus.mcu(0).core().tick + 20;
+    const std::uint32_t first_tick = bus.mcu(0).core().tick + 20;
     test::Ticks ticks{
         .flags = static_cast<std::uint8_t>(BUSHD_TICKS_START | (fine ? BUSHD_TICKS_FINE : 0)),
         .first = first_tick,
@@ -43,6 +53,9 @@ class EmissionBus {
     master.post(1, BUSHD_MSG_TICKS, test::ticks_payload(ticks));
     while (bus.mcu(0).core().tick != first_tick) bus.advance_to(bus.next_event_ns());
     start_ns = bus.now_ns();
+  }
+  void run(const std::vector<std::vector<int>>& rows) {
+    begin(rows);
     bus.advance_to(start_ns + static_cast<TimeNs>(rows.size() + 3) * tick_ns_);
     ASSERT_EQ(master.poll(1).moving, 0);
   }
@@ -63,7 +76,6 @@ class EmissionBus {
   Recorder recorder;
   Bus bus;
   FrameMaster master;
-  std::uint32_t first_tick = 0;
   TimeNs start_ns = 0;  // of the rows
 };
 

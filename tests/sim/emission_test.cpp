@@ -47,30 +47,20 @@ std::int64_t sum(const std::vector<Step>& steps) {
   return position;
 }
 
-bushd_emission of_mode(bushd_emission_mode mode, std::uint16_t step_us = 2048) {
-  bushd_emission settings{};
-  settings.mode = mode;
-  settings.step_us = step_us;
-  return settings;
-}
-
 std::vector<TimeNs> rises(const std::vector<Step>& steps, TimeNs from_ns) {
   std::vector<TimeNs> out;
   for (const Step& step : steps) out.push_back(step.rise_ns - from_ns);
   return out;
 }
 
-constexpr std::uint32_t kTickNs = 16'384'000;  // eight T_step of the document
-constexpr TimeNs kStepNs = 2'048'000;
-
 TEST(EmissionOnPins, BurstPulsesTogetherEachStepPeriod) {
-  EmissionBus lab(kTickNs);
+  EmissionBus lab(kEightStepsNs);
   lab.use(of_mode(BUSHD_EMISSION_BURST), 4);
   lab.run({{3, 0, -1, 8}, {1, 2, 0, 0}});
   const auto steps = steps_of(lab.recorder, false);
   using Times = std::vector<TimeNs>;
-  EXPECT_EQ(rises(steps.at(0), lab.start_ns), (Times{0, kStepNs, 2 * kStepNs, kTickNs}));
-  EXPECT_EQ(rises(steps.at(1), lab.start_ns), (Times{kTickNs, kTickNs + kStepNs}));
+  EXPECT_EQ(rises(steps.at(0), lab.start_ns), (Times{0, kStepNs, 2 * kStepNs, kEightStepsNs}));
+  EXPECT_EQ(rises(steps.at(1), lab.start_ns), (Times{kEightStepsNs, kEightStepsNs + kStepNs}));
   EXPECT_EQ(rises(steps.at(2), lab.start_ns), (Times{0}));
   EXPECT_EQ(steps.at(3).size(), 8u);
   EXPECT_EQ(sum(steps.at(0)), 4);
@@ -78,16 +68,16 @@ TEST(EmissionOnPins, BurstPulsesTogetherEachStepPeriod) {
 }
 
 TEST(EmissionOnPins, CommonDirIsLowForLeftMoversAndHighForRightMovers) {
-  EmissionBus lab(kTickNs);
+  EmissionBus lab(kEightStepsNs);
   bushd_emission settings = of_mode(BUSHD_EMISSION_COMMON_DIR);
   settings.dir_setup_us = 20;
   lab.use(settings, 3);
   lab.run({{2, -3, 1}, {-1, 0, 8}});
   const auto steps = steps_of(lab.recorder, true);
   using Times = std::vector<TimeNs>;
-  constexpr TimeNs kSlot = kTickNs / 256;
+  constexpr TimeNs kSlot = kEightStepsNs / 256;
   EXPECT_EQ(rises(steps.at(1), lab.start_ns), (Times{0, kStepNs, 2 * kStepNs}));
-  EXPECT_EQ(rises(steps.at(0), lab.start_ns), (Times{kSlot, kSlot + kStepNs, kTickNs}));
+  EXPECT_EQ(rises(steps.at(0), lab.start_ns), (Times{kSlot, kSlot + kStepNs, kEightStepsNs}));
   EXPECT_EQ(sum(steps.at(0)), 1);
   EXPECT_EQ(sum(steps.at(1)), -3);
   EXPECT_EQ(sum(steps.at(2)), 9);
@@ -101,7 +91,7 @@ TEST(EmissionOnPins, CommonDirIsLowForLeftMoversAndHighForRightMovers) {
 }
 
 TEST(EmissionOnPins, StaggeredPulsesFollowEachOther) {
-  EmissionBus lab(kTickNs);
+  EmissionBus lab(kEightStepsNs);
   bushd_emission settings = of_mode(BUSHD_EMISSION_STAGGERED);
   settings.settle_us = 518;
   lab.use(settings, 4);
@@ -115,7 +105,7 @@ TEST(EmissionOnPins, StaggeredPulsesFollowEachOther) {
 // Figures 16 and 17 of the document: one DIR and a current sensor. Those to the left come first, in
 // pairs of slots; DIR is low for them and high for those to the right.
 TEST(EmissionOnPins, StaggeredPulsesWithACommonDirGoLeftThenRight) {
-  EmissionBus lab(kTickNs);
+  EmissionBus lab(kEightStepsNs);
   bushd_emission settings = of_mode(BUSHD_EMISSION_COMMON_STAGGERED);
   settings.settle_us = 518;
   settings.dir_setup_us = 30;
@@ -123,10 +113,10 @@ TEST(EmissionOnPins, StaggeredPulsesWithACommonDirGoLeftThenRight) {
   lab.run({{1, -1, 2, -1}, {0, 1, 0, -1}});
   const auto steps = steps_of(lab.recorder, true);
   using Times = std::vector<TimeNs>;
-  constexpr TimeNs kSlot = kTickNs / 256;
+  constexpr TimeNs kSlot = kEightStepsNs / 256;
   constexpr TimeNs kApart = 512'000;
-  EXPECT_EQ(rises(steps.at(1), lab.start_ns), (Times{0, kTickNs + 640'000 + kSlot}));
-  EXPECT_EQ(rises(steps.at(3), lab.start_ns), (Times{kApart, kTickNs}));
+  EXPECT_EQ(rises(steps.at(1), lab.start_ns), (Times{0, kEightStepsNs + 640'000 + kSlot}));
+  EXPECT_EQ(rises(steps.at(3), lab.start_ns), (Times{kApart, kEightStepsNs}));
   EXPECT_EQ(rises(steps.at(0), lab.start_ns), (Times{2 * kApart + kSlot}));
   EXPECT_EQ(rises(steps.at(2), lab.start_ns), (Times{3 * kApart + kSlot, kStepNs + kSlot}));
   EXPECT_EQ(sum(steps.at(0)), 1);
@@ -143,7 +133,7 @@ TEST(EmissionOnPins, StaggeredPulsesWithACommonDirGoLeftThenRight) {
 // together with another, and the current has settled where there is time for it.
 TEST(EmissionOnPins, StaggeredPulsesWithACommonDirNeverTurnBackWithinAStep) {
   std::mt19937 random(11);
-  EmissionBus lab(kTickNs);
+  EmissionBus lab(kEightStepsNs);
   bushd_emission settings = of_mode(BUSHD_EMISSION_COMMON_STAGGERED);
   settings.settle_us = 200;
   lab.use(settings, 6);
@@ -167,7 +157,7 @@ TEST(EmissionOnPins, StaggeredPulsesWithACommonDirNeverTurnBackWithinAStep) {
       if (it->first / kStepNs != next->first / kStepNs) continue;
       EXPECT_FALSE(it->second && !next->second) << "back to the left at " << next->first;
       // Six times 0.256 ms, two pairs, is less than T_step.
-      EXPECT_EQ(next->first - it->first - (next->second != it->second ? kTickNs / 256 : 0),
+      EXPECT_EQ(next->first - it->first - (next->second != it->second ? kEightStepsNs / 256 : 0),
                 256'000);
     }
   }
@@ -359,18 +349,10 @@ TEST(EmissionOnPins, AnotherModeTakesTheLevelsAway) {
 
 TEST(EmissionOnPins, StepsOfATickThatAResetCutsAreThoseThatWereMade) {
   for (const bushd_emission_mode mode : {BUSHD_EMISSION_BURST, BUSHD_EMISSION_PHASES}) {
-    EmissionBus lab(kTickNs);
+    EmissionBus lab(kEightStepsNs);
     lab.use(of_mode(mode), 1);
-    lab.first_tick = lab.bus.mcu(0).core().tick + 5;
-    lab.master.post(1, BUSHD_MSG_TICKS,
-                    test::ticks_payload({.flags = BUSHD_TICKS_START,
-                                         .first = lab.first_tick,
-                                         .displacements = {0x88},
-                                         .delays = {0}}));
-    while (lab.bus.mcu(0).core().tick != lab.first_tick) {
-      lab.bus.advance_to(lab.bus.next_event_ns());
-    }
-    lab.bus.advance_to(lab.bus.now_ns() + kTickNs / 2);
+    lab.begin({{8}});
+    lab.bus.advance_to(lab.bus.now_ns() + kEightStepsNs / 2);
     lab.bus.reboot(0, 1'000'000);
     EXPECT_EQ(lab.bus.mcu(0).shaft(0).position_steps, mode == BUSHD_EMISSION_BURST ? 5 : 4);
   }

@@ -13,19 +13,9 @@
 namespace bushd::sim::supply_current_test {
 namespace {
 
-constexpr std::uint32_t kTickNs = 16'384'000;  // eight T_step
-constexpr TimeNs kStepNs = 2'048'000;
-
-bushd_emission of_mode(bushd_emission_mode mode) {
-  bushd_emission settings{};
-  settings.mode = mode;
-  settings.step_us = 2048;
-  return settings;
-}
-
 // The largest deviation from the mean of quiet times, of a move of four motors in full swing.
 double peak_deviation(const bushd_emission& settings, const SupplyRules& rules) {
-  EmissionBus lab(kTickNs, {.supply = rules});
+  EmissionBus lab(kEightStepsNs, {.supply = rules});
   lab.use(settings, 4);
   lab.settle();
   const SupplyCurrent& supply = lab.bus.mcu(0).supply();
@@ -37,7 +27,7 @@ double peak_deviation(const bushd_emission& settings, const SupplyRules& rules) 
   lab.run({{8, 8, -8, 8}, {8, 8, -8, 8}, {8, 8, -8, 8}});
   double peak = 0;
   // The memory of the model reaches back so far.
-  for (TimeNs t = lab.start_ns; t < lab.start_ns + 3 * TimeNs{kTickNs}; t += 2'000) {
+  for (TimeNs t = lab.start_ns; t < lab.start_ns + 3 * TimeNs{kEightStepsNs}; t += 2'000) {
     peak = std::max(peak, std::abs(supply.current_a(t) - mean));
   }
   return peak;
@@ -97,7 +87,7 @@ TEST(SupplyCurrent, FirmwareMeasuresItsSettlingTimeBeforeWork) {
   for (const TimeNs settle_ns : {200'000, 518'000, 1'500'000}) {
     SupplyRules rules;
     rules.settle_ns = settle_ns;
-    EmissionBus lab(kTickNs, {.supply = rules});
+    EmissionBus lab(kEightStepsNs, {.supply = rules});
     lab.use(of_mode(BUSHD_EMISSION_STAGGERED), 4);
     EXPECT_EQ(lab.master.poll(1).state, BUSHD_STATE_BUSY);
     lab.settle();
@@ -122,7 +112,7 @@ TEST(SupplyCurrent, FirmwareMeasuresItsSettlingTimeBeforeWork) {
 TEST(SupplyCurrent, StepThatNobodyFeelsLeavesTheTimeUnknown) {
   SupplyRules rules;
   rules.drop_a = rules.overshoot_a = 0.01;
-  EmissionBus lab(kTickNs, {.supply = rules});
+  EmissionBus lab(kEightStepsNs, {.supply = rules});
   lab.use(of_mode(BUSHD_EMISSION_STAGGERED), 4);
   lab.settle();
   const bushd_report report = lab.master.poll(1);
@@ -132,23 +122,23 @@ TEST(SupplyCurrent, StepThatNobodyFeelsLeavesTheTimeUnknown) {
   lab.run({{1, 1, 1, 0}});
   for (std::uint8_t m = 0; m < 3; ++m) {
     EXPECT_EQ(lab.recorder.times(0, Signal::kStep, m, true).at(0) - lab.start_ns,
-              kTickNs / 256 * (m * 32 / 3))
+              kEightStepsNs / 256 * (m * 32 / 3))
         << "spread over the whole T_step";
   }
 }
 
 TEST(SupplyCurrent, NothingIsMeasuredWithoutEnOrWithATimeThatIsGiven) {
-  EmissionBus lab(kTickNs, {.supply = SupplyRules{}});
+  EmissionBus lab(kEightStepsNs, {.supply = SupplyRules{}});
   bushd_emission settings = of_mode(BUSHD_EMISSION_STAGGERED);
   settings.settle_us = 518;
   lab.use(settings, 4);
   EXPECT_EQ(lab.master.poll(1).state, BUSHD_STATE_READY);
-  lab.bus.advance_to(lab.bus.now_ns() + 40 * TimeNs{kTickNs});
+  lab.bus.advance_to(lab.bus.now_ns() + 40 * TimeNs{kEightStepsNs});
   EXPECT_EQ(lab.bus.mcu(0).shaft(0).travel_steps, 0u);
 
   ASSERT_EQ(lab.master.acknowledged(1, bushd_control{BUSHD_CONTROL_DISABLE, 0}), BUSHD_OK);
   lab.use(of_mode(BUSHD_EMISSION_STAGGERED), 4);
-  lab.bus.advance_to(lab.bus.now_ns() + 40 * TimeNs{kTickNs});
+  lab.bus.advance_to(lab.bus.now_ns() + 40 * TimeNs{kEightStepsNs});
   EXPECT_EQ(lab.bus.mcu(0).shaft(0).travel_steps, 0u);
   ASSERT_EQ(lab.master.acknowledged(1, bushd_control{BUSHD_CONTROL_ENABLE, 0}), BUSHD_OK);
   lab.settle();

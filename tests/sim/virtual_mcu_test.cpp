@@ -11,9 +11,8 @@ constexpr std::uint32_t kAll =
 
 class DisabledCapability : public McuAlone, public testing::WithParamInterface<std::uint32_t> {
  protected:
-  DisabledCapability() : McuAlone(kBaud, 0) {
+  DisabledCapability() : McuAlone(kBaud, kTickNs) {
     bus_.add_mcu({.address = kAddress, .disabled_capabilities = GetParam()});
-    pass(kTickNs);
   }
 
   std::uint32_t capabilities() {

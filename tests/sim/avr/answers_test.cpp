@@ -9,7 +9,6 @@ class AvrAnswers : public AvrAlone {};
 
 TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
   constexpr TimeNs kByteNs = TimeNs{10'000'000'000} / kBaud;
-  pass(kBootNs);
   ASSERT_NO_FATAL_FAILURE(make_ready());
   run(3, 10'000);  // slots interrupt it all the time
   pass(50 * TimeNs{kTickNs});
@@ -31,7 +30,6 @@ TEST_F(AvrAnswers, BeginWithinATickInWhateverPhaseTheyAreAskedFor) {
 // An answer that waits for its window lies where frames are received.
 TEST_F(AvrAnswers, AreWholeWhateverPassesByBefore) {
   constexpr std::uint8_t kOther = 9;
-  pass(kBootNs);
   ASSERT_NO_FATAL_FAILURE(make_ready());
   Random random(2, 0);
   const auto longest = [&] {
@@ -82,7 +80,6 @@ TEST_F(AvrAnswers, AreWholeWhateverPassesByBefore) {
 
 TEST_F(AvrAnswers, FollowFramesOfEveryLength) {
   constexpr std::uint8_t kUnknown = 0x7E;
-  pass(kBootNs);
   for (std::size_t size = 0; size <= BUSHD_FRAME_MAX_PAYLOAD; ++size) {
     const Bytes payload(size, static_cast<std::uint8_t>(size));
     const auto answer = master_.request(kAddress, kUnknown, payload);

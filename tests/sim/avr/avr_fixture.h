@@ -60,7 +60,7 @@ class AvrAlone : public McuAlone {
   AvrMcu* avr_ = nullptr;
 };
 
-// The image for ATmega1284P with a power stage behind its pins, booted.
+// The image for ATmega1284P with a power stage behind its pins.
 class Atmega1284pAlone : public McuAlone {
  protected:
   explicit Atmega1284pAlone(const PowerStageRules& rules = {}) : McuAlone(kBaud, 300'000'000) {
@@ -69,7 +69,6 @@ class Atmega1284pAlone : public McuAlone {
                                   .memory_owners = ATMEGA1284P_MEMORY_OWNERS,
                                   .chip = "atmega1284p",
                                   .power_stage = rules});
-    pass(boot_ns_);
   }
 
   AvrMcu* avr_ = nullptr;

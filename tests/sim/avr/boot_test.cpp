@@ -8,7 +8,6 @@ namespace {
 class AvrBoot : public AvrAlone {};
 
 TEST_F(AvrBoot, FindsNoFaultInAGoodChip) {
-  pass(kBootNs);
   EXPECT_EQ(master_.poll(kAddress).faults, 0);
 }
 
@@ -31,13 +30,13 @@ TEST_F(AvrBoot, ABitOfTheProgramThatHasFlippedKeepsMotorsOff) {
 // In the queue, where the MCU works all the same.
 TEST_F(AvrBoot, ABitOfRamThatIsStuckKeepsMotorsOff) {
   avr_->stick_ram_bit(0x900, 3);
-  pass(kBootNs);
+  reboot();
   EXPECT_EQ(master_.poll(kAddress).failed_tests, BUSHD_TEST_RAM);
 }
 
 TEST_F(AvrBoot, AnInputThatIsShortedToTheSupplyKeepsMotorsOff) {
   avr_->short_motor_input(5);
-  pass(kBootNs);
+  reboot();
   const bushd_report report = master_.poll(kAddress);
   EXPECT_EQ(report.faults, BUSHD_FAULT_SELF_TEST);
   EXPECT_EQ(report.failed_tests, BUSHD_TEST_INPUTS);
@@ -46,12 +45,11 @@ TEST_F(AvrBoot, AnInputThatIsShortedToTheSupplyKeepsMotorsOff) {
 // A motor may stand on its switch.
 TEST_F(AvrBoot, AnInputThatIsActiveIsNoFault) {
   avr_->set_inputs({0xFFFF, BUSHD_SYSTEM_INPUTS});
-  pass(kBootNs);
+  reboot();
   EXPECT_EQ(master_.poll(kAddress).faults, 0);
 }
 
 TEST_F(AvrBoot, TellsWhyItBooted) {
-  pass(kBootNs);
   EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_POWER_ON);
   reboot();
   EXPECT_EQ(master_.poll(kAddress).reset_cause, BUSHD_RESET_EXTERNAL);
@@ -69,7 +67,6 @@ INSTANTIATE_TEST_SUITE_P(Hangs, AvrWatchdog,
                          [](auto& hang) { return hang.param.name; });
 
 TEST_P(AvrWatchdog, BootsAnMcuThatHangsInMotionAnew) {
-  pass(kBootNs);
   ASSERT_NO_FATAL_FAILURE(make_ready());
   run(3, 10'000);
   pass(100 * TimeNs{kTickNs});
@@ -101,7 +98,6 @@ TEST_P(AvrWatchdog, BootsAnMcuThatHangsInMotionAnew) {
 
 // The work of a stop must not grow with what is left of the run.
 TEST_F(AvrBoot, TheWatchdogLeavesAnEmergencyStopOfALongRunAlone) {
-  pass(kBootNs);
   ASSERT_NO_FATAL_FAILURE(make_ready());
   run(3, 1'000'000);
   pass(100 * TimeNs{kTickNs});
@@ -117,7 +113,6 @@ TEST_F(AvrBoot, TheWatchdogLeavesAnEmergencyStopOfALongRunAlone) {
 
 // No request comes, for longer than the watchdog waits; nothing moves.
 TEST_F(AvrBoot, TheWatchdogLeavesAnIdleMcuAlone) {
-  pass(kBootNs);
   const std::uint16_t boot_number = master_.poll(kAddress).boot_number;
   pass(2'000'000'000);
   EXPECT_EQ(master_.poll(kAddress).boot_number, boot_number);

@@ -30,7 +30,8 @@ struct Load {
 
 class AvrFigures : public AvrAlone, public testing::WithParamInterface<Load> {
  protected:
-  AvrFigures() : AvrAlone(1'000'000, 0) { pass(300'000'000); }
+  AvrFigures() : AvrAlone(1'000'000, 0) {}
+  void SetUp() override { pass(300'000'000); }
 
   // As long as bushd makes them.
   int ticks_per_frame() const {

@@ -10,7 +10,7 @@ constexpr std::uint32_t kFastBaud = 1'000'000;
 
 class AvrFlooded : public AvrAlone {
  protected:
-  AvrFlooded() : AvrAlone(kFastBaud) { pass(kBootNs); }
+  AvrFlooded() : AvrAlone(kFastBaud) {}
 
   // The answer to a question behind it.
   bool answers_after(const Bytes& flood) {

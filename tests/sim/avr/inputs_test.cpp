@@ -4,10 +4,7 @@
 namespace bushd::sim::inputs_test {
 namespace {
 
-class AvrInputs : public AvrAlone {
- protected:
-  AvrInputs() { pass(kBootNs); }
-};
+class AvrInputs : public AvrAlone {};
 
 TEST_F(AvrInputs, OpenSwitchesAreInactive) {
   const bushd_report report = master_.poll(kAddress);

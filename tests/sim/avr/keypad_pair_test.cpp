@@ -37,7 +37,6 @@ constexpr Kind kSwitchAndKey{KEYPAD_SWITCH_IMAGE, "-switch-", "250000000 -500000
 class KeypadPair : public AvrAlone {
  protected:
   explicit KeypadPair(const Kind& kind = kFourKeys) : AvrAlone(kBaud, 6, kind.motor), kind_(kind) {
-    pass(kBootNs);
     if (const char* path = std::getenv("BUSHD_KEYPAD_TRACE")) {
       out_.open(path, std::ios::app);
       EXPECT_TRUE(out_);

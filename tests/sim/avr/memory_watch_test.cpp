@@ -14,8 +14,6 @@ using testing::HasSubstr;
 
 class AvrMemoryWatched : public AvrAlone {
  protected:
-  AvrMemoryWatched() : map_(AVR_IMAGES "-500000.elf", AVR_MEMORY_OWNERS) { pass(kBootNs); }
-
   void poke(std::uint16_t address, std::uint16_t value) {
     avr_->poke(address, static_cast<std::uint8_t>(value));
     avr_->poke(static_cast<std::uint16_t>(address + 1), static_cast<std::uint8_t>(value >> 8));
@@ -37,7 +35,7 @@ class AvrMemoryWatched : public AvrAlone {
     pass(100 * TimeNs{kTickNs});
   }
 
-  AvrMemoryMap map_;
+  AvrMemoryMap map_{AVR_IMAGES "-500000.elf", AVR_MEMORY_OWNERS};
 };
 
 TEST_F(AvrMemoryWatched, FindsNothingInGoodWork) {

@@ -8,8 +8,6 @@ namespace {
 
 class AvrNvm : public AvrAlone {
  protected:
-  AvrNvm() { pass(kBootNs); }
-
   static std::vector<std::uint16_t> ramp(std::uint16_t first, std::size_t count) {
     std::vector<std::uint16_t> codes;
     while (codes.size() < count) codes.push_back(first--);

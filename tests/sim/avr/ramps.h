@@ -56,7 +56,6 @@ class AvrRamps : public AvrAlone {
   };
 
   void make_ready(const RampLoad& load) {
-    pass(kBootNs);
     ASSERT_NO_FATAL_FAILURE(master_.bring_up(load.tick_ns, load.format));
     ASSERT_NO_FATAL_FAILURE(
         master_.upload_table(kAddress, 0, load.unit_ns, ramp_to(load.cruise), load.cruise));

@@ -62,7 +62,6 @@ class AvrStoppedRun : public AvrAlone, public testing::WithParamInterface<std::u
 
 TEST_P(AvrStoppedRun, RampsDownFromTheStepThatRuns) {
   constexpr std::uint32_t kLong = 20'000;
-  pass(kBootNs);
   ASSERT_NO_FATAL_FAILURE(make_ready());
   run(0, kLong);
   pass(GetParam() * TimeNs{kTickNs});

@@ -11,20 +11,16 @@ namespace bushd::sim {
 class QemuAlone : public McuAlone {
  protected:
   static constexpr std::uint16_t kBoots = 41;
-  static constexpr TimeNs kBootNs = 100'000'000;
 
   explicit QemuAlone(std::uint32_t baud = kBaud) : QemuAlone(baud, image_path(baud)) {}
   QemuAlone(std::uint32_t baud, const std::string& image, std::uint16_t recorded_boots = 1)
-      : McuAlone(baud, kBootNs) {
+      : McuAlone(baud, 100'000'000) {
     qemu_ = add<QemuMcu>(QemuOptions{.image = image,
                                      .address = kAddress,
                                      .boots = kBoots,
                                      .recorded_boots = recorded_boots,
                                      .memory_owners = LM3S_MEMORY_OWNERS});
   }
-
-  // Some faults of the chip must be there before it boots: those of a constructor are.
-  void SetUp() override { pass(kBootNs); }
 
   static std::string image_path(std::uint32_t baud) {
     return LM3S_IMAGES "-" + std::to_string(baud) + ".elf";
