@@ -60,14 +60,8 @@ TEST_P(KeptProgram, IsThereAfterAResetAndWaitsToBeRun) {
 TEST_P(KeptProgram, IsRefusedWhereNothingOutlivesAReset) {
   ReadyRig none(law, format, {.keeps_programs = false});
   const Bytes bytes = bytes_of(to_and_fro(kKept));
-  Bytes payload;
-  append(payload, 0, 2);
-  append(payload, bytes.size(), 2);
-  payload.insert(payload.end(), bytes.begin(), bytes.end());
-  ASSERT_EQ(none.request(BUSHD_MSG_PROGRAM_PUT, payload), BUSHD_OK);
-  payload = {BUSHD_PROGRAM_COMMIT, 0};
-  append(payload, crc32(bytes), 4);
-  EXPECT_EQ(none.request(BUSHD_MSG_PROGRAM, payload), BUSHD_E_CAPACITY);
+  ASSERT_EQ(put(none, bytes, 0, bytes.size()), BUSHD_OK);
+  EXPECT_EQ(commit(none, bytes), BUSHD_E_CAPACITY);
 }
 
 // A scan that had passed by the program before it changed tells nothing.

@@ -62,8 +62,7 @@ TEST_P(Keypad, ADirectionCountsUntilTheNextKeyWithTheFirstSpeed) {
     EXPECT_EQ(rig.poll().running, 0) << "not for a master to end";
     EXPECT_EQ(rig.keypad_display(), "0300\n");
     expect_steps(3'000'000, direction, 190);
-    press(kKeyStop, 1);
-    expect_rest_as_counted();
+    expect_counted_after_stop();
     EXPECT_EQ(rig.keypad_display(), "0300\n");
   }
 }
@@ -95,8 +94,7 @@ TEST_P(Keypad, SlowerInMotionIsARampDownAndANewBeginning) {
   int steps = 0;
   for (std::size_t i = 100; i < 199; ++i) steps += rig.history(1)[i];
   EXPECT_NEAR(steps, 99 * 2.56 / 3.3, 1.0);
-  press(kKeyStop, 1);
-  expect_rest_as_counted();
+  expect_counted_after_stop();
 }
 
 // The period of the loop is in 25 us: 3 ms are 120 of them, 3.3 ms 132.
@@ -145,8 +143,7 @@ TEST_P(Keypad, ABrokenLineEndsMotionUntilAKeyIsPressed) {
   EXPECT_EQ(rig.poll().autonomous, 0);
   press(kKeyForward, 60);
   EXPECT_EQ(rig.poll().autonomous, kMotors);
-  press(kKeyStop, 1);
-  expect_rest_as_counted();
+  expect_counted_after_stop();
 }
 
 TEST_P(Keypad, OtherBytesMeanNothing) {

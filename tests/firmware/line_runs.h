@@ -92,10 +92,10 @@ class OfLines : public Streams {
                     .steps = of.steps == 0 ? of.longest - of.from : of.steps,
                     .count = 0,
                     .entries = nullptr};
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(bushd_encode_line_run(
-        &message, entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
-    return payload;
+    return payload_of([&](std::uint8_t* to) {
+      return bushd_encode_line_run(&message, entries.data(),
+                                   static_cast<std::uint8_t>(entries.size()), to);
+    });
   }
   static bushd_status start(Rig& on, const Frame& of) {
     return on.take(BUSHD_MSG_LINE_RUN, frame(of));

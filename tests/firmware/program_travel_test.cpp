@@ -144,14 +144,8 @@ TEST_P(ProgramTravel, AnMcuThatDoesNotTravelTakesNone) {
   EXPECT_EQ(other.identify().capabilities & BUSHD_CAN_TRAVEL, 0u);
   other.mutable_mcu()->config.program->stage = BUSHD_PROGRAM_NONE;
   const Bytes bytes = bytes_of(alone({travel(), kProgramEnd}));
-  Bytes put;
-  append(put, 0, 2);
-  append(put, bytes.size(), 2);
-  put.insert(put.end(), bytes.begin(), bytes.end());
-  ASSERT_EQ(other.request(BUSHD_MSG_PROGRAM_PUT, put), BUSHD_OK);
-  Bytes commit = {BUSHD_PROGRAM_COMMIT, 0};
-  append(commit, crc32(bytes), 4);
-  EXPECT_EQ(other.request(BUSHD_MSG_PROGRAM, commit), BUSHD_E_UNKNOWN_MESSAGE);
+  ASSERT_EQ(put(other, bytes, 0, bytes.size()), BUSHD_OK);
+  EXPECT_EQ(commit(other, bytes), BUSHD_E_UNKNOWN_MESSAGE);
 }
 
 // It waits for its own delay, whatever a program asks for meanwhile.
@@ -172,11 +166,10 @@ TEST_P(ProgramTravel, AnotherMotorsTravelIsNotBegunByARefusedOne) {
                                 .steps = 50,
                                 .delay_us = 100'000,
                                 .wait_us = 200'000};
-  ASSERT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload_of(message, bushd_encode_travel)), BUSHD_OK);
+  ASSERT_EQ(rig.request(message), BUSHD_OK);
   rig.trigger(0);
   ASSERT_EQ(rig.mcu().travel.stage, BUSHD_TRAVEL_DELAY);
-  ASSERT_EQ(load(alone({travel(), kProgramEnd})), BUSHD_OK);
-  ASSERT_EQ(start(rig.first_open()), BUSHD_OK);
+  begin(alone({travel(), kProgramEnd}));
   pass(10);
   EXPECT_EQ(state().reason, BUSHD_PROGRAM_REFUSED);
   EXPECT_EQ(rig.mcu().travel.stage, BUSHD_TRAVEL_DELAY);

@@ -283,12 +283,24 @@ class Programs : public OfLines {
  protected:
   using OfLines::OfLines;
 
-  bushd_status put(const Bytes& part, std::size_t offset, std::size_t total) {
+  static bushd_status put(Rig& on, const Bytes& part, std::size_t offset, std::size_t total) {
     Bytes payload;
     append(payload, offset, 2);
     append(payload, total, 2);
     payload.insert(payload.end(), part.begin(), part.end());
-    return rig.request(BUSHD_MSG_PROGRAM_PUT, payload);
+    return on.request(BUSHD_MSG_PROGRAM_PUT, payload);
+  }
+  static bushd_status commit(Rig& on, const Bytes& bytes) {
+    return control(on, BUSHD_PROGRAM_COMMIT, 0, crc32(bytes));
+  }
+  static bushd_status control(Rig& on, std::uint8_t action, std::uint8_t number,
+                              std::uint32_t value) {
+    Bytes payload = {action, number};
+    append(payload, value, 4);
+    return on.request(BUSHD_MSG_PROGRAM, payload);
+  }
+  bushd_status put(const Bytes& part, std::size_t offset, std::size_t total) {
+    return put(rig, part, offset, total);
   }
   bushd_status upload(const Bytes& bytes, std::size_t part = 100) {
     for (std::size_t at = 0; at < bytes.size(); at += part) {
@@ -301,11 +313,9 @@ class Programs : public OfLines {
     return BUSHD_OK;
   }
   bushd_status control(std::uint8_t action, std::uint8_t number = 0, std::uint32_t value = 0) {
-    Bytes payload = {action, number};
-    append(payload, value, 4);
-    return rig.request(BUSHD_MSG_PROGRAM, payload);
+    return control(rig, action, number, value);
   }
-  bushd_status commit(const Bytes& bytes) { return control(BUSHD_PROGRAM_COMMIT, 0, crc32(bytes)); }
+  bushd_status commit(const Bytes& bytes) { return commit(rig, bytes); }
   bushd_status load(const ProgramText& text) {
     const Bytes bytes = bytes_of(text);
     const bushd_status status = upload(bytes);

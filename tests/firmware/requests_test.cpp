@@ -8,10 +8,9 @@ namespace bushd::test {
 namespace {
 
 Bytes poll_of(const std::vector<bushd_poll_entry>& entries) {
-  Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-  payload.resize(
-      bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), payload.data()));
-  return payload;
+  return payload_of([&](std::uint8_t* to) {
+    return bushd_encode_poll(entries.data(), static_cast<std::uint8_t>(entries.size()), to);
+  });
 }
 
 Bytes identify_of(std::uint16_t salt, std::uint8_t windows, std::uint16_t units) {

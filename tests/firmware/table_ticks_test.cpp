@@ -9,11 +9,10 @@ class TableTicks : public Streams {
  protected:
   Bytes state_frame(const Ticks& head, std::uint16_t count,
                     std::vector<bushd_table_ticks_entry> entries) const {
-    Bytes payload(BUSHD_FRAME_MAX_PAYLOAD);
-    payload.resize(
-        bushd_encode_table_ticks(head.epoch, head.flags, head.first, count, entries.data(),
-                                 static_cast<std::uint8_t>(entries.size()), payload.data()));
-    return payload;
+    return payload_of([&](std::uint8_t* to) {
+      return bushd_encode_table_ticks(head.epoch, head.flags, head.first, count, entries.data(),
+                                      static_cast<std::uint8_t>(entries.size()), to);
+    });
   }
   bushd_status take_state(Rig& on, const Ticks& head, std::uint16_t count,
                           const std::vector<bushd_table_ticks_entry>& entries) const {
@@ -39,10 +38,8 @@ BUSHD_IN_BOTH_FORMATS(TableTicks);
 
 TEST_P(TableTicks, EqualTicksForAnyRunFromAnyTick) {
   holds("two MCUs, one hears displacements, the other run states", [this] {
-    Rig by_ticks;
-    Rig by_states;
-    by_ticks.make_ready(law, format);
-    by_states.make_ready(law, format);
+    ReadyRig by_ticks(law, format);
+    ReadyRig by_states(law, format);
     bushd_run run;
     const int direction = between(0, 1) != 0 ? 1 : -1;
     const bool lead = between(0, 3) == 0;

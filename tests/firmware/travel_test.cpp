@@ -37,9 +37,7 @@ class Travel : public Streams {
     ASSERT_EQ(rig.set_inputs(settings), BUSHD_OK);
     ASSERT_EQ(rig.motor_inputs({kTraveller, 1, 2, 1}), BUSHD_OK);
   }
-  bushd_status request(const bushd_travel& message) {
-    return rig.request(BUSHD_MSG_TRAVEL, payload_of(message, bushd_encode_travel));
-  }
+  bushd_status request(const bushd_travel& message) { return rig.request(message); }
   // From the left limit, with a delay of 20 ms before the return.
   bushd_travel once(std::uint32_t steps = kWay) {
     return {++number_, BUSHD_TRAVEL_LIMITS, kTraveller, 1, BUSHD_EDGE_NONE, 0, steps, 0, 20'000};
@@ -375,8 +373,7 @@ TEST(TravelOfASmallMcu, IsUnknown) {
   ReadyRig rig(ramp_law(), BUSHD_FORMAT_FINE, {.disabled_capabilities = BUSHD_CAN_TRAVEL});
   EXPECT_EQ(rig.identify().capabilities & BUSHD_CAN_TRAVEL, 0);
   const bushd_travel message = {1, BUSHD_TRAVEL_STEP, 0, 1, BUSHD_EDGE_NONE, 0, 1, 0, 50};
-  EXPECT_EQ(rig.request(BUSHD_MSG_TRAVEL, payload_of(message, bushd_encode_travel)),
-            BUSHD_E_UNKNOWN_MESSAGE);
+  EXPECT_EQ(rig.request(message), BUSHD_E_UNKNOWN_MESSAGE);
 }
 
 TEST_P(Travel, IsRefusedWhereItsStepsAreNotCounted) {
