@@ -8,12 +8,6 @@ namespace {
 
 constexpr std::size_t kCodes = 3;
 
-std::vector<std::uint16_t> long_ramp() {
-  std::vector<std::uint16_t> codes;
-  while (codes.size() < 900) codes.push_back(static_cast<std::uint16_t>(2000 - codes.size()));
-  return codes;
-}
-
 class Nvm : public McuAlone, public testing::WithParamInterface<Target> {
  protected:
   Nvm() : McuAlone(kBaud, 300'000'000), real_(GetParam().make()) {
@@ -57,7 +51,7 @@ BUSHD_FOR_TARGETS(Nvm, targets());
 
 TEST_P(Nvm, TablesAndSettingsOutliveAReset) {
   ASSERT_NO_FATAL_FAILURE(make_ready());
-  const std::vector<std::uint16_t> ramp = long_ramp();
+  const std::vector<std::uint16_t> ramp = falling_codes(2000, 900);
   ASSERT_NO_FATAL_FAILURE(master_.upload_table(kAddress, 5, 10'000, ramp, 1100));
   bushd_set_inputs inputs{};
   inputs.system_inverted = BUSHD_INPUT_FORWARD;
@@ -188,13 +182,7 @@ class NvmProgram : public Nvm {
   bushd_status control(std::uint8_t action, std::uint32_t value) {
     return ask(bushd_program_control{action, 0, value});
   }
-  bushd_program_state state() {
-    bushd_program_state state{};
-    const auto reply = master_.request(kAddress, BUSHD_MSG_PROGRAM_STATE, Bytes{});
-    EXPECT_TRUE(reply && bushd_decode_program_state(reply->payload.data(), reply->payload.size(),
-                                                    &state) == BUSHD_OK);
-    return state;
-  }
+  bushd_program_state state() { return master_.program_state(kAddress); }
 };
 BUSHD_FOR_TARGETS(NvmProgram, targets_with(BUSHD_CAN_PROGRAM));
 
@@ -261,7 +249,7 @@ BUSHD_FOR_TARGETS(NvmScratch, targets_with(BUSHD_CAN_SCRATCH));
 
 TEST_P(NvmScratch, ATableForLinesIsNotKeptAndLeavesTheOthersAlone) {
   ASSERT_NO_FATAL_FAILURE(
-      master_.upload_table(kAddress, BUSHD_SCRATCH_BANK, 10'000, long_ramp(), 1100));
+      master_.upload_table(kAddress, BUSHD_SCRATCH_BANK, 10'000, falling_codes(2000, 900), 1100));
   expect_only_the_other_table_is_kept();
 }
 

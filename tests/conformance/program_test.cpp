@@ -62,17 +62,10 @@ class ProgramScript : public TargetScript {
   void control(std::uint8_t action, std::uint8_t number = 0, std::uint32_t value = 0) {
     ASSERT_NO_FATAL_FAILURE(ask(bushd_program_control{action, number, value}));
   }
-  bushd_program_state state(std::uint8_t address) {
-    bushd_program_state state{};
-    const auto reply = master_.request(address, BUSHD_MSG_PROGRAM_STATE, Bytes{});
-    EXPECT_TRUE(reply && bushd_decode_program_state(reply->payload.data(), reply->payload.size(),
-                                                    &state) == BUSHD_OK);
-    return state;
-  }
   void expect_alike() {
     Script::expect_alike({kFirst, kSecond});
-    const bushd_program_state expected = state(kVirtual);
-    const bushd_program_state told = state(kReal);
+    const bushd_program_state expected = master_.program_state(kVirtual);
+    const bushd_program_state told = master_.program_state(kReal);
     EXPECT_EQ(told.stage, expected.stage);
     EXPECT_EQ(told.reason, expected.reason);
     EXPECT_EQ(told.frame, expected.frame);
@@ -100,9 +93,9 @@ TEST_P(ProgramScript, GoesOnInSilenceAsItsTwinDoes) {
   ASSERT_NO_FATAL_FAILURE(load(program(BUSHD_PROGRAM_WITHOUT_HOST)));
   ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_RUN, 1, master_.poll(kReal).tick + 40));
   pass_ticks(4000);
-  EXPECT_EQ(state(kReal).stage, BUSHD_PROGRAM_ENDED);
-  EXPECT_EQ(state(kReal).reason, BUSHD_PROGRAM_DONE);
-  EXPECT_EQ(state(kReal).repeats, 3u);
+  EXPECT_EQ(master_.program_state(kReal).stage, BUSHD_PROGRAM_ENDED);
+  EXPECT_EQ(master_.program_state(kReal).reason, BUSHD_PROGRAM_DONE);
+  EXPECT_EQ(master_.program_state(kReal).repeats, 3u);
   EXPECT_EQ(master_.poll(kReal).motor[kFirst].position_steps, 150 - 90);
   EXPECT_EQ(master_.poll(kReal).motor[kSecond].position_steps, 40);
   EXPECT_EQ(recorder_.times(1, Signal::kPositionCompare, 0, true).size(), 3u);
@@ -138,8 +131,8 @@ TEST_P(ProgramScript, AnInputEndsAMoveAsAtItsTwin) {
   pass_ticks(60);
   set_inputs({0, 0});
   pass_ticks(200);
-  EXPECT_EQ(state(kReal).stage, BUSHD_PROGRAM_ENDED);
-  EXPECT_EQ(state(kReal).reason, BUSHD_PROGRAM_DONE);
+  EXPECT_EQ(master_.program_state(kReal).stage, BUSHD_PROGRAM_ENDED);
+  EXPECT_EQ(master_.program_state(kReal).reason, BUSHD_PROGRAM_DONE);
   const std::int32_t position = master_.poll(kReal).motor[kFirst].position_steps;
   EXPECT_GT(position, 60);
   EXPECT_LT(position, 1800);
@@ -158,8 +151,8 @@ TEST_P(ProgramScript, StopsOnRequest) {
   }
   ASSERT_NO_FATAL_FAILURE(control(BUSHD_PROGRAM_STOP));
   pass_ticks(150);
-  EXPECT_EQ(state(kReal).stage, BUSHD_PROGRAM_ENDED);
-  EXPECT_EQ(state(kReal).reason, BUSHD_PROGRAM_STOPPED);
+  EXPECT_EQ(master_.program_state(kReal).stage, BUSHD_PROGRAM_ENDED);
+  EXPECT_EQ(master_.program_state(kReal).reason, BUSHD_PROGRAM_STOPPED);
   // Each was asked in a tick of its own, so what they made differs: the counts are those of the
   // pins.
   for (const std::uint8_t motor : {kFirst, kSecond}) {

@@ -22,6 +22,22 @@ namespace bushd::sim {
 using Bytes = std::vector<std::uint8_t>;
 using test::payload_of;
 
+// What these bytes say; nothing if they are no such message.
+template <class Message>
+std::optional<Message> decoded(const Bytes& payload,
+                               bushd_status (*decode)(const std::uint8_t*, std::size_t, Message*)) {
+  Message message{};
+  if (decode(payload.data(), payload.size(), &message) != BUSHD_OK) return std::nullopt;
+  return message;
+}
+
+// Codes from `first` down.
+inline std::vector<std::uint16_t> falling_codes(std::uint16_t first, std::size_t count) {
+  std::vector<std::uint16_t> codes;
+  while (codes.size() < count) codes.push_back(first--);
+  return codes;
+}
+
 // Keeps edges per MCU as they come and checks what an EdgeSink is promised.
 class Recorder final : public EdgeSink {
  public:
@@ -142,8 +158,9 @@ class FrameMaster {
     return std::nullopt;
   }
 
-  std::optional<Frame> identify(std::uint8_t address) {
-    return request(address, BUSHD_MSG_IDENTIFY, Bytes{0, 0, 1, 0, 0});
+  std::optional<bushd_identity> identify(std::uint8_t address) {
+    const auto reply = request(address, BUSHD_MSG_IDENTIFY, Bytes{0, 0, 1, 0, 0});
+    return reply ? decoded(reply->payload, bushd_decode_identity) : std::nullopt;
   }
   // All good answers of a broadcast scan.
   std::vector<Frame> scan(const bushd_identify& message) {
@@ -191,14 +208,10 @@ class FrameMaster {
   void forget_report(std::uint8_t address) { told_.erase(address); }
 
   bushd_tables tables(std::uint8_t address) {
-    bushd_tables told{};
-    const auto reply = request(address, BUSHD_MSG_TABLES);
-    if (!reply) {
-      ADD_FAILURE() << "no tables from " << int{address};
-      return told;
-    }
-    EXPECT_EQ(bushd_decode_tables(reply->payload.data(), reply->payload.size(), &told), BUSHD_OK);
-    return told;
+    return answer(address, BUSHD_MSG_TABLES, bushd_decode_tables);
+  }
+  bushd_program_state program_state(std::uint8_t address) {
+    return answer(address, BUSHD_MSG_PROGRAM_STATE, bushd_decode_program_state);
   }
   std::size_t valid_tables(std::uint8_t address) {
     const bushd_tables told = tables(address);
@@ -291,6 +304,15 @@ class FrameMaster {
   int bad_frames = 0;
 
  private:
+  template <class Message>
+  Message answer(std::uint8_t address, bushd_type type,
+                 bushd_status (*decode)(const std::uint8_t*, std::size_t, Message*)) {
+    const auto reply = request(address, static_cast<std::uint8_t>(type));
+    const auto told = reply ? decoded(reply->payload, decode) : std::nullopt;
+    EXPECT_TRUE(told) << "no answer from " << int{address} << " to " << type;
+    return told.value_or(Message{});
+  }
+
   Bus& bus_;
   bushd_receiver receiver_{};
   std::uint8_t sequence_ = 0;

@@ -49,15 +49,12 @@ class TwoMcus : public testing::Test {
 
 TEST_F(TwoMcus, EachAnswersForItself) {
   for (std::size_t i = 0; i < 2; ++i) {
-    const auto reply = master.identify(bus.mcu(i).address());
-    ASSERT_TRUE(reply);
-    bushd_identity identity;
-    ASSERT_EQ(bushd_decode_identity(reply->payload.data(), reply->payload.size(), &identity),
-              BUSHD_OK);
-    EXPECT_EQ(identity.boot_number, bus.mcu(i).boot_number());
-    EXPECT_EQ(identity.motors, 16);
-    EXPECT_EQ(identity.slots, 256);
-    EXPECT_EQ(identity.queue_ticks, 1024);
+    const auto identity = master.identify(bus.mcu(i).address());
+    ASSERT_TRUE(identity);
+    EXPECT_EQ(identity->boot_number, bus.mcu(i).boot_number());
+    EXPECT_EQ(identity->motors, 16);
+    EXPECT_EQ(identity->slots, 256);
+    EXPECT_EQ(identity->queue_ticks, 1024);
     EXPECT_EQ(master.frames.size(), 1u);
   }
   EXPECT_EQ(bus.collisions(), 0u);
@@ -148,13 +145,11 @@ TEST_F(TwoMcus, OnePollIsAnsweredByAllInTheirWindows) {
     const std::size_t bytes = 1 + master.frames[i].payload.size() + BUSHD_FRAME_OVERHEAD;
     EXPECT_EQ(master.frames[i].end_ns,
               poll_ns + begin_ns[i] + static_cast<TimeNs>(bytes) * kByteNs);
-    bushd_report report{};
-    ASSERT_EQ(bushd_decode_report(master.frames[i].payload.data(), master.frames[i].payload.size(),
-                                  &report),
-              BUSHD_OK);
+    const auto report = decoded(master.frames[i].payload, bushd_decode_report);
+    ASSERT_TRUE(report);
     // As it was when the poll's frame ended.
     const TimeNs boot_ns = i == 0 ? 333'333 : 0;
-    EXPECT_EQ(TimeNs{report.tick} * BUSHD_BOOT_TICK_NS + report.tick_ns, poll_ns - boot_ns);
+    EXPECT_EQ(TimeNs{report->tick} * BUSHD_BOOT_TICK_NS + report->tick_ns, poll_ns - boot_ns);
   }
 }
 
@@ -170,11 +165,10 @@ TEST(Bus, McusOfOneAddressAreFoundAndParted) {
     found = master.scan({salt, 4, 300});
   }
   ASSERT_EQ(found.size(), 2u);
-  bushd_identity identity;
-  ASSERT_EQ(bushd_decode_identity(found[1].payload.data(), found[1].payload.size(), &identity),
-            BUSHD_OK);
+  const auto identity = decoded(found[1].payload, bushd_decode_identity);
+  ASSERT_TRUE(identity);
   bushd_set_address message{};
-  std::copy_n(identity.unique_id, BUSHD_UNIQUE_ID_SIZE, message.unique_id);
+  std::copy_n(identity->unique_id, BUSHD_UNIQUE_ID_SIZE, message.unique_id);
   message.address = 6;
   master.frames.clear();
   master.broadcast(message);

@@ -208,20 +208,19 @@ class RandomStreams : public testing::Test {
   // An answer that noise has asked for, to be given later, may fall upon a question; and several
   // long frames at once take a while.
   bushd_report ask() {
-    bushd_report report{};
     for (int attempt = 0; attempt < 3; ++attempt) {
       master_.patience_ns = attempt == 0 ? kPatienceNs : 5 * kPatienceNs;
       const auto reply = master_.request(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL,
                                          Bytes{1, kAddress, 0, 0, 0, 255}, kAddress);
-      if (reply &&
-          bushd_decode_report(reply->payload.data(), reply->payload.size(), &report) == BUSHD_OK) {
+      const auto report = reply ? decoded(reply->payload, bushd_decode_report) : std::nullopt;
+      if (report) {
         master_.patience_ns = kPatienceNs;
-        return report;
+        return *report;
       }
       ++asked_again_;
     }
     ADD_FAILURE() << "no report";
-    return report;
+    return {};
   }
 
   void expect_right_counts() {

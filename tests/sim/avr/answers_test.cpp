@@ -44,13 +44,12 @@ TEST_F(AvrAnswers, AreWholeWhateverPassesByBefore) {
     master_.post(BUSHD_ADDRESS_BROADCAST, BUSHD_MSG_POLL, poll);
   };
   const auto expect_answer = [&] {
-    bushd_report report{};
     master_.drain();
     std::erase_if(master_.frames, [](const Frame& frame) { return frame.address != kAddress; });
     ASSERT_EQ(master_.frames.size(), 1u);
-    const Bytes& payload = master_.frames[0].payload;
-    EXPECT_EQ(bushd_decode_report(payload.data(), payload.size(), &report), BUSHD_OK);
-    EXPECT_EQ(report.motor_count, 16);
+    const auto report = decoded(master_.frames[0].payload, bushd_decode_report);
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->motor_count, 16);
   };
   for (int i = 0; i < 20; ++i) {
     ask();

@@ -16,11 +16,8 @@ class QemuNvm : public QemuAlone {
   }
   // Another table than that of any other number.
   void upload(std::uint8_t bank, std::uint16_t number, std::size_t codes) {
-    std::vector<std::uint16_t> ramp;
-    while (ramp.size() < codes) {
-      ramp.push_back(static_cast<std::uint16_t>(60'000 + number - ramp.size()));
-    }
-    master_.upload_table(kAddress, bank, 10'000, ramp, 1000);
+    const auto first = static_cast<std::uint16_t>(60'000 + number);
+    master_.upload_table(kAddress, bank, 10'000, falling_codes(first, codes), 1000);
   }
   std::uint32_t table_crc() {
     const bushd_tables told = master_.tables(kAddress);
