@@ -1,6 +1,6 @@
 // What lies where in the RAM of an image, and which of its source files may write there. Each
-// simulator reads the objects and the source files from its kind of ELF (sim_avr/memory_map.h,
-// sim_qemu/memory_map.h), and who may write what from the port's file of owners, of lines
+// simulator reads the objects and the source files from its kind of ELF (sim/avr/memory_map.h,
+// sim/qemu/memory_map.h), and who may write what from the port's file of owners, of lines
 //
 //     OBJECT  FILE...      # comment
 //

@@ -1,52 +1,34 @@
 // Requests by their messages: so that no test puts the type of one beside the fields of another.
 #pragma once
 
-#include <tuple>
+#include <concepts>
 
 #include "engine/message.h"
 #include "engine/payload.h"
 
 namespace bushd::test {
 
-template <class Message>
-struct RequestKind {
-  bushd_type type;
-  std::size_t (*encode)(const Message*, std::uint8_t*);
-};
-
-inline constexpr std::tuple kRequestKinds{
-    RequestKind{BUSHD_MSG_ASSIGN, bushd_encode_assign},
-    RequestKind{BUSHD_MSG_CONFIGURE, bushd_encode_configure},
-    RequestKind{BUSHD_MSG_CONTROL, bushd_encode_control},
-    RequestKind{BUSHD_MSG_CURRENTS, bushd_encode_currents},
-    RequestKind{BUSHD_MSG_EMERGENCY, bushd_encode_emergency},
-    RequestKind{BUSHD_MSG_EMISSION, bushd_encode_emission},
-    RequestKind{BUSHD_MSG_HOME, bushd_encode_home},
-    RequestKind{BUSHD_MSG_IDENTIFY, bushd_encode_identify},
-    RequestKind{BUSHD_MSG_LOCAL, bushd_encode_local},
-    RequestKind{BUSHD_MSG_MOTOR_INPUTS, bushd_encode_motor_inputs},
-    RequestKind{BUSHD_MSG_POSITION_COMPARE, bushd_encode_position_compare},
-    RequestKind{BUSHD_MSG_PROGRAM, bushd_encode_program_control},
-    RequestKind{BUSHD_MSG_SET_ADDRESS, bushd_encode_set_address},
-    RequestKind{BUSHD_MSG_INPUTS, bushd_encode_set_inputs},
-    RequestKind{BUSHD_MSG_OUTPUTS, bushd_encode_set_outputs},
-    RequestKind{BUSHD_MSG_SET_POSITION, bushd_encode_set_position},
-    RequestKind{BUSHD_MSG_VELOCITY, bushd_encode_set_velocity},
-    RequestKind{BUSHD_MSG_SYNC, bushd_encode_sync},
-    RequestKind{BUSHD_MSG_TABLE_BEGIN, bushd_encode_table_begin},
-    RequestKind{BUSHD_MSG_TABLE_END, bushd_encode_table_end},
-    RequestKind{BUSHD_MSG_TRAVEL, bushd_encode_travel}};
-
 struct Request {
   bushd_type type;
   std::vector<std::uint8_t> payload;
 };
 
-template <class Message>
-Request request_of(const Message& message) {
-  const auto& kind = std::get<RequestKind<Message>>(kRequestKinds);
-  return {kind.type, payload_of(message, kind.encode)};
-}
+// request_of(bushd_home{...}), and so on; compiled only where it is called, since messages with
+// lists have encoders with other parameters.
+#define BUSHD_REQUEST_OF(type, number, kind, needs)                      \
+  template <class Message>                                               \
+    requires std::same_as<Message, bushd_##kind>                         \
+  Request request_of(const Message& message) {                           \
+    return {BUSHD_MSG_##type, payload_of(message, bushd_encode_##kind)}; \
+  }
+BUSHD_SETUP_REQUESTS(BUSHD_REQUEST_OF)
+BUSHD_MOTION_REQUESTS(BUSHD_REQUEST_OF)
+BUSHD_PROGRAM_REQUESTS(BUSHD_REQUEST_OF)
+BUSHD_REQUEST_OF(SYNC, , sync, )
+BUSHD_REQUEST_OF(EMERGENCY, , emergency, )
+BUSHD_REQUEST_OF(IDENTIFY, , identify, )
+BUSHD_REQUEST_OF(SET_ADDRESS, , set_address, )
+#undef BUSHD_REQUEST_OF
 
 // TICKS; BUSHD_TICKS_FINE among the flags says what displacements are.
 struct Ticks {
