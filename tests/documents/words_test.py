@@ -12,7 +12,7 @@ import unittest
 SOURCE = pathlib.Path(os.environ["BUSHD_SOURCE_DIR"])
 WORDS = pathlib.Path(__file__).with_name("words.toml")
 ROOMS = ("CHANGELOG.md", "CONTRIBUTING.md", "README.md", "daemon", "debian", "docs", "firmware", "lib", "tables", "tests", "tools")
-TEXTS = {"", ".S", ".c", ".cmake", ".cpp", ".csv", ".h", ".in", ".inc", ".lcm", ".md", ".patch", ".py", ".sh", ".toml", ".txt"}
+TEXTS = {"", ".S", ".c", ".cmake", ".cpp", ".csv", ".h", ".in", ".inc", ".lcm", ".md", ".patch", ".py", ".sh", ".toml", ".ts", ".txt"}
 KEYS = {"pattern", "instead", "wrong", "right", "where", "but"}
 
 

@@ -9,7 +9,7 @@ import type { TableFile } from "../net/messages";
 export const kMostCode = 65_535;
 export type Side = "accel" | "decel";
 
-// Of a message that sets a table; a code takes 4 bytes.
+// A message that sets a table has at most as many; a code takes 4 bytes.
 const kMostBytes = 60_000;
 
 // Why a table cannot be set over the control socket; "": it can.

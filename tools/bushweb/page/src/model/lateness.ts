@@ -13,7 +13,7 @@ export class Lateness {
   private atMs = 0;
   private sentMs = 0;
 
-  // Of a message that was made at `sentMs` of the daemon's clock and comes at `nowMs` of the page's.
+  // How late a message is that was made at `sentMs` of the daemon's clock and comes at `nowMs` of the page's.
   of(sentMs: number, nowMs: number): number {
     if (!Number.isFinite(sentMs)) return 0;
     const differenceMs = nowMs - sentMs;

@@ -12,7 +12,7 @@ export class Rate {
     while (this.seen.length > 2 && nowMs - (this.seen[1]?.atMs ?? 0) > kWindowMs) this.seen.shift();
   }
 
-  // Of the last ten seconds; nothing until there are two counts.
+  // The rate of the last ten seconds; nothing until there are two counts.
   perSecond(): number | undefined {
     const first = this.seen[0];
     const last = this.seen[this.seen.length - 1];
