@@ -12,7 +12,6 @@
 
 #include "base/json_text.h"
 #include "base/printable.h"
-#include "client/answer.h"
 #include "commands.h"
 #include "tables/table_text.h"
 
@@ -78,19 +77,12 @@ class Crate {
   Crate(Client& client, std::uint32_t number) : client_(client), number_(number) {}
 
   std::optional<api::CamacResult> run(camac::Block block) {
-    const auto reply = client_.run(
-        api::Camac{.crate = static_cast<std::int32_t>(number_), .block = std::move(block)},
-        Client::Until::kResult);
-    if (!reply) {
-      exit_code_ = failure(client_, reply.error());
-      return std::nullopt;
-    }
-    const auto* result = detail_of<api::CamacResult>(reply);
-    if (result == nullptr) {
-      exit_code_ = refused(*reply);
-      return std::nullopt;
-    }
-    return *result;
+    const auto result = ask<api::CamacResult>(
+        client_,
+        api::Camac{.crate = static_cast<std::int32_t>(number_), .block = std::move(block)});
+    if (result) return *result;
+    exit_code_ = result.error();
+    return std::nullopt;
   }
   std::optional<camac::Response> cycle(const camac::Naf& naf) {
     const auto result = run({.cycles = {naf}});
@@ -213,10 +205,7 @@ Result<std::vector<std::uint32_t>> codes_of(Client& client, const std::string& n
 int load(Client& client, const CamacOptions& options, int station, int page,
          const std::string& name) {
   const auto codes = codes_of(client, name);
-  if (!codes) {
-    fmt::print(stderr, "bushctl: {}\n", bushd::printable(codes.error().message));
-    return kFailed;
-  }
+  if (!codes) return failed({.message = codes.error().message});
   Crate crate(client, options.crate);
   const std::uint32_t start = static_cast<std::uint32_t>(page) * kPageBytes;
   camac::Block block;

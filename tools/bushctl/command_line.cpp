@@ -155,6 +155,12 @@ void Command::run(std::function<int()> action) {
   });
 }
 
+void Command::run_with_client(std::function<int(bushd::client::Client&)> action) {
+  run([connection = connection_, action = std::move(action)] {
+    return with_client(*connection, action);
+  });
+}
+
 CommandLine::CommandLine(const std::string& version)
     : app_(std::make_unique<CLI::App>("bushctl: move and watch the motors of a running bushd",
                                       "bushctl")) {
@@ -196,11 +202,11 @@ Command CommandLine::add(const std::string& name, const std::string& text,
   CLI::App* parent = group.empty() ? app_.get() : app_->get_subcommand(group);
   CLI::App* command = parent->add_subcommand(name, text);
   add_connection(command);
-  return Command(command);
+  return {command, connection_};
 }
 
 Command CommandLine::add_local(const std::string& name, const std::string& text) {
-  return Command(app_->add_subcommand(name, text));
+  return {app_->add_subcommand(name, text), connection_};
 }
 
 namespace {

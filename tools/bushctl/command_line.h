@@ -33,7 +33,7 @@ struct Connection {
 // One subcommand. What is pointed to outlives the command line.
 class Command {
  public:
-  explicit Command(CLI::App* app) : app_(app) {}
+  Command(CLI::App* app, const Connection& connection) : app_(app), connection_(&connection) {}
 
   Command& footer(const std::string& text);
   Command& flag(const std::string& name, bool* value, const std::string& text);
@@ -71,10 +71,14 @@ class Command {
   // `usage`: how --help names them.
   Command& raw_words(std::vector<std::string>* value, const std::string& usage);
 
+  // What it does; the result is the exit code.
   void run(std::function<int()> action);
+  // The same with a client (with_client()).
+  void run_with_client(std::function<int(bushd::client::Client&)> action);
 
  private:
   CLI::App* app_;
+  const Connection* connection_;
   std::vector<std::string>* raw_words_ = nullptr;
 };
 

@@ -12,7 +12,6 @@
 #include <optional>
 
 #include "base/printable.h"
-#include "client/answer.h"
 #include "progress.h"
 #include "render.h"
 
@@ -90,10 +89,7 @@ int with_client(const Connection& connection, const std::function<int(Client&)>&
   auto options = connection.options();
   options.interrupt_fd = signal_descriptor();
   auto client = Client::open(std::move(options));
-  if (!client) {
-    fmt::print(stderr, "bushctl: {}\n", bushd::printable(client.error().text()));
-    return kFailed;
-  }
+  if (!client) return failed(client.error());
   if (const std::string& why = (*client)->barred(); !why.empty()) {
     fmt::print(stderr, "bushctl: {}; LCM is used meanwhile\n", bushd::printable(why));
   }
@@ -101,9 +97,7 @@ int with_client(const Connection& connection, const std::function<int(Client&)>&
 }
 
 int failure(const Client& client, const bushd::Error& error) {
-  if (client.interrupted()) return kInterrupted;
-  fmt::print(stderr, "bushctl: {}\n", bushd::printable(error.text()));
-  return kFailed;
+  return client.interrupted() ? static_cast<int>(kInterrupted) : failed(error);
 }
 
 int complete(const bushd::client::Status& status, const bushd::client::Status::Missing& missing,
@@ -114,7 +108,7 @@ int complete(const bushd::client::Status& status, const bushd::client::Status::M
 }
 
 int wrong_usage(const bushd::Error& error) {
-  fmt::print(stderr, "bushctl: {}\n", bushd::printable(error.text()));
+  failed(error);
   return kUsage;
 }
 
@@ -161,8 +155,8 @@ int send(Client& client, const Sending& sending) {
   meanwhile.on_reply = [&](const api::Reply& heard) {
     accepted = accepted || std::holds_alternative<api::Accepted>(heard);
     progress.clear();
-    for (const std::string& line : lines(heard)) fmt::print("{}\n", line);
-    for (const std::string& line : rounding_lines(request, heard)) fmt::print("{}\n", line);
+    print_lines(lines(heard));
+    print_lines(rounding_lines(request, heard));
     // What limits a line, and how near to it the motors are; at which frame a program has ended.
     const auto* completed = std::get_if<api::Completed>(&heard);
     const bool tells_more = std::holds_alternative<api::MoveLine>(request) ||
@@ -233,12 +227,12 @@ int show_plan(const Connection& connection, std::vector<api::MovePath> parts, bo
 }
 
 int print(const api::MovePlan& plan, bool as_json) {
-  if (as_json) {
-    fmt::print("{}\n", json(plan));
-  } else {
-    for (const std::string& line : lines(plan)) fmt::print("{}\n", line);
-  }
+  print_lines(as_json ? std::vector{json(plan)} : lines(plan));
   return kDone;
+}
+
+void print_lines(const std::vector<std::string>& lines) {
+  for (const std::string& line : lines) fmt::print("{}\n", line);
 }
 
 std::chrono::milliseconds milliseconds(double seconds) {

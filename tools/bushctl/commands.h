@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "client/answer.h"
 #include "client/client.h"
 #include "command_line.h"
 
@@ -84,7 +85,8 @@ enum class Hope { kReached, kDone, kDoneEverywhere };
 // kAnswered: done when accepted. kResult: done when the result is as hoped for. All returns are
 // exit codes.
 int send(const Connection& connection, const bushd::api::Request& request,
-         bushd::client::Client::Until until, Hope hope);
+         bushd::client::Client::Until until = bushd::client::Client::Until::kResult,
+         Hope hope = Hope::kDone);
 // The same with a client that is there.
 int send(bushd::client::Client& client, const bushd::api::Request& request,
          bushd::client::Client::Until until, Hope hope);
@@ -108,6 +110,7 @@ int show_plan(const Connection& connection, std::vector<bushd::api::MovePath> pa
               const Wording& wording);
 
 int print(const bushd::api::MovePlan& plan, bool as_json);
+void print_lines(const std::vector<std::string>& lines);
 
 // Says on stderr why, unless it was the user who broke off.
 int failure(const bushd::client::Client& client, const bushd::Error& error);
@@ -119,6 +122,17 @@ int failed(const bushd::Error& error);
 // Says what is wrong with words that make no request.
 int wrong_usage(const bushd::Error& error);
 int refused(const bushd::api::Reply& reply);
+
+// What the request's result brings. Where there is none, stderr says why, and the error is the exit
+// code.
+template <class Detail>
+tl::expected<Detail, int> ask(bushd::client::Client& client, const bushd::api::Request& request) {
+  const auto reply = client.run(request, bushd::client::Client::Until::kResult);
+  if (!reply) return tl::unexpected(failure(client, reply.error()));
+  const auto* detail = bushd::client::detail_of<Detail>(*reply);
+  if (detail == nullptr) return tl::unexpected(refused(*reply));
+  return *detail;
+}
 
 std::chrono::milliseconds milliseconds(double seconds);
 // The clock on the wall, since 1970.

@@ -14,6 +14,7 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
+using bushd::client::detail_of;
 
 struct ConfigOptions {
   std::vector<std::string> words;
@@ -23,34 +24,34 @@ struct ConfigOptions {
 };
 
 // The result, or the exit code where there is none.
-std::variant<api::Configuration, int> ask(Client& client, const api::Configure& request,
-                                          std::string* reason = nullptr) {
+struct Configured {
+  api::Configuration configuration;
+  std::string reason;
+};
+tl::expected<Configured, int> configure(Client& client, const api::Configure& request) {
   const auto reply = client.run(request, Client::Until::kResult);
-  if (!reply) return failure(client, reply.error());
+  if (!reply) return tl::unexpected(failure(client, reply.error()));
   const auto* completed = std::get_if<api::Completed>(&*reply);
-  const auto* configuration =
-      completed == nullptr ? nullptr : std::get_if<api::Configuration>(&completed->detail);
-  if (configuration == nullptr || completed->outcome != api::Outcome::kDone) return refused(*reply);
-  if (reason != nullptr) *reason = completed->reason;
-  return *configuration;
+  const auto* configuration = detail_of<api::Configuration>(*reply);
+  if (configuration == nullptr || completed->outcome != api::Outcome::kDone) {
+    return tl::unexpected(refused(*reply));
+  }
+  return Configured{*configuration, completed->reason};
+}
+
+int nothing_differs(const api::Configuration& configuration) {
+  fmt::print("nothing differs from {}\n", bushd::printable(configuration.path));
+  return kDone;
 }
 
 int show(const api::Configuration& configuration, const ConfigOptions& options) {
-  if (options.json) {
-    fmt::print("{}\n", json(configuration));
-  } else if (configuration.settings.empty()) {
-    fmt::print("nothing differs from {}\n", bushd::printable(configuration.path));
-  } else {
-    for (const std::string& line : table(configuration)) fmt::print("{}\n", line);
-  }
+  if (!options.json && configuration.settings.empty()) return nothing_differs(configuration);
+  print_lines(options.json ? std::vector{json(configuration)} : table(configuration));
   return kDone;
 }
 
 int save_and_tell(Client& client, const api::Configuration& configuration) {
-  if (configuration.settings.empty()) {
-    fmt::print("nothing differs from {}\n", bushd::printable(configuration.path));
-    return kDone;
-  }
+  if (configuration.settings.empty()) return nothing_differs(configuration);
   const auto saved = save(configuration);
   if (!saved) {
     fmt::print(stderr, "bushctl: not saved: {}\n", bushd::printable(saved.error().text()));
@@ -61,19 +62,18 @@ int save_and_tell(Client& client, const api::Configuration& configuration) {
                bushd::printable(value));
   }
   fmt::print("written to {}\n", bushd::printable(configuration.path));
-  const auto told = ask(client, *saved);
-  if (std::holds_alternative<api::Configuration>(told)) return kDone;
+  const auto told = configure(client, *saved);
+  if (told) return kDone;
   fmt::print(stderr,
              "bushctl: bushd does not know yet that it is written; restart bushd before "
              "changing these again\n");
-  return std::get<int>(told);
+  return told.error();
 }
 
 int run(Client& client, const api::Configure& request, const ConfigOptions& options) {
-  std::string reason;
-  auto answer = ask(client, request, &reason);
-  if (const int* code = std::get_if<int>(&answer)) return *code;
-  auto& configuration = std::get<api::Configuration>(answer);
+  auto answer = configure(client, request);
+  if (!answer) return answer.error();
+  auto& [configuration, reason] = *answer;
   if (options.save) return save_and_tell(client, differences(std::move(configuration)));
   if (request.kind == api::Configure::Kind::kChange && !options.json) {
     fmt::print("{}\n", bushd::printable(reason));

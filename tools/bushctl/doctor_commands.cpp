@@ -33,11 +33,7 @@ void add_doctor_command(CommandLine& commands) {
         const auto findings = doctor::diagnose(doctor::observe({.config_path = options->config,
                                                                 .client = std::move(client),
                                                                 .watch_s = options->watch_s}));
-        if (options->json) {
-          fmt::print("{}\n", doctor::json(findings));
-        } else {
-          for (const std::string& text : doctor::lines(findings)) fmt::print("{}\n", text);
-        }
+        print_lines(options->json ? std::vector{doctor::json(findings)} : doctor::lines(findings));
         return doctor::any_error(findings) ? kFailed : kDone;
       });
 }

@@ -100,12 +100,7 @@ int follow(Client& client, const FollowOptions& options, const bushd::csv::Numbe
       return code;
     }
     const auto* plan = std::get_if<api::MovePlan>(&completed->detail);
-    if (plan == nullptr || !options.dry_run) continue;
-    if (options.json) {
-      fmt::print("{}\n", json(*plan));
-    } else {
-      for (const std::string& line : lines(*plan)) fmt::print("{}\n", line);
-    }
+    if (plan != nullptr && options.dry_run) print(*plan, options.json);
   }
   if (options.dry_run) return kDone;
   common.part = Part::kRun;

@@ -9,7 +9,6 @@
 #include "base/fields_json.h"
 #include "base/json_text.h"
 #include "base/printable.h"
-#include "client/answer.h"
 #include "commands.h"
 #include "grid.h"
 
@@ -18,7 +17,6 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
-using bushd::client::detail_of;
 using nlohmann::ordered_json;
 
 void print_json(const std::string& motor, const api::MotionHistory& history) {
@@ -44,7 +42,7 @@ void print_history(const api::MotionHistory& history) {
               bushd::printable(motion.outcome), bushd::printable(motion.who),
               bushd::printable(motion.reason)});
   }
-  for (const std::string& line : grid.lines()) fmt::print("{}\n", line);
+  print_lines(grid.lines());
 }
 
 struct HistoryOptions {
@@ -54,12 +52,10 @@ struct HistoryOptions {
 };
 
 int show_history(Client& client, const HistoryOptions& options) {
-  const auto reply = client.run(
-      api::GetHistory{.motor = options.motor, .most = static_cast<std::int32_t>(options.most)},
-      Client::Until::kResult);
-  if (!reply) return failure(client, reply.error());
-  const auto* history = detail_of<api::MotionHistory>(reply);
-  if (history == nullptr) return refused(*reply);
+  const auto history = ask<api::MotionHistory>(
+      client,
+      api::GetHistory{.motor = options.motor, .most = static_cast<std::int32_t>(options.most)});
+  if (!history) return history.error();
   if (options.json) {
     print_json(options.motor, *history);
   } else {
@@ -68,7 +64,9 @@ int show_history(Client& client, const HistoryOptions& options) {
   return kDone;
 }
 
-void add_history(CommandLine& commands) {
+}  // namespace
+
+void add_history_commands(CommandLine& commands) {
   const auto options = std::make_shared<HistoryOptions>();
   commands.add("history", "Show what has moved a motor, the newest first")
       .footer(
@@ -77,16 +75,7 @@ void add_history(CommandLine& commands) {
       .option("NAME", &options->motor, "Motor")
       .number("--most", &options->most, api::GetHistory::kMost, "How many lines")
       .flag("--json", &options->json, "Print JSON")
-      .run([&commands, options] {
-        return with_client(commands.connection(),
-                           [&](Client& client) { return show_history(client, *options); });
-      });
-}
-
-}  // namespace
-
-void add_history_commands(CommandLine& commands) {
-  add_history(commands);
+      .run_with_client([options](Client& client) { return show_history(client, *options); });
 }
 
 }  // namespace bushctl

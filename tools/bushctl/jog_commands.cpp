@@ -50,7 +50,7 @@ std::chrono::milliseconds renewal(const JogOptions& options) {
 }
 
 void print_reply(const api::Reply& reply) {
-  for (const std::string& line : lines(reply)) fmt::print("{}\n", line);
+  print_lines(lines(reply));
   std::fflush(stdout);
 }
 
@@ -84,8 +84,7 @@ int run(const Connection& connection, JogOptions options) {
                                                  options.words[1])});
     }
     // What ends the jog of others is answered when the motor stands.
-    if (*speed == 0)
-      return send(connection, jog_at(options, 0), Client::Until::kResult, Hope::kDone);
+    if (*speed == 0) return send(connection, jog_at(options, 0));
     return with_client(connection, [&](Client& client) { return jog(client, options, *speed); });
   }
   if (options.pulses_after > 0) {

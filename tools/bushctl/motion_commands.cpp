@@ -4,7 +4,6 @@
 #include <chrono>
 #include <memory>
 
-#include "client/answer.h"
 #include "commands.h"
 #include "envelope_move.h"
 #include "move_arguments.h"
@@ -17,7 +16,6 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::client::Client;
-using bushd::client::detail_of;
 
 constexpr const char* kSpeed = "Not faster than this, in the motor's unit per second";
 constexpr const char* kSteps = "Numbers are steps, not the motors' units";
@@ -35,11 +33,8 @@ template <class Move>
 int show_plan(const Connection& connection, Move move, bool as_json) {
   return with_client(connection, [&](Client& client) {
     move.dry_run = true;
-    const auto reply = client.run(move, Client::Until::kResult);
-    if (!reply) return failure(client, reply.error());
-    const auto* plan = detail_of<api::MovePlan>(reply);
-    if (plan == nullptr) return refused(*reply);
-    return print(*plan, as_json);
+    const auto plan = ask<api::MovePlan>(client, move);
+    return plan ? print(*plan, as_json) : plan.error();
   });
 }
 
@@ -233,7 +228,7 @@ void add_compare(CommandLine& commands) {
         const auto request = parse_position_compare(options->motor, options->position,
                                                     numbers(options->steps), options->pulse);
         if (!request) return wrong_usage(request.error());
-        return send(commands.connection(), *request, Client::Until::kResult, Hope::kDone);
+        return send(commands.connection(), *request);
       });
 }
 
@@ -247,8 +242,7 @@ void add_stop(CommandLine& commands) {
       .words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .flag("--wait", &options->wait, "Wait until the motors stand")
       .run([&commands, options] {
-        return send(commands.connection(), api::Stop{options->motors}, until(options->wait),
-                    Hope::kDone);
+        return send(commands.connection(), api::Stop{options->motors}, until(options->wait));
       });
 }
 
@@ -318,7 +312,7 @@ void add_set(CommandLine& commands) {
             parse_set(options->motor, options->position, numbers(options->steps), options->dial);
         if (!request) return wrong_usage(request.error());
         // Over in a moment, and only the result tells whether the MCU did it.
-        return send(commands.connection(), *request, Client::Until::kResult, Hope::kDone);
+        return send(commands.connection(), *request);
       });
 }
 

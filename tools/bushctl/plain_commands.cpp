@@ -17,10 +17,7 @@ void add(CommandLine& commands, const char* name, const char* text, const char* 
       .footer(footer)
       .words("NAME", motors.get(), motors_are == Command::Needed::kNo ? kMotorsOrAll : kMotors,
              motors_are)
-      .run([&commands, motors] {
-        return send(commands.connection(), Request{*motors}, bushd::client::Client::Until::kResult,
-                    Hope::kDone);
-      });
+      .run([&commands, motors] { return send(commands.connection(), Request{*motors}); });
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 
 #include "base/fields_json.h"
 #include "base/json_text.h"
-#include "client/answer.h"
 #include "commands.h"
 #include "program_file.h"
 #include "program_text.h"
@@ -75,9 +74,7 @@ int print_put(Client& client, const api::ProgramEntry& program, bool as_json) {
   // Without it positions are steps.
   const auto status = client.status(kStatusWithin);
   if (!status && client.interrupted()) return kInterrupted;
-  for (const std::string& line : lines(program, status.value_or(Status()))) {
-    fmt::print("{}\n", line);
-  }
+  print_lines(lines(program, status.value_or(Status())));
   return kDone;
 }
 
@@ -107,15 +104,9 @@ int put(const Connection& connection, const PutOptions& options) {
 }
 
 int list_programs(Client& client, bool as_json) {
-  const auto reply = client.run(api::ListPrograms{}, Client::Until::kResult);
-  if (!reply) return failure(client, reply.error());
-  const auto* list = detail_of<api::ProgramList>(reply);
-  if (list == nullptr) return refused(*reply);
-  if (as_json) {
-    fmt::print("{}\n", bushd::json_text(bushd::json_of(*list)));
-    return kDone;
-  }
-  for (const std::string& line : table(*list)) fmt::print("{}\n", line);
+  const auto list = ask<api::ProgramList>(client, api::ListPrograms{});
+  if (!list) return list.error();
+  print_lines(as_json ? std::vector{bushd::json_text(bushd::json_of(*list))} : table(*list));
   return kDone;
 }
 
@@ -163,10 +154,7 @@ void add_program_list(CommandLine& commands) {
   commands
       .add("list", "List the programs of all MCUs that can have one, and how far they are", kGroup)
       .flag("--json", json.get(), "Print JSON")
-      .run([&commands, json] {
-        return with_client(commands.connection(),
-                           [&](Client& client) { return list_programs(client, *json); });
-      });
+      .run_with_client([json](Client& client) { return list_programs(client, *json); });
 }
 
 void add_program_run(CommandLine& commands) {
@@ -182,10 +170,8 @@ void add_program_run(CommandLine& commands) {
           "exit code is 0 only if every program came to its end; Ctrl-C ramps their motors down.")
       .words("PROGRAM", &options->programs, "Programs that were put", Command::Needed::kYes)
       .flag("--wait", &options->wait, "Wait for the result")
-      .run([&commands, options] {
-        return with_client(commands.connection(), [&](Client& client) {
-          return run_programs(client, options->programs, options->wait);
-        });
+      .run_with_client([options](Client& client) {
+        return run_programs(client, options->programs, options->wait);
       });
 }
 
@@ -194,8 +180,7 @@ void add_program_erase(CommandLine& commands) {
   commands.add("erase", "Erase a program from the memory of its MCU", kGroup)
       .option("PROGRAM", program.get(), "The program")
       .run([&commands, program] {
-        return send(commands.connection(), api::EraseProgram{*program}, Client::Until::kResult,
-                    Hope::kDone);
+        return send(commands.connection(), api::EraseProgram{*program});
       });
 }
 

@@ -74,11 +74,7 @@ int latency_test(const RawBusOptions& options, std::uint8_t address, unsigned co
                                           options.port, address, options.baud)});
   }
   std::sort(test.latencies_us.begin(), test.latencies_us.end());
-  if (options.json) {
-    fmt::print("{}\n", latency_json(test));
-  } else {
-    for (const std::string& text : latency_lines(test)) fmt::print("{}\n", text);
-  }
+  print_lines(options.json ? std::vector{latency_json(test)} : latency_lines(test));
   return kDone;
 }
 
@@ -87,11 +83,7 @@ int scan(const RawBusOptions& options) {
   if (!bus) return failed(bus.error());
   const auto found = find_some(*bus, options);
   if (!found) return failed(found.error());
-  if (options.json) {
-    fmt::print("{}\n", scan_json(*found));
-  } else {
-    for (const std::string& text : scan_lines(*found)) fmt::print("{}\n", text);
-  }
+  print_lines(options.json ? std::vector{scan_json(*found)} : scan_lines(*found));
   return kDone;
 }
 

@@ -64,35 +64,19 @@ void print(const std::map<std::string, api::TableRef>& groups,
                 fmt::format("{:.6g}", entry.start_steps_per_s),
                 fmt::format("{:.6g}", entry.max_steps_per_s)});
   }
-  for (const std::string& line : in_service.lines()) fmt::print("{}\n", line);
+  print_lines(in_service.lines());
   fmt::print("\n");
-  for (const std::string& line : tables.lines()) fmt::print("{}\n", line);
+  print_lines(tables.lines());
   for (const api::TableEntry& entry : entries) {
     if (!entry.fault.empty())
       fmt::print("{}: {}\n", bushd::printable(entry.name), bushd::printable(entry.fault));
   }
 }
 
-// Nothing when the daemon did not answer, or not with what was asked for; stderr says which.
-template <class Detail>
-std::optional<Detail> ask(Client& client, const api::Request& request, int* code) {
-  const auto reply = client.run(request, Client::Until::kResult);
-  if (!reply) {
-    *code = failure(client, reply.error());
-    return std::nullopt;
-  }
-  if (const auto* completed = std::get_if<api::Completed>(&*reply)) {
-    if (const auto* detail = std::get_if<Detail>(&completed->detail)) return *detail;
-  }
-  *code = refused(*reply);
-  return std::nullopt;
-}
-
 int list_tables(Client& client, bool as_json) {
   constexpr std::chrono::milliseconds kWithin{4000};
-  int code = kDone;
-  const auto list = ask<api::TableList>(client, api::ListTables{}, &code);
-  if (!list) return code;
+  const auto list = ask<api::TableList>(client, api::ListTables{});
+  if (!list) return list.error();
   const auto status = client.status(kWithin);
   if (!status) return failure(client, status.error());
   if (status->missing_mcus.count > 0) return complete(*status, status->missing_mcus, "MCUs");
@@ -112,9 +96,8 @@ void print(const bushd::tables::TableContent& table) {
 }
 
 int show_table(Client& client, const std::string& wanted, bool as_json) {
-  int code = kDone;
-  const auto file = ask<api::TableFile>(client, api::GetTable{wanted}, &code);
-  if (!file) return code;
+  const auto file = ask<api::TableFile>(client, api::GetTable{wanted});
+  if (!file) return file.error();
   const bushd::tables::TableContent& table = file->content;
   // Computed here, so that it is what is shown that is hashed.
   if (const auto fault = bushd::tables::check(table)) {
@@ -135,10 +118,7 @@ void add_list(CommandLine& commands) {
   const auto json = std::make_shared<bool>(false);
   commands.add("list", "List the tables, and the table of each group", "table")
       .flag("--json", json.get(), "Print JSON")
-      .run([&commands, json] {
-        return with_client(commands.connection(),
-                           [&](Client& client) { return list_tables(client, *json); });
-      });
+      .run_with_client([json](Client& client) { return list_tables(client, *json); });
 }
 
 void add_show(CommandLine& commands) {
@@ -150,11 +130,8 @@ void add_show(CommandLine& commands) {
   commands.add("show", "Show a table", "table")
       .option("TABLE", &options->table, "NAME, NAME@REVISION or NAME@TAG")
       .flag("--json", &options->json, "Print JSON")
-      .run([&commands, options] {
-        return with_client(commands.connection(), [&](Client& client) {
-          return show_table(client, options->table, options->json);
-        });
-      });
+      .run_with_client(
+          [options](Client& client) { return show_table(client, options->table, options->json); });
 }
 
 void add_use(CommandLine& commands) {
@@ -166,19 +143,14 @@ void add_use(CommandLine& commands) {
           "move is by it. It stays in service when the daemon is started again.")
       .option("GROUP", &request->group, "The group")
       .option("TABLE", &request->table, "Table of the group from the next move on")
-      .run([&commands, request] {
-        return send(commands.connection(), *request, Client::Until::kResult, Hope::kDone);
-      });
+      .run([&commands, request] { return send(commands.connection(), *request); });
 }
 
 void add_reload(CommandLine& commands) {
   commands
       .add("reload",
            "Reload the tables of all groups; an invalid one leaves the old one in service", "table")
-      .run([&commands] {
-        return send(commands.connection(), api::ReloadTables{}, Client::Until::kResult,
-                    Hope::kDone);
-      });
+      .run([&commands] { return send(commands.connection(), api::ReloadTables{}); });
 }
 
 }  // namespace

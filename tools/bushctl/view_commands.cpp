@@ -44,11 +44,7 @@ int show_status(Client& client, const StatusOptions& options) {
   if (status->states.empty()) return complete(*status, status->missing_mcus, "MCUs");
   const auto chosen = only(std::move(*status), options.motors);
   if (!chosen) return failure(client, chosen.error());
-  if (options.json) {
-    fmt::print("{}\n", json(*chosen));
-  } else {
-    for (const std::string& line : table(*chosen)) fmt::print("{}\n", line);
-  }
+  print_lines(options.json ? std::vector{json(*chosen)} : table(*chosen));
   return complete(*chosen, chosen->missing_mcus, "MCUs");
 }
 
@@ -60,11 +56,7 @@ struct HealthOptions {
 };
 
 void print(const Status& status, bool as_json) {
-  if (as_json) {
-    fmt::print("{}\n", health_json(status));
-  } else {
-    for (const std::string& line : health_table(status)) fmt::print("{}\n", line);
-  }
+  print_lines(as_json ? std::vector{health_json(status)} : health_table(status));
   std::fflush(stdout);
 }
 
@@ -171,11 +163,7 @@ int show_where(Client& client, const std::vector<std::string>& names,
   if (!status) return failure(client, status.error());
   const auto motors = where(*status, names, unix_us());
   if (!motors) return failure(client, motors.error());
-  if (as_json) {
-    fmt::print("{}\n", json(*motors));
-  } else {
-    for (const std::string& text : table(*motors)) fmt::print("{}\n", text);
-  }
+  print_lines(as_json ? std::vector{json(*motors)} : table(*motors));
   return kDone;
 }
 
@@ -189,10 +177,8 @@ void add_where(CommandLine& commands) {
   Command command = commands.add("where", "Show where motors stand: user, dial and steps");
   command.words("NAME", &options->motors, kMotorsOrAll, Command::Needed::kNo)
       .flag("--json", &options->json, "As JSON");
-  add_timeout(command, &options->timeout_s).run([&commands, options] {
-    return with_client(commands.connection(), [&](Client& client) {
-      return show_where(client, options->motors, milliseconds(options->timeout_s), options->json);
-    });
+  add_timeout(command, &options->timeout_s).run_with_client([options](Client& client) {
+    return show_where(client, options->motors, milliseconds(options->timeout_s), options->json);
   });
 }
 

@@ -113,7 +113,7 @@ int list_tokens(const TokenOptions& options, const std::string& path) {
     grid.row({token.name, time_text(token.expires_s), token.expired(now_s) ? "expired" : "valid",
               time_text(token.made_s), token.made_by});
   }
-  for (const std::string& line : grid.lines()) fmt::print("{}\n", line);
+  print_lines(grid.lines());
   return kDone;
 }
 
