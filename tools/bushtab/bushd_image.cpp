@@ -179,14 +179,14 @@ int import_bushd(const Places& places, const BushdImport& wanted) {
     if (!bytes) return refuse(bytes.error());
     const auto travel = image::read_travel(*bytes);
     if (!travel) return refuse(travel.error());
-    content = image::table_of(*travel, wanted.time_unit_ns);
+    content = image::table_of(*travel, wanted.time_unit_ns.value_or(0));
     steps = static_cast<std::uint32_t>(travel->codes.size());
     json = {{"steps", steps}, {"reactor_delay_code", travel->reactor_delay}};
   } else {
     const auto memory = read_image(wanted.image);
     if (!memory) return refuse(memory.error());
     const image::Program program = image::read_page((*memory)[wanted.page]);
-    content = image::table_of(program.codes, wanted.start_hz);
+    content = image::table_of(program.codes, wanted.start_hz.value_or(0));
     steps = program.steps;
     json = {{"steps", steps}, {"positions", hex(program.positions)}};
   }

@@ -42,12 +42,17 @@ struct MotorOptions {
 bushd::Result<std::optional<bushd::tables::profiles::Motor>> load_motor(
     const MotorOptions& options);
 
-struct Show {
-  bool steps = false;  // every step of the move that just comes to cruise
+// The table that a command is about, and whether it tells in JSON what it did.
+struct TableOptions {
+  std::string table;
   bool json = false;
+};
+
+struct Show : TableOptions {
+  bool steps = false;                           // every step of the move that just comes to cruise
   std::optional<bushd::Converter> converter{};  // with its codes K of these steps
 };
-int show(const Places& places, const std::string& table, const Show& wanted);
+int show(const Places& places, const Show& wanted);
 // What a command that wrote a table says: its revision; with `json`, what show says of it.
 int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool json);
 
@@ -66,25 +71,21 @@ struct Check {
 };
 int check(const Places& places, const Check& wanted);
 
-struct Expansion {
-  std::string table;
+struct Expansion : TableOptions {
   std::int64_t steps = 0;  // -INT32_MAX .. INT32_MAX
   std::uint32_t tick_us = 0;
   bushd_format format = BUSHD_FORMAT_FINE;
   std::optional<double> speed;  // steps/s, not to be exceeded
-  bool json = false;
 };
 int expand(const Places& places, const Expansion& expansion);
 
 // The table of a spec whose name is a table as on the command line.
-struct New {
+struct New : TableOptions {
   bushd::tables::profiles::Spec spec;
   MotorOptions motor;
-  std::string table;
   std::vector<std::string> comments;
   bool print = false;    // to stdout instead of into a file
   bool replace = false;  // a table that is there: a new revision of it
-  bool json = false;
 };
 int make_new(const Places& places, const New& wanted);
 
@@ -99,12 +100,12 @@ int wizard(const Places& places, const Wizard& wanted);
 // A change of a table that is there: a new revision, comments kept.
 using Change =
     std::function<bushd::Result<bushd::tables::TableContent>(bushd::tables::TableContent content)>;
-int change(const Places& places, const std::string& table, bool json, const std::string& note,
+int change(const Places& places, const TableOptions& options, const std::string& note,
            const Change& change);
 // Says on stderr which texts of the table were kept and never saved, if any were.
 void tell_kept(const std::filesystem::path& table, const std::string& name);
 // In $VISUAL or $EDITOR; what is no table is kept aside, and the old one stays.
-int edit(const Places& places, const std::string& table, bool json);
+int edit(const Places& places, const TableOptions& options);
 // In the terminal; refused if there is none.
 struct Tui {
   std::string table;
@@ -112,34 +113,39 @@ struct Tui {
   std::vector<std::uint32_t> steps;  // of moves whose times are shown
 };
 int tui(const Places& places, const Tui& wanted);
-int copy(const Places& places, const std::string& from, const std::string& to, bool json);
-int log(const Places& places, const std::string& table, bool json);
-int revert(const Places& places, const std::string& table, const std::string& revision, bool json);
-int tag(const Places& places, const std::string& table, const std::string& tag,
-        const std::string& revision, bool json);
+struct Copy : TableOptions {
+  std::string to;
+};
+int copy(const Places& places, const Copy& wanted);
+int log(const Places& places, const TableOptions& options);
+struct Revert : TableOptions {
+  std::string revision;
+};
+int revert(const Places& places, const Revert& wanted);
+struct Tag : TableOptions {
+  std::string tag;
+  std::string revision;
+};
+int tag(const Places& places, const Tag& wanted);
 
-struct BushdExport {
+struct BushdExport : TableOptions {
   std::string image;
-  std::string table;
   unsigned page = 0;
   std::uint32_t steps = 0;
   std::string positions;  // hexadecimal; empty: those of the image
   bool resample = false;
   bool bushd1 = false;
   std::uint32_t reactor_delay = 0;
-  bool json = false;
 };
 int export_bushd(const Places& places, const BushdExport& wanted);
 
-struct BushdImport {
+struct BushdImport : TableOptions {
   std::string image;
-  std::string table;
   unsigned page = 0;
-  double start_hz = 0;
-  std::uint32_t time_unit_ns = 0;  // bushd1
+  std::optional<double> start_hz;             // needed but for bushd1
+  std::optional<std::uint32_t> time_unit_ns;  // needed for bushd1
   bool bushd1 = false;
   bool replace = false;
-  bool json = false;
 };
 int import_bushd(const Places& places, const BushdImport& wanted);
 
@@ -177,8 +183,15 @@ struct Envelope {
   std::string png{};
 };
 int envelope(const Places& places, const Envelope& wanted);
-int time(const Places& places, const std::string& table, const std::vector<std::uint32_t>& steps,
-         bool json);
-int diff(const Places& places, const std::string& before, const std::string& after, bool json);
+struct Times : TableOptions {
+  std::vector<std::uint32_t> steps;
+};
+int time(const Places& places, const Times& wanted);
+struct Diff {
+  std::string before;
+  std::string after;
+  bool json = false;
+};
+int diff(const Places& places, const Diff& wanted);
 
 }  // namespace bushtab

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 int unchanged(const Home& home, bool json) {
   const std::string path = home.store.path_of(home.name).string();
-  if (json) return show(Places{}, path, {.json = true});
+  if (json) return show(Places{}, {{path, true}});
   fmt::print("{}: nothing to change\n", bushd::printable(path));
   return kDone;
 }
@@ -76,18 +76,18 @@ std::string editor_of_user() {
 
 }  // namespace
 
-int change(const Places& places, const std::string& table, bool json, const std::string& note,
+int change(const Places& places, const TableOptions& options, const std::string& note,
            const Change& change) {
-  auto home = home_of(places, table);
+  auto home = home_of(places, options.table);
   if (!home) return refuse(home.error());
   const auto old = read_home(*home);
   if (!old) return refuse(old.error());
   const auto content = change(old->content);
   if (!content) return refuse(content.error());
-  if (*content == old->content) return unchanged(*home, json);
+  if (*content == old->content) return unchanged(*home, options.json);
   const auto text = tables::rewrite(old->text, *content, home->store.path_of(home->name).string());
   if (!text) return refuse(text.error());
-  return saved(*home, home->store.save(home->name, old->text, *text, note), json);
+  return saved(*home, home->store.save(home->name, old->text, *text, note), options.json);
 }
 
 void tell_kept(const fs::path& table, const std::string& name) {
@@ -97,8 +97,8 @@ void tell_kept(const fs::path& table, const std::string& name) {
   }
 }
 
-int edit(const Places& places, const std::string& table, bool json) {
-  auto home = home_of(places, table);
+int edit(const Places& places, const TableOptions& options) {
+  auto home = home_of(places, options.table);
   if (!home) return refuse(home.error());
   const auto old = read_home(*home);
   if (!old) return refuse(old.error());
@@ -112,13 +112,13 @@ int edit(const Places& places, const std::string& table, bool json) {
   std::error_code ignored;
   if (text && *text == old->text) {
     fs::remove(*aside, ignored);
-    return edited ? unchanged(*home, json) : refuse(editor_failure(editor));
+    return edited ? unchanged(*home, options.json) : refuse(editor_failure(editor));
   }
   if (text && edited) {
     const auto revision = home->store.save(home->name, old->text, *text, "edit");
     if (revision) {
       fs::remove(*aside, ignored);
-      return saved(*home, revision, json);
+      return saved(*home, revision, options.json);
     }
     return kept_there(path, *aside, revision.error());
   }
@@ -128,10 +128,10 @@ int edit(const Places& places, const std::string& table, bool json) {
   return kept_there(path, *aside, editor_failure(editor));
 }
 
-int copy(const Places& places, const std::string& from, const std::string& to, bool json) {
-  const auto source = open_table(places, from);
+int copy(const Places& places, const Copy& wanted) {
+  const auto source = open_table(places, wanted.table);
   if (!source) return refuse(source.error());
-  auto home = home_of(places, to);
+  auto home = home_of(places, wanted.to);
   if (!home) return refuse(home.error());
   const auto text = tables::read_text((*source)->path());
   if (!text) return refuse(text.error());
@@ -140,11 +140,11 @@ int copy(const Places& places, const std::string& from, const std::string& to, b
   content->name = home->name;
   const auto renamed = tables::rewrite(*text, *content, (*source)->path());
   if (!renamed) return refuse(renamed.error());
-  return saved(*home, create_in(*home, *renamed, "copy of " + from), json);
+  return saved(*home, create_in(*home, *renamed, "copy of " + wanted.table), wanted.json);
 }
 
-int log(const Places& places, const std::string& table, bool json) {
-  const auto home = home_of(places, table);
+int log(const Places& places, const TableOptions& options) {
+  const auto home = home_of(places, options.table);
   if (!home) return refuse(home.error());
   const auto revisions = home->store.log(home->name);
   if (!revisions) return refuse(revisions.error());
@@ -158,46 +158,42 @@ int log(const Places& places, const std::string& table, bool json) {
                    {"note", revision.note},
                    {"sha256", revision.content_hash},
                    {"tags", revision.tags}});
-    if (json) continue;
+    if (options.json) continue;
     std::string tags;
     for (const std::string& tag : revision.tags) tags += "  [" + bushd::printable(tag) + "]";
     fmt::print("{:>5}  {}  {}  {}{}\n", revision.number, revision.time,
                revision.content_hash.substr(0, tables::kShortHashLength),
                bushd::printable(revision.note), tags);
   }
-  if (json) {
-    print_json(all);
-  }
+  if (options.json) print_json(all);
   return kDone;
 }
 
-int revert(const Places& places, const std::string& table, const std::string& revision, bool json) {
-  auto home = home_of(places, table);
+int revert(const Places& places, const Revert& wanted) {
+  auto home = home_of(places, wanted.table);
   if (!home) return refuse(home.error());
   const auto now = home->store.read(home->name);
-  const auto then = home->store.read(home->name, revision);
+  const auto then = home->store.read(home->name, wanted.revision);
   if (!then) return refuse(then.error());
   const std::string note = fmt::format("revert to {}", then->content.revision);
   // The file may be gone, or be no table any more; what else stands there is not written over.
-  if (!now) return saved(*home, create_in(*home, then->text, note), json);
-  return saved(*home, home->store.save(home->name, now->text, then->text, note), json);
+  if (!now) return saved(*home, create_in(*home, then->text, note), wanted.json);
+  return saved(*home, home->store.save(home->name, now->text, then->text, note), wanted.json);
 }
 
-int tag(const Places& places, const std::string& table, const std::string& tag,
-        const std::string& revision, bool json) {
-  auto home = home_of(places, table);
+int tag(const Places& places, const Tag& wanted) {
+  auto home = home_of(places, wanted.table);
   if (!home) return refuse(home.error());
-  const auto number = home->store.tag(home->name, tag, revision);
+  const auto number = home->store.tag(home->name, wanted.tag, wanted.revision);
   if (!number) {
     const auto now = read_home(*home);
     return refuse(now ? number.error() : now.error());
   }
-  if (json) {
-    const nlohmann::ordered_json said = {{"name", home->name}, {"revision", *number}, {"tag", tag}};
-    print_json(said);
+  if (wanted.json) {
+    print_json({{"name", home->name}, {"revision", *number}, {"tag", wanted.tag}});
   } else {
     fmt::print("{}: revision {} is {}\n", bushd::printable(home->name), *number,
-               bushd::printable(tag));
+               bushd::printable(wanted.tag));
   }
   return kDone;
 }

@@ -1,6 +1,5 @@
 #include <charconv>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -41,46 +40,38 @@ std::string refuse_no_number(const std::string& value) {
 
 }  // namespace
 
-void add_envelope_options(CLI::App& app, const Places& places, const Run& run) {
-  const auto options = std::make_shared<Envelope>();
-  CLI::App* command = app.add_subcommand(
-      "envelope", "Make, change and draw an envelope: a move of several speeds that has a name");
+void add_envelope_options(Commands& commands) {
+  const auto [command, options] = commands.add<Envelope>(
+      "envelope", "Make, change and draw an envelope: a move of several speeds that has a name",
+      envelope);
   command->add_option("ENVELOPE", options->name, "An envelope's name, or a file NAME.envelope")
       ->required();
-  command->add_option("--table", options->table, "Table of its motor, beside it or shipped")
-      ->type_name("TABLE");
+  add_value(command, "--table", options->table, "TABLE",
+            "Table of its motor, beside it or shipped");
   command
       ->add_option_function<std::vector<std::string>>(
           "--zone",
-          [options](const std::vector<std::string>& zones) {
-            for (const std::string& zone : zones) options->zones.push_back(*zone_of(zone));
+          [&zones = options->zones](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) zones.push_back(*zone_of(text));
           },
           "From there on at most so fast per second; several, in the order of the way")
       ->check(refuse_no_zone)
       ->type_name("FROM:SPEED");
-  command->add_option("--end", options->end, "Where the motion ends")
-      ->check(refuse_no_number)
-      ->type_name("PLACE");
+  add_value(command, "--end", options->end, "PLACE", "Where the motion ends")
+      ->check(refuse_no_number);
   command
       ->add_option("--by", options->by,
                    "Places are distances from where the motion begins, or positions")
       ->check(CLI::IsMember({"distance", "position"}));
-  command
-      ->add_option("--steps-per-unit", options->steps_per_unit,
-                   "Numbers are in a unit of so many steps, as those of its motor (default: steps)")
-      ->check(refuse_not_positive)
-      ->type_name("STEPS");
-  command->add_option("--description", options->description, "What it is for")->type_name("TEXT");
+  add_value(command, "--steps-per-unit", options->steps_per_unit, "STEPS",
+            "Numbers are in a unit of so many steps, as those of its motor (default: steps)")
+      ->check(refuse_not_positive);
+  add_value(command, "--description", options->description, "TEXT", "What it is for");
   command->add_flag("--replace", options->replace,
                     "Change what is given in an envelope that exists");
   command->add_flag("--json", options->json, "Print JSON");
-  command
-      ->add_option("--svg", options->svg,
-                   "Write speed over steps and time, and acceleration, as SVG")
-      ->type_name("FILE");
-  command->add_option("--png", options->png, "Write the same as PNG")->type_name("FILE");
+  add_picture_options(command, options->svg, options->png);
   command->footer("Without changes it shows and draws the envelope.");
-  run(command, [&places, options] { return envelope(places, *options); });
 }
 
 }  // namespace bushtab

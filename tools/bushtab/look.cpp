@@ -133,29 +133,27 @@ int list(const Places& places, bool json) {
   return result;
 }
 
-int time(const Places& places, const std::string& name, const std::vector<std::uint32_t>& steps,
-         bool json) {
-  const auto table = open_table(places, name);
+int time(const Places& places, const Times& wanted) {
+  const auto table = open_table(places, wanted.table);
   if (!table) return refuse(table.error());
   ordered_json all = ordered_json::array();
-  for (const std::uint32_t count : steps) {
+  for (const std::uint32_t count : wanted.steps) {
     const auto move = tables::move_time((*table)->view(), count);
     const double peak = move.fastest_code == 0 ? 0.0 : hz(**table, move.fastest_code);
     all.push_back({{"steps", count}, {"time_ns", move.time_ns}, {"peak_steps_per_s", peak}});
-    if (!json) {
+    if (!wanted.json) {
       fmt::print("{:>10} steps  {:>14.3f} ms  up to {:.6g} steps/s\n", count,
                  static_cast<double>(move.time_ns) * 1e-6, peak);
     }
   }
-  if (json) print_json(all);
+  if (wanted.json) print_json(all);
   return kDone;
 }
 
-int diff(const Places& places, const std::string& before_name, const std::string& after_name,
-         bool json) {
-  const auto before = open_table(places, before_name);
+int diff(const Places& places, const Diff& wanted) {
+  const auto before = open_table(places, wanted.before);
   if (!before) return refuse(before.error());
-  const auto after = open_table(places, after_name);
+  const auto after = open_table(places, wanted.after);
   if (!after) return refuse(after.error());
   const bushd_table& a = (*before)->view();
   const bushd_table& b = (*after)->view();
@@ -195,7 +193,7 @@ int diff(const Places& places, const std::string& before_name, const std::string
         {{"steps_per_s", speed_hz}, {"before", entry(**before)}, {"after", entry(**after)}});
   }
   const ordered_json summary = summary_of(**before, **after, by_step.size());
-  if (json) {
+  if (wanted.json) {
     print_json({{"same_content", same},
                 {"summary", summary},
                 {"by_step", by_step},

@@ -29,14 +29,12 @@ int run(int argc, char** argv) {
       ->type_name("FILE");
 
   std::function<int()> chosen;
-  const bushtab::Run on = [&chosen](CLI::App* command, std::function<int()> action) {
-    command->final_callback([&chosen, action = std::move(action)] { chosen = action; });
-  };
-  bushtab::add_new_options(app, places, on);
-  bushtab::add_wizard_options(app, places, on);
-  bushtab::add_envelope_options(app, places, on);
-  bushtab::add_edit_options(app, places, on);
-  bushtab::add_look_options(app, places, on);
+  bushtab::Commands commands(app, places, chosen);
+  bushtab::add_new_options(commands);
+  bushtab::add_wizard_options(commands);
+  bushtab::add_envelope_options(commands);
+  bushtab::add_edit_options(commands);
+  bushtab::add_look_options(commands);
   if (const auto words = bushd::completion_asked(argc, argv)) {
     auto completion = bushd::complete(app, *words);
     places.directory = completion.given["--dir"];

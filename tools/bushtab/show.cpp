@@ -170,8 +170,8 @@ bushd::Result<void> keeps(const Table& table, const bushd::Converter& converter)
 
 }  // namespace
 
-int show(const Places& places, const std::string& name, const Show& wanted) {
-  const auto table = open_table(places, name);
+int show(const Places& places, const Show& wanted) {
+  const auto table = open_table(places, wanted.table);
   if (!table) return refuse(table.error());
   if (wanted.converter) {
     const auto kept = keeps(**table, *wanted.converter);
@@ -189,7 +189,7 @@ int show(const Places& places, const std::string& name, const Show& wanted) {
 int saved(const Home& home, const bushd::Result<std::uint32_t>& revision, bool json) {
   if (!revision) return refuse(revision.error());
   const std::string path = home.store.path_of(home.name).string();
-  if (json) return show(Places{}, path, {.json = true});
+  if (json) return show(Places{}, {{path, true}});
   fmt::print("{}: revision {}\n", bushd::printable(path), *revision);
   return kDone;
 }
