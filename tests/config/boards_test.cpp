@@ -18,39 +18,26 @@ const std::string kBoard =
     "[[motor]]\nname = \"m0\"\nmcu = \"board\"\noutput = 7\ngroup = \"axes\"\n";
 const std::string kKeypad = kBoard + "[[keypad]]\nport = \"/dev/b\"\nmotor = \"m0\"\n";
 
-std::string changed(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  if (at == std::string::npos) throw std::runtime_error(from);
-  return text.replace(at, from.size(), to);
-}
-
-std::string board_error(const std::string& text) {
-  const auto config = ConfigFile(text).load();
-  return config ? "none" : config.error().text();
-}
-
 TEST(ConfigBoards, BoardStandsForAnMcuOfItsName) {
-  const auto config = ConfigFile(kBoard).load();
-  ASSERT_TRUE(config) << config.error().text();
-  EXPECT_EQ(config->buses[0].kind, config::BusKind::kCommutator);
-  EXPECT_EQ(config->buses[0].start_hz, 100u);
-  EXPECT_EQ(config->buses[0].answer_ms, 100u);
-  ASSERT_EQ(config->mcus.size(), 1u);
-  EXPECT_EQ(config->mcus[0].id, "board");
+  const auto config = loaded(kBoard);
+  EXPECT_EQ(config.buses[0].kind, config::BusKind::kCommutator);
+  EXPECT_EQ(config.buses[0].start_hz, 100u);
+  EXPECT_EQ(config.buses[0].answer_ms, 100u);
+  ASSERT_EQ(config.mcus.size(), 1u);
+  EXPECT_EQ(config.mcus[0].id, "board");
   EXPECT_TRUE(ConfigFile(kBoard + "limit_action = \"immediate\"\n").load());
 }
 
 const std::string kConverter = "converter = { max_hz = 2500, max_code = 250 }\n";
 
 TEST(ConfigBoards, BoardMayHaveAConverterInPlaceOfDelayCodes) {
-  const std::string text = changed(kBoard, "start_hz = 100\n", kConverter);
-  const auto config = ConfigFile(text).load();
-  ASSERT_TRUE(config) << config.error().text();
-  EXPECT_EQ(config->buses[0].converter, (Converter{.max_hz = 2500, .max_code = 250}));
-  EXPECT_EQ(config->buses[0].start_hz, 0u);
-  EXPECT_EQ(config->buses[0].answer_ms, 100u);
+  const std::string text = replaced(kBoard, "start_hz = 100\n", kConverter);
+  const auto config = loaded(text);
+  EXPECT_EQ(config.buses[0].converter, (Converter{.max_hz = 2500, .max_code = 250}));
+  EXPECT_EQ(config.buses[0].start_hz, 0u);
+  EXPECT_EQ(config.buses[0].answer_ms, 100u);
   const auto refused = [&text](const std::string& from, const std::string& to) {
-    return board_error(changed(text, from, to));
+    return error_of(replaced(text, from, to));
   };
   EXPECT_THAT(refused("baud", "start_hz = 100\nbaud"), HasSubstr("Remove one of both lines"));
   EXPECT_THAT(refused(kConverter, "converter = 5\n"),
@@ -70,34 +57,33 @@ TEST(ConfigBoards, BoardMayHaveAConverterInPlaceOfDelayCodes) {
 }
 
 TEST(ConfigBoards, WhatABoardDoesNotHaveIsRefused) {
-  EXPECT_THAT(board_error(changed(kBoard, "start_hz = 100\n", "")), HasSubstr("start_hz"));
-  EXPECT_THAT(board_error(changed(kBoard, "= 100\n", "= 101\n")), HasSubstr("1..100 Hz"));
+  EXPECT_THAT(error_of(replaced(kBoard, "start_hz = 100\n", "")), HasSubstr("start_hz"));
+  EXPECT_THAT(error_of(replaced(kBoard, "= 100\n", "= 101\n")), HasSubstr("1..100 Hz"));
   EXPECT_THAT(
-      board_error(changed(kBoard, "baud", "tick_us = 2560\nbaud")),
+      error_of(replaced(kBoard, "baud", "tick_us = 2560\nbaud")),
       HasSubstr(
           "unknown key; allowed here: name, kind, port, baud, start_hz, converter, answer_ms"));
-  EXPECT_THAT(board_error(changed(kBoard, "output = 7", "output = 8")),
+  EXPECT_THAT(error_of(replaced(kBoard, "output = 7", "output = 8")),
               HasSubstr("is 8; allowed: 0..7 on commutator board \"board\""));
-  EXPECT_THAT(board_error(changed(kBoard, "baud", "emergency_stop = \"disable\"\nbaud")),
+  EXPECT_THAT(error_of(replaced(kBoard, "baud", "emergency_stop = \"disable\"\nbaud")),
               HasSubstr("nothing on a bus of this kind can disable drivers; allowed: \"ramp\""));
-  EXPECT_THAT(board_error(kBoard + "limit = \"both\"\n"), HasSubstr("limit switches of its own"));
-  EXPECT_THAT(board_error(kBoard + "home = { direction = \"negative\", most_steps = 5 }\n"),
+  EXPECT_THAT(error_of(kBoard + "limit = \"both\"\n"), HasSubstr("limit switches of its own"));
+  EXPECT_THAT(error_of(kBoard + "home = { direction = \"negative\", most_steps = 5 }\n"),
               HasSubstr("motor[0].home"));
-  EXPECT_THAT(board_error("[[mcu]]\nbus = \"board\"\naddress = 1\n" + kBoard),
+  EXPECT_THAT(error_of("[[mcu]]\nbus = \"board\"\naddress = 1\n" + kBoard),
               HasSubstr("Remove this section; its motors have mcu = \"board\""));
   // The table's fastest code is 10 of 40 us.
-  EXPECT_EQ(board_error(changed(kBoard, "= 100\n", "= 10\n")), "none");
-  EXPECT_THAT(board_error(changed(kBoard, "= 100\n", "= 9\n")),
+  EXPECT_EQ(error_of(replaced(kBoard, "= 100\n", "= 10\n")), "no error");
+  EXPECT_THAT(error_of(replaced(kBoard, "= 100\n", "= 9\n")),
               HasSubstr("has steps 400000 ns apart; allowed: 444444 ns and more"));
-  EXPECT_THAT(board_error(changed(kBoard, "\"commutator\"", "\"can\"")),
+  EXPECT_THAT(error_of(replaced(kBoard, "\"commutator\"", "\"can\"")),
               HasSubstr("allowed: \"rs485\", \"serial-pulse\" or \"commutator\""));
 }
 
 TEST(ConfigKeypads, KeysHaveDefaults) {
-  const auto config = ConfigFile(kKeypad).load();
-  ASSERT_TRUE(config) << config.error().text();
-  ASSERT_EQ(config->keypads.size(), 1u);
-  const config::Keypad& keypad = config->keypads[0];
+  const auto config = loaded(kKeypad);
+  ASSERT_EQ(config.keypads.size(), 1u);
+  const config::Keypad& keypad = config.keypads[0];
   EXPECT_EQ(keypad.baud, 625u);
   EXPECT_FALSE(keypad.latched);
   EXPECT_EQ(keypad.delay_us, 3'000u);
@@ -106,26 +92,26 @@ TEST(ConfigKeypads, KeysHaveDefaults) {
 }
 
 TEST(ConfigKeypads, WhatCannotBeIsRefused) {
-  EXPECT_THAT(board_error(changed(kKeypad, "motor = \"m0\"", "motor = \"m1\"")),
+  EXPECT_THAT(error_of(replaced(kKeypad, "motor = \"m0\"", "motor = \"m1\"")),
               HasSubstr("keypad[0].motor: is \"m1\"; allowed: the name of a motor"));
-  EXPECT_THAT(board_error(changed(kKeypad, "/dev/b", "/dev/a")), HasSubstr("is already taken"));
+  EXPECT_THAT(error_of(replaced(kKeypad, "/dev/b", "/dev/a")), HasSubstr("is already taken"));
   for (const char* spelling : {"/dev/../dev/a", "//dev/./a"}) {
-    EXPECT_THAT(board_error(changed(kKeypad, "/dev/b", spelling)),
+    EXPECT_THAT(error_of(replaced(kKeypad, "/dev/b", spelling)),
                 HasSubstr("is already taken: it is, or may be, \"/dev/a\" of bus \"board\""))
         << spelling;
   }
   EXPECT_THAT(
-      board_error(changed(changed(kKeypad, "/dev/a", "/dev/tty[ab]"), "/dev/b", "/dev/ttya")),
+      error_of(replaced(replaced(kKeypad, "/dev/a", "/dev/tty[ab]"), "/dev/b", "/dev/ttya")),
       HasSubstr("is already taken: it is, or may be, \"/dev/tty[ab]\""));
-  EXPECT_THAT(board_error(kKeypad + "[[keypad]]\nport = \"/dev/../dev/b\"\nmotor = \"m0\"\n"),
+  EXPECT_THAT(error_of(kKeypad + "[[keypad]]\nport = \"/dev/../dev/b\"\nmotor = \"m0\"\n"),
               HasSubstr("\"/dev/b\" of another [[keypad]]"));
-  EXPECT_THAT(board_error(kKeypad + "mode = \"toggle\"\n"),
+  EXPECT_THAT(error_of(kKeypad + "mode = \"toggle\"\n"),
               HasSubstr("allowed: \"hold\" or \"latch\""));
-  EXPECT_THAT(board_error(kKeypad + "baud = 1\n"), HasSubstr("50..4000000"));
-  EXPECT_THAT(board_error(kKeypad + "keepalive_ms = 49\n"), HasSubstr("50..10000"));
-  EXPECT_THAT(board_error(kKeypad + "slowest_us = 2000\n"),
+  EXPECT_THAT(error_of(kKeypad + "baud = 1\n"), HasSubstr("50..4000000"));
+  EXPECT_THAT(error_of(kKeypad + "keepalive_ms = 49\n"), HasSubstr("50..10000"));
+  EXPECT_THAT(error_of(kKeypad + "slowest_us = 2000\n"),
               HasSubstr("slowest_us = 2000 is below delay_us = 3000"));
-  EXPECT_THAT(board_error(kKeypad + "speed = 3\n"), HasSubstr("unknown key"));
+  EXPECT_THAT(error_of(kKeypad + "speed = 3\n"), HasSubstr("unknown key"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "config/config.h"
+#include "results.h"
 #include "tables/temp_directory.h"
 
 namespace bushd::test {
@@ -59,6 +60,7 @@ class ConfigFile {
     path_ = directory_.write("bushd.toml", text);
   }
   Result<config::Config> load() const { return config::load(path_); }
+  std::string error() const { return error_of(load()); }
   const TempDirectory& directory() const { return directory_; }
   const std::string& path() const { return path_; }
 
@@ -67,9 +69,13 @@ class ConfigFile {
   std::string path_;
 };
 
+// What the text of a good configuration says; the error of another one ends the test.
+inline config::Config loaded(const std::string& text) {
+  return good(ConfigFile(text).load());
+}
+
 inline std::string error_of(const std::string& configuration) {
-  const auto config = ConfigFile(configuration).load();
-  return config ? "no error" : config.error().text();
+  return ConfigFile(configuration).error();
 }
 
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
@@ -78,12 +84,16 @@ inline std::string replaced(std::string text, const std::string& from, const std
   return text.replace(at, from.size(), to);
 }
 
-// Lines in the first [[mcu]], "hall:1", and in the first [[motor]], "theta" at output 0 of that.
+// Lines in the first [[mcu]], "hall:1", and in the first [[motor]], "theta" at output 0 of that;
+// then from line 37 on, in the second [[motor]], "slit".
 inline std::string of_mcu(const std::string& keys, const std::string& text = kGood) {
   return replaced(text, "address = 1\n", "address = 1\n" + keys);
 }
 inline std::string of_motor(const std::string& keys, const std::string& text = kGood) {
   return replaced(text, "output = 0\n", "output = 0\n" + keys);
+}
+inline std::string of_slit(const std::string& keys) {
+  return replaced(kGood, "output = 15\n", "output = 15\n" + keys);
 }
 
 }  // namespace bushd::test

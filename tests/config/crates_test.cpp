@@ -12,6 +12,7 @@ namespace {
 
 using test::ConfigFile;
 using test::kGood;
+using test::loaded;
 using test::replaced;
 using testing::HasSubstr;
 
@@ -33,23 +34,21 @@ std::string error_of(const std::string& from, const std::string& to) {
 }
 
 TEST(ConfigCrates, NoneIsNeeded) {
-  const auto config = ConfigFile(kGood).load();
-  ASSERT_TRUE(config) << config.error().text();
-  EXPECT_TRUE(config->crates.empty());
+  const auto config = loaded(kGood);
+  EXPECT_TRUE(config.crates.empty());
 }
 
 TEST(ConfigCrates, ModulesHaveStationsAndMotors) {
-  const auto config = ConfigFile(kCrate).load();
-  ASSERT_TRUE(config) << config.error().text();
-  ASSERT_EQ(config->crates.size(), 1u);
-  EXPECT_EQ(config->crates[0].number, 1);
-  ASSERT_EQ(config->crates[0].modules.size(), 2u);
-  const CamacModule& two = config->crates[0].modules[0];
+  const auto config = loaded(kCrate);
+  ASSERT_EQ(config.crates.size(), 1u);
+  EXPECT_EQ(config.crates[0].number, 1);
+  ASSERT_EQ(config.crates[0].modules.size(), 2u);
+  const CamacModule& two = config.crates[0].modules[0];
   EXPECT_EQ(two.station, 5);
   EXPECT_EQ(two.type, CamacModule::Type::kBushd2);
   EXPECT_EQ(two.f_start_hz, 100);
   EXPECT_EQ(two.motors, std::vector<MotorId>{MotorId{0}});
-  const CamacModule& one = config->crates[0].modules[1];
+  const CamacModule& one = config.crates[0].modules[1];
   EXPECT_EQ(one.station, 7);
   EXPECT_EQ(one.type, CamacModule::Type::kBushd1);
   EXPECT_EQ(one.motors, std::vector<MotorId>{MotorId{1}});
@@ -57,14 +56,14 @@ TEST(ConfigCrates, ModulesHaveStationsAndMotors) {
 }
 
 TEST(ConfigCrates, TheAdjustableDelayIsOfOneOfTwoRuns) {
-  const auto loaded = [](const std::string& word) {
+  const auto delayed = [](const std::string& word) {
     return ConfigFile(kCrate + "adjustable_delay = \"" + word + "\"\n").load();
   };
-  EXPECT_EQ(loaded("return")->crates[0].modules[1].adjustable_delay,
+  EXPECT_EQ(delayed("return")->crates[0].modules[1].adjustable_delay,
             CamacModule::AdjustableDelay::kReturn);
-  EXPECT_EQ(loaded("opening")->crates[0].modules[1].adjustable_delay,
+  EXPECT_EQ(delayed("opening")->crates[0].modules[1].adjustable_delay,
             CamacModule::AdjustableDelay::kOpening);
-  EXPECT_THAT(loaded("both").error().text(),
+  EXPECT_THAT(delayed("both").error().text(),
               HasSubstr("is \"both\"; allowed: \"return\" or \"opening\""));
   EXPECT_THAT(error_of("f_start_hz = 100", "adjustable_delay = \"return\""),
               HasSubstr("adjustable_delay"))
@@ -74,11 +73,10 @@ TEST(ConfigCrates, TheAdjustableDelayIsOfOneOfTwoRuns) {
 TEST(ConfigCrates, WithoutAComputerItsMcuHasToConsent) {
   const std::string alone = replaced(kCrate, "f_start_hz = 100", "without_computer = true");
   EXPECT_THAT(test::error_of(alone), HasSubstr("programs_without_host = true in its [[mcu]]"));
-  const auto loaded =
-      ConfigFile(replaced(alone, "[[mcu]]\n", "[[mcu]]\nprograms_without_host = true\n")).load();
-  ASSERT_TRUE(loaded) << loaded.error().text();
-  EXPECT_TRUE(loaded->crates[0].modules[0].without_computer);
-  EXPECT_FALSE(loaded->crates[0].modules[1].without_computer);
+  const auto config =
+      loaded(replaced(alone, "[[mcu]]\n", "[[mcu]]\nprograms_without_host = true\n"));
+  EXPECT_TRUE(config.crates[0].modules[0].without_computer);
+  EXPECT_FALSE(config.crates[0].modules[1].without_computer);
 }
 
 TEST(ConfigCrates, BadOnesAreRefused) {
@@ -100,7 +98,7 @@ TEST(ConfigCrates, BadOnesAreRefused) {
               HasSubstr("motor \"theta\" is already one of station 5 of crate 1; allowed: each "
                         "once"));
   EXPECT_THAT(error_of("[\"theta\"]", "[\"theta\", \"theta\"]"), HasSubstr("each once"));
-  EXPECT_THAT(ConfigFile(kCrate + "[[crate]]\nnumber = 1\nmodule = []\n").load().error().text(),
+  EXPECT_THAT(test::error_of(kCrate + "[[crate]]\nnumber = 1\nmodule = []\n"),
               HasSubstr("crate 1 is already there"));
   EXPECT_THAT(error_of("number = 1\n", "number = 1\nname = \"a\"\n"), HasSubstr("name"));
 }
@@ -108,10 +106,8 @@ TEST(ConfigCrates, BadOnesAreRefused) {
 TEST(ConfigCrates, ProgramsChangeTheTableOfNobodyElse) {
   const std::string same_group =
       replaced(kCrate, "group = \"slits\"\n", "group = \"goniometer\"\n");
-  const auto config = ConfigFile(same_group).load();
-  ASSERT_FALSE(config);
   EXPECT_THAT(
-      config.error().text(),
+      test::error_of(same_group),
       HasSubstr("motor \"theta\" of station 5 of crate 1 moves by programs, which become "
                 "the table of group \"goniometer\", and motor \"slit\" has the same group"));
 }

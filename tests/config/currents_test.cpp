@@ -10,8 +10,8 @@
 namespace bushd::config {
 namespace {
 
-using test::ConfigFile;
 using test::error_of;
+using test::loaded;
 using test::of_mcu;
 using test::of_motor;
 using testing::HasSubstr;
@@ -23,16 +23,14 @@ std::string with(const std::string& currents, const std::string& steps = "phases
 
 TEST(Currents, AreReadOfAMotorWithPhases) {
   const auto config =
-      ConfigFile(with("{ ramp_ma = 1500, cruise_ma = 1000, hold_ma = 300, decay = \"fast\" }"))
-          .load();
-  ASSERT_TRUE(config) << config.error().text();
-  const auto& currents = config->motors[0].drive.currents;
+      loaded(with("{ ramp_ma = 1500, cruise_ma = 1000, hold_ma = 300, decay = \"fast\" }"));
+  const auto& currents = config.motors[0].drive.currents;
   ASSERT_TRUE(currents);
   EXPECT_EQ(currents->ramp_ma, 1500);
   EXPECT_EQ(currents->cruise_ma, 1000);
   EXPECT_EQ(currents->hold_ma, 300);
   EXPECT_TRUE(currents->fast_decay);
-  EXPECT_FALSE(config->motors[1].drive.currents);
+  EXPECT_FALSE(config.motors[1].drive.currents);
 }
 
 TEST(Currents, WhatIsWrongIsNamed) {

@@ -8,25 +8,15 @@ namespace bushd::config {
 namespace {
 
 using test::ConfigFile;
+using test::error_of;
+using test::loaded;
 using test::of_mcu;
 using test::replaced;
 using testing::EndsWith;
 using testing::HasSubstr;
 
 bushd_emission settings_of(const std::string& keys) {
-  const auto config = ConfigFile(of_mcu(keys)).load();
-  if (!config) {
-    ADD_FAILURE() << config.error().text();
-    return {};
-  }
-  return config->mcus[0].emission.settings;
-}
-
-std::string emission_error(const std::string& text) {
-  const ConfigFile file(text);
-  const auto config = file.load();
-  if (config) return "no error";
-  return config.error().text().substr(file.path().size() + 1);
+  return loaded(of_mcu(keys)).mcus[0].emission.settings;
 }
 
 TEST(EmissionKeys, EvenIsTheDefault) {
@@ -78,39 +68,39 @@ TEST(EmissionKeys, TheSettlingTimeIsMeasuredWhereThatIsAskedFor) {
   EXPECT_FALSE(measures(staggered));
   EXPECT_FALSE(measures(staggered + "settle_us = 65535\n"));
   EXPECT_FALSE(measures(staggered + "settle_us = 0\n")) << "none is said";
-  EXPECT_THAT(emission_error(of_mcu(staggered + "settle_us = -1\n")),
+  EXPECT_THAT(error_of(of_mcu(staggered + "settle_us = -1\n")),
               HasSubstr("21:13: mcu[0].settle_us: is -1; allowed: a whole number 0..65535 us or "
                         "\"measured\""));
-  EXPECT_THAT(emission_error(of_mcu(staggered + "settle_us = \"yes\"\n")),
+  EXPECT_THAT(error_of(of_mcu(staggered + "settle_us = \"yes\"\n")),
               HasSubstr("21:13: mcu[0].settle_us: is \"yes\"; allowed: a whole number 0..65535 us "
                         "or \"measured\""));
 }
 
 TEST(EmissionKeys, WhatIsWrongIsNamedWithItsLine) {
-  EXPECT_THAT(emission_error(of_mcu("steps = \"odd\"\n")),
+  EXPECT_THAT(error_of(of_mcu("steps = \"odd\"\n")),
               EndsWith("19:9: mcu[0].steps: is \"odd\"; allowed: \"even\", \"burst\", "
                        "\"staggered\" or \"phases\""));
-  EXPECT_THAT(emission_error(of_mcu("steps = \"burst\"\n")),
+  EXPECT_THAT(error_of(of_mcu("steps = \"burst\"\n")),
               HasSubstr("16:1: mcu[0].step_us: is missing; allowed: a whole number 1..65535 us"));
-  EXPECT_THAT(emission_error(of_mcu("pulse_us = 2.5\n")),
+  EXPECT_THAT(error_of(of_mcu("pulse_us = 2.5\n")),
               HasSubstr("19:12: mcu[0].pulse_us: is the floating-point number 2.5; allowed: a "
                         "whole number 0..65535 us"));
-  EXPECT_THAT(emission_error(of_mcu("steps = \"phases\"\nhold_current = 1\n")),
+  EXPECT_THAT(error_of(of_mcu("steps = \"phases\"\nhold_current = 1\n")),
               HasSubstr("20:16: mcu[0].hold_current: is 1; allowed: true or false"));
-  EXPECT_THAT(emission_error(of_mcu("steps = \"phases\"\nphase_sequence = \"four\"\n")),
+  EXPECT_THAT(error_of(of_mcu("steps = \"phases\"\nphase_sequence = \"four\"\n")),
               HasSubstr("20:18: mcu[0].phase_sequence: is \"four\"; allowed: \"wave\", \"full\", "
                         "\"half\" or \"three-phase\""));
 }
 
 TEST(EmissionKeys, OneDirForAllNeedsStepsThatBeginWithTheTick) {
-  EXPECT_THAT(emission_error(of_mcu("direction = \"left\"\n")),
+  EXPECT_THAT(error_of(of_mcu("direction = \"left\"\n")),
               EndsWith("19:13: mcu[0].direction: is \"left\"; allowed: \"own\" or \"common\""));
-  EXPECT_THAT(emission_error(of_mcu("direction = \"common\"\n")),
+  EXPECT_THAT(error_of(of_mcu("direction = \"common\"\n")),
               EndsWith("19:13: mcu[0].direction: is \"common\" with steps = \"even\"; allowed: "
                        "\"common\" only with steps = \"burst\", \"staggered\""));
   for (const std::string direction : {"own", "common"}) {
     EXPECT_THAT(
-        emission_error(of_mcu("steps = \"phases\"\ndirection = \"" + direction + "\"\n")),
+        error_of(of_mcu("steps = \"phases\"\ndirection = \"" + direction + "\"\n")),
         EndsWith("20:13: mcu[0].direction: is \"" + direction +
                  "\" with steps = \"phases\"; allowed: only with drivers, which have STEP and "
                  "DIR; remove it"));
@@ -119,7 +109,7 @@ TEST(EmissionKeys, OneDirForAllNeedsStepsThatBeginWithTheTick) {
 
 TEST(EmissionKeys, TheKeyOfBeforeIsRefusedWithTheKeysThatSayTheSame) {
   const auto said = [](const std::string& value) {
-    return emission_error(of_mcu("emission = " + value + "\nstep_us = 300\n"));
+    return error_of(of_mcu("emission = " + value + "\nstep_us = 300\n"));
   };
   EXPECT_THAT(said("\"common-dir\""),
               EndsWith("19:12: mcu[0].emission: is not a key; write steps = \"burst\" with "
@@ -129,14 +119,14 @@ TEST(EmissionKeys, TheKeyOfBeforeIsRefusedWithTheKeysThatSayTheSame) {
 }
 
 TEST(EmissionKeys, KeysThatSayNothingInThisModeAreRefused) {
-  EXPECT_THAT(emission_error(of_mcu("step_us = 300\n")),
+  EXPECT_THAT(error_of(of_mcu("step_us = 300\n")),
               HasSubstr("19:11: mcu[0].step_us: says nothing with steps = \"even\"; allowed: only "
                         "with \"burst\", \"staggered\""));
-  EXPECT_THAT(emission_error(of_mcu("steps = \"burst\"\nstep_us = 9\nsettle_us = 5\n")),
+  EXPECT_THAT(error_of(of_mcu("steps = \"burst\"\nstep_us = 9\nsettle_us = 5\n")),
               HasSubstr("mcu[0].settle_us: says nothing"));
-  EXPECT_THAT(emission_error(of_mcu("steps = \"phases\"\npulse_us = 5\n")),
+  EXPECT_THAT(error_of(of_mcu("steps = \"phases\"\npulse_us = 5\n")),
               HasSubstr("mcu[0].pulse_us: says nothing"));
-  EXPECT_THAT(emission_error(of_mcu("hold_current = true\n")),
+  EXPECT_THAT(error_of(of_mcu("hold_current = true\n")),
               HasSubstr("mcu[0].hold_current: says nothing"));
 }
 
@@ -144,7 +134,7 @@ TEST(EmissionKeys, StepPeriodMustHaveRoomForWhatTheTablesMake) {
   // The table makes up to seven steps in a tick.
   EXPECT_EQ(settings_of("steps = \"burst\"\nstep_us = 365\n").step_us, 365);
   EXPECT_THAT(
-      emission_error(of_mcu("steps = \"burst\"\nstep_us = 366\n")),
+      error_of(of_mcu("steps = \"burst\"\nstep_us = 366\n")),
       HasSubstr("20:11: mcu[0].step_us: is 366: room for 6 steps in the 2560 us tick of bus "
                 "\"hall\", but motor \"theta\" makes up to 7 by table \"bushd2-constant\"; "
                 "allowed: 365 or less. Or use a slower table"));
@@ -152,9 +142,9 @@ TEST(EmissionKeys, StepPeriodMustHaveRoomForWhatTheTablesMake) {
 
 TEST(EmissionKeys, PhasesHaveFourOutputsAMotor) {
   const std::string phases = of_mcu("steps = \"phases\"\n");
-  EXPECT_EQ(emission_error(replaced(phases, "output = 0\n", "output = 3\n")), "no error");
+  EXPECT_EQ(error_of(replaced(phases, "output = 0\n", "output = 3\n")), "no error");
   EXPECT_THAT(
-      emission_error(replaced(phases, "output = 0\n", "output = 4\n")),
+      error_of(replaced(phases, "output = 0\n", "output = 4\n")),
       HasSubstr("32:10: motor[0].output: is 4; allowed: 0..3 on MCU \"hall:1\", where phases "
                 "take 4 outputs a motor"));
 }
@@ -167,8 +157,7 @@ TEST(EmissionKeys, NoStepOfATableWaitsForDir) {
                                    "table = \"bushd2-constant\"", "table = \"fast\""));
     file.directory().write("fast.toml", "name = \"fast\"\ntime_unit_ns = 1000\naccel = [" +
                                             std::to_string(us) + ", 200]\n");
-    const auto config = file.load();
-    return config ? "no error" : config.error().text();
+    return file.error();
   };
   EXPECT_THAT(
       with_first_delay(200, 1000),
@@ -183,23 +172,23 @@ TEST(EmissionKeys, NoStepOfATableWaitsForDir) {
 
 // What no MCU can do is found before one is asked.
 TEST(EmissionKeys, WhatNoMcuCanDoIsRefused) {
-  EXPECT_THAT(emission_error(of_mcu("dir_setup_us = 65535\n")),
+  EXPECT_THAT(error_of(of_mcu("dir_setup_us = 65535\n")),
               HasSubstr("19:16: mcu[0].dir_setup_us: is 65535 us; allowed: less than the length of "
                         "the 2560 us tick of bus \"hall\", 2520 us at most"));
-  EXPECT_THAT(emission_error(of_mcu("dir_setup_us = 2560\n")), HasSubstr("is 2560 us"));
+  EXPECT_THAT(error_of(of_mcu("dir_setup_us = 2560\n")), HasSubstr("is 2560 us"));
   EXPECT_EQ(settings_of("dir_setup_us = 2400\n").dir_setup_us, 2400);
   // Half a slot is 2520 / 256 us.
   EXPECT_THAT(
-      emission_error(of_mcu("pulse_us = 10\n")),
+      error_of(of_mcu("pulse_us = 10\n")),
       HasSubstr("mcu[0].pulse_us: is 10 us; allowed: half a slot of the 2560 us tick of bus "
                 "\"hall\", 9 us at most. Use a longer tick_us"));
   EXPECT_EQ(settings_of("pulse_us = 9\n").pulse_us, 9);
   EXPECT_THAT(
-      emission_error(
+      error_of(
           of_mcu("direction = \"common\"\nsteps = \"burst\"\nstep_us = 300\ndir_setup_us = 10\n")),
       HasSubstr(
           "mcu[0].dir_setup_us: is 10 us; allowed: less than half a slot of the 2560 us tick"));
-  EXPECT_THAT(emission_error(of_mcu("steps = \"burst\"\nstep_us = 2560\n")),
+  EXPECT_THAT(error_of(of_mcu("steps = \"burst\"\nstep_us = 2560\n")),
               HasSubstr("mcu[0].step_us: is 2560"));
 }
 

@@ -10,21 +10,18 @@
 namespace bushd::config {
 namespace {
 
-using test::ConfigFile;
 using test::kGood;
+using test::loaded;
+using test::of_slit;
 using test::replaced;
 
 std::string with_mcu(const std::string& keys) {
   return replaced(kGood, "address = 255\n", "address = 255\n" + keys);  // from line 22 on
 }
-std::string with_motor(const std::string& keys) {
-  return replaced(kGood, "output = 15\n", "output = 15\n" + keys);  // from line 37 on
-}
 
 TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
-  const auto config = ConfigFile(kGood).load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  const Mcu& mcu = config->mcus[0];
+  const auto config = loaded(kGood);
+  const Mcu& mcu = config.mcus[0];
   EXPECT_EQ(mcu.emergency_input, BUSHD_EMERGENCY_INPUT_IGNORED);
   EXPECT_FALSE(mcu.emergency_active_open);
   EXPECT_EQ(mcu.debounce_ticks, 1);
@@ -32,8 +29,8 @@ TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
   EXPECT_EQ(mcu.enable_after_reset, EnableAfterReset::kReady);
   EXPECT_FALSE(mcu.idle_disable_s);
   EXPECT_EQ(mcu.enable_settle_ms, 0u);
-  EXPECT_FALSE(config->motors[0].never_disable);
-  const Motor& motor = config->motors[0];
+  EXPECT_FALSE(config.motors[0].never_disable);
+  const Motor& motor = config.motors[0];
   EXPECT_FALSE(motor.inputs.positive || motor.inputs.negative || motor.inputs.home ||
                motor.inputs.step);
   EXPECT_EQ(motor.inputs.own, (Input{.number = motor.output.value}));
@@ -42,59 +39,49 @@ TEST(ConfigInputs, NothingIsWatchedUnlessItIsAskedFor) {
 
 TEST(ConfigInputs, AnMcuHasItsOwn) {
   const auto config =
-      ConfigFile(with_mcu("emergency_input = \"immediate\"\nemergency_active = \"open\"\n"
-                          "debounce_ticks = 15\novercurrent = 1023\n"
-                          "enable_after_reset = \"at_once\"\n"))
-          .load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  const Mcu& mcu = config->mcus[1];
+      loaded(with_mcu("emergency_input = \"immediate\"\nemergency_active = \"open\"\n"
+                      "debounce_ticks = 15\novercurrent = 1023\n"
+                      "enable_after_reset = \"at_once\"\n"));
+  const Mcu& mcu = config.mcus[1];
   EXPECT_EQ(mcu.emergency_input, BUSHD_EMERGENCY_INPUT_IMMEDIATE);
   EXPECT_TRUE(mcu.emergency_active_open);
   EXPECT_EQ(mcu.debounce_ticks, 15);
   EXPECT_EQ(mcu.overcurrent, 1023);
   EXPECT_EQ(mcu.enable_after_reset, EnableAfterReset::kAtOnce);
-  EXPECT_EQ(config->mcus[0].emergency_input, BUSHD_EMERGENCY_INPUT_IGNORED);
+  EXPECT_EQ(config.mcus[0].emergency_input, BUSHD_EMERGENCY_INPUT_IGNORED);
 }
 
 TEST(ConfigInputs, AnEmergencyMayDisableDrivers) {
   const auto config =
-      ConfigFile(replaced(with_mcu("emergency_input = \"disable\"\n"), "format = \"fine\"\n",
-                          "format = \"fine\"\nemergency_stop = \"disable\"\n"))
-          .load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  EXPECT_EQ(config->mcus[1].emergency_input, BUSHD_EMERGENCY_INPUT_DISABLE);
-  EXPECT_EQ(config->buses[0].emergency_stop, BUSHD_STOP_DISABLE);
+      loaded(replaced(with_mcu("emergency_input = \"disable\"\n"), "format = \"fine\"\n",
+                      "format = \"fine\"\nemergency_stop = \"disable\"\n"));
+  EXPECT_EQ(config.mcus[1].emergency_input, BUSHD_EMERGENCY_INPUT_DISABLE);
+  EXPECT_EQ(config.buses[0].emergency_stop, BUSHD_STOP_DISABLE);
 }
 
 TEST(ConfigInputs, DriversAreDisabledAtRest) {
-  const auto config =
-      ConfigFile(replaced(with_mcu("idle_disable_s = 2.5\nenable_settle_ms = 300\n"),
-                          "output = 15\n", "output = 15\nnever_disable = true\n"))
-          .load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  EXPECT_EQ(config->mcus[1].idle_disable_s, 2.5);
-  EXPECT_EQ(config->mcus[1].enable_settle_ms, 300u);
-  EXPECT_TRUE(config->motors[1].never_disable);
-  const auto at_once = ConfigFile(with_mcu("idle_disable_s = 0\n")).load();
-  ASSERT_TRUE(at_once.has_value()) << at_once.error().text();
-  EXPECT_EQ(at_once->mcus[1].idle_disable_s, 0);
+  const auto config = loaded(replaced(with_mcu("idle_disable_s = 2.5\nenable_settle_ms = 300\n"),
+                                      "output = 15\n", "output = 15\nnever_disable = true\n"));
+  EXPECT_EQ(config.mcus[1].idle_disable_s, 2.5);
+  EXPECT_EQ(config.mcus[1].enable_settle_ms, 300u);
+  EXPECT_TRUE(config.motors[1].never_disable);
+  const auto at_once = loaded(with_mcu("idle_disable_s = 0\n"));
+  EXPECT_EQ(at_once.mcus[1].idle_disable_s, 0);
 }
 
 TEST(ConfigInputs, AMotorHasALimitAtEitherEndOrAtBoth) {
   for (const auto& [word, positive, negative] :
        {std::tuple{"positive", true, false}, {"negative", false, true}, {"both", true, true}}) {
-    const auto config = ConfigFile(with_motor("limit = \"" + std::string(word) +
-                                              "\"\nlimit_action = \"immediate\"\n"
-                                              "input_active = \"open\"\n"))
-                            .load();
-    ASSERT_TRUE(config.has_value()) << config.error().text();
-    const Motor& motor = config->motors[1];
+    const auto config = loaded(of_slit("limit = \"" + std::string(word) +
+                                       "\"\nlimit_action = \"immediate\"\n"
+                                       "input_active = \"open\"\n"));
+    const Motor& motor = config.motors[1];
     const Input own{.number = 15, .active_open = true};
     EXPECT_EQ(motor.inputs.positive, positive ? std::optional(own) : std::nullopt) << word;
     EXPECT_EQ(motor.inputs.negative, negative ? std::optional(own) : std::nullopt) << word;
     EXPECT_EQ(motor.limit_action, BUSHD_STOP_IMMEDIATE);
     EXPECT_EQ(motor.inputs.own, own);
-    EXPECT_FALSE(config->motors[0].inputs.positive);
+    EXPECT_FALSE(config.motors[0].inputs.positive);
   }
 }
 
@@ -127,19 +114,18 @@ TEST(ConfigInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
       {with_mcu("idle_disable_s = -1\n"), 22,
        "mcu[1].idle_disable_s: is -1; allowed: a number 0..1000000 s; 0: at once"},
       {with_mcu("enable_settle_ms = -1\n"), 22, "mcu[1].enable_settle_ms: is -1; allowed: a whole"},
-      {with_motor("never_disable = 1\n"), 37,
-       "motor[1].never_disable: is 1; allowed: true or false"},
+      {of_slit("never_disable = 1\n"), 37, "motor[1].never_disable: is 1; allowed: true or false"},
       {replaced(with_mcu("idle_disable_s = 0\n"), "output = 15\n", "output = 15\nlocal = true\n"),
        38, "motor[1].local: is true, but MCU \"roof:255\" has idle_disable_s"},
       {replaced(with_mcu("idle_disable_s = 1\n"), "output = 15\n", "output = 15\nlocal = true\n"),
        38, "motor[1].local: is true, but MCU \"roof:255\" has idle_disable_s"},
-      {with_motor("limit = \"left\"\n"), 37,
+      {of_slit("limit = \"left\"\n"), 37,
        "motor[1].limit: is \"left\"; allowed: \"positive\", \"negative\" or \"both\""},
-      {with_motor("limit = \"both\"\nlimit_action = \"halt\"\n"), 38,
+      {of_slit("limit = \"both\"\nlimit_action = \"halt\"\n"), 38,
        "motor[1].limit_action: is \"halt\"; allowed: \"ramp\" or \"immediate\""},
-      {with_motor("limit_action = \"immediate\"\n"), 37,
+      {of_slit("limit_action = \"immediate\"\n"), 37,
        "motor[1].limit_action: applies only with a limit"},
-      {with_motor("input_active = \"low\"\n"), 37,
+      {of_slit("input_active = \"low\"\n"), 37,
        "motor[1].input_active: is \"low\"; allowed: \"closed\" or \"open\""},
   };
   test::expect_refused(bad);

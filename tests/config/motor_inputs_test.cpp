@@ -10,25 +10,19 @@
 namespace bushd::config {
 namespace {
 
-using test::ConfigFile;
 using test::kGood;
-using test::replaced;
+using test::loaded;
+using test::of_slit;
 
-// Inputs of "slit", output 15 of "roof:255"; from line 37 on.
-std::string with_motor_inputs(const std::string& keys) {
-  return replaced(kGood, "output = 15\n", "output = 15\n" + keys);
-}
-
-// Beside another one of that MCU, from line 38 on (after its output in 41).
+// Inputs of "slit", output 15 of "roof:255", beside those of another motor of that MCU, from line
+// 38 on (after its output in 41).
 std::string with_two(const std::string& keys, const std::string& others) {
-  return with_motor_inputs(keys) + "[[motor]]\nname = \"blade\"\nmcu = \"roof:255\"\noutput = 2\n" +
-         others + "group = \"slits\"\n";
+  return of_slit(keys) + "[[motor]]\nname = \"blade\"\nmcu = \"roof:255\"\noutput = 2\n" + others +
+         "group = \"slits\"\n";
 }
 
 MotorInputs inputs_of(const std::string& keys) {
-  const auto config = ConfigFile(with_motor_inputs(keys)).load();
-  EXPECT_TRUE(config.has_value()) << config.error().text();
-  return config ? config->motors[1].inputs : MotorInputs{};
+  return loaded(of_slit(keys)).motors[1].inputs;
 }
 
 constexpr const char* kHome = "home = { direction = \"positive\", most_steps = 100 }\n";
@@ -53,11 +47,9 @@ TEST(MotorInputs, EachHasItsLevel) {
 }
 
 TEST(MotorInputs, AsASectionOfItsOwn) {
-  const auto config =
-      ConfigFile(kGood + "[motor.inputs]\npositive = 3\nhome = { input = 3 }\n").load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  EXPECT_EQ(config->motors[1].inputs.positive, Input{3});
-  EXPECT_EQ(config->motors[1].inputs.home, Input{3}) << "a limit may be the home switch";
+  const auto config = loaded(kGood + "[motor.inputs]\npositive = 3\nhome = { input = 3 }\n");
+  EXPECT_EQ(config.motors[1].inputs.positive, Input{3});
+  EXPECT_EQ(config.motors[1].inputs.home, Input{3}) << "a limit may be the home switch";
 }
 
 TEST(MotorInputs, OlderKeysMeanTheInputOfTheOutput) {
@@ -85,63 +77,55 @@ TEST(MotorInputs, BothKindsOfKeysGoTogether) {
 }
 
 TEST(MotorInputs, ALimitActionNeedsALimitOfEitherKind) {
-  const auto config =
-      ConfigFile(with_motor_inputs("inputs = { negative = 4 }\nlimit_action = \"immediate\"\n"))
-          .load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  EXPECT_EQ(config->motors[1].limit_action, BUSHD_STOP_IMMEDIATE);
+  const auto config = loaded(of_slit("inputs = { negative = 4 }\nlimit_action = \"immediate\"\n"));
+  EXPECT_EQ(config.motors[1].limit_action, BUSHD_STOP_IMMEDIATE);
 }
 
 TEST(MotorInputs, TwoMotorsMayShareALimit) {
-  const auto config = ConfigFile(with_two("inputs = { positive = 3, negative = 4, home = 5 }\n",
-                                          "inputs = { positive = 4, negative = 3, home = 6 }\n"))
-                          .load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(test::error_of(with_two("inputs = { positive = 3, negative = 4, home = 5 }\n",
+                                    "inputs = { positive = 4, negative = 3, home = 6 }\n")),
+            "no error");
 }
 
 TEST(MotorInputs, OneThatNobodyNeedsMayBeAnothersWithoutAWord) {
-  const auto config = ConfigFile(with_two("", "inputs = { home = 15 }\n")).load();
-  ASSERT_TRUE(config.has_value()) << config.error().text();
+  EXPECT_EQ(test::error_of(with_two("", "inputs = { home = 15 }\n")), "no error");
 }
 
 TEST(MotorInputs, WhatCannotBeIsRefusedWithItsLineAndKey) {
   const test::RefusedKey bad[] = {
-      {with_motor_inputs("inputs = 3\n"), 37,
+      {of_slit("inputs = 3\n"), 37,
        "motor[1].inputs: is 3; allowed: a table such as { positive = 3,"},
-      {with_motor_inputs("inputs = {}\n"), 37,
-       "motor[1].inputs: is empty; allowed: a table such as"},
-      {with_motor_inputs("inputs = { left = 3 }\n"), 37,
+      {of_slit("inputs = {}\n"), 37, "motor[1].inputs: is empty; allowed: a table such as"},
+      {of_slit("inputs = { left = 3 }\n"), 37,
        "motor[1].inputs.left: unknown key; allowed here: positive, negative, home, step"},
-      {with_motor_inputs("inputs = { positive = 16 }\n"), 37,
+      {of_slit("inputs = { positive = 16 }\n"), 37,
        "motor[1].inputs.positive: is 16; allowed: a whole number 0..15; or { input = N"},
-      {with_motor_inputs("inputs = { home = -1 }\n"), 37,
-       "motor[1].inputs.home: is -1; allowed: a whole"},
-      {with_motor_inputs("inputs = { step = \"3\" }\n"), 37,
+      {of_slit("inputs = { home = -1 }\n"), 37, "motor[1].inputs.home: is -1; allowed: a whole"},
+      {of_slit("inputs = { step = \"3\" }\n"), 37,
        "motor[1].inputs.step: is the string \"3\"; allowed: a whole"},
-      {with_motor_inputs("inputs = { home = { active = \"open\" } }\n"), 37,
+      {of_slit("inputs = { home = { active = \"open\" } }\n"), 37,
        "motor[1].inputs.home.input: is missing; allowed: a whole"},
-      {with_motor_inputs("inputs = { home = { input = 16 } }\n"), 37,
+      {of_slit("inputs = { home = { input = 16 } }\n"), 37,
        "motor[1].inputs.home.input: is 16; allowed: a whole"},
-      {with_motor_inputs("inputs = { home = { input = 1, level = 0 } }\n"), 37,
+      {of_slit("inputs = { home = { input = 1, level = 0 } }\n"), 37,
        "motor[1].inputs.home.level: unknown key"},
-      {with_motor_inputs("inputs = { home = { input = 1, active = \"low\" } }\n"), 37,
+      {of_slit("inputs = { home = { input = 1, active = \"low\" } }\n"), 37,
        "motor[1].inputs.home.active: is \"low\"; allowed: \"closed\" or \"open\""},
-      {with_motor_inputs("inputs = { positive = 3, home = { input = 3, active = \"open\" } }\n"),
-       37,
+      {of_slit("inputs = { positive = 3, home = { input = 3, active = \"open\" } }\n"), 37,
        "motor[1].inputs.positive: is input 3, active when closed, but as home switch of motor "
        "\"slit\" it is active when open; allowed: one level an input"},
-      {with_motor_inputs("inputs = { positive = 3, step = 3 }\n"), 37,
+      {of_slit("inputs = { positive = 3, step = 3 }\n"), 37,
        "motor[1].inputs.step: is input 3, the positive limit of motor \"slit\"; allowed: an input "
        "of its own. Connect the sensor to another input"},
-      {with_motor_inputs("limit = \"positive\"\ninputs = { positive = 3 }\n"), 38,
+      {of_slit("limit = \"positive\"\ninputs = { positive = 3 }\n"), 38,
        "motor[1].inputs.positive: is input 3, but `limit` says that the positive limit of motor "
        "\"slit\" is input 15, the number of its output; allowed: one of the two keys"},
-      {with_motor_inputs("input_active = \"closed\"\nlimit = \"negative\"\n"
-                         "inputs = { home = { input = 15, active = \"open\" } }\n"),
+      {of_slit("input_active = \"closed\"\nlimit = \"negative\"\n"
+               "inputs = { home = { input = 15, active = \"open\" } }\n"),
        38,
        "motor[1].limit: is input 15, active when closed, but as home switch of motor \"slit\" it "
        "is active when open"},
-      {with_motor_inputs("inputs = { home = 3 }\nlimit_action = \"ramp\"\n"), 38,
+      {of_slit("inputs = { home = 3 }\nlimit_action = \"ramp\"\n"), 38,
        "motor[1].limit_action: applies only with a limit"},
       {with_two("inputs = { home = 3 }\n", "inputs = { negative = 3 }\n"), 43,
        "motor[2].inputs.negative: is input 3 of MCU \"roof:255\", the home switch of motor "

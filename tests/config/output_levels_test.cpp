@@ -7,20 +7,15 @@
 namespace bushd::config {
 namespace {
 
-using test::ConfigFile;
 using test::error_of;
 using test::kGood;
+using test::loaded;
 using test::of_mcu;
 using test::of_motor;
 using testing::HasSubstr;
 
 bushd_set_outputs outputs_of(const std::string& text) {
-  const auto config = ConfigFile(text).load();
-  if (!config) {
-    ADD_FAILURE() << config.error().text();
-    return {};
-  }
-  return config->mcus[0].outputs;
+  return loaded(text).mcus[0].outputs;
 }
 
 TEST(OutputLevels, AreHighWithoutAKey) {

@@ -10,8 +10,8 @@
 namespace bushd::config {
 namespace {
 
-using test::ConfigFile;
 using test::error_of;
+using test::loaded;
 using test::of_motor;
 using testing::HasSubstr;
 
@@ -22,17 +22,14 @@ std::string with_velocity(const std::string& velocity,
 }
 
 TEST(Velocity, IsReadOfAMotorWithLocalInputs) {
-  const auto config =
-      ConfigFile(
-          with_velocity("{ min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 }"))
-          .load();
-  ASSERT_TRUE(config) << config.error().text();
-  const auto& velocity = config->motors[0].drive.velocity;
+  const auto config = loaded(
+      with_velocity("{ min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 }"));
+  const auto& velocity = config.motors[0].drive.velocity;
   ASSERT_TRUE(velocity);
   EXPECT_EQ(velocity->min_steps_per_s, 100);
   EXPECT_EQ(velocity->max_steps_per_s, 1500);
   EXPECT_EQ(velocity->steps_per_s2, 500);
-  EXPECT_FALSE(config->motors[1].drive.velocity);
+  EXPECT_FALSE(config.motors[1].drive.velocity);
 }
 
 TEST(Velocity, WhatIsWrongIsNamed) {

@@ -25,8 +25,7 @@ pulse_us = 258
 next = true
 )");
   program.without_host = true;
-  const auto bytes = compile(program);
-  ASSERT_TRUE(bytes) << bytes.error().text();
+  const auto bytes = good(compile(program));
   const std::vector<std::uint8_t> expected = {
       1,    1,    0x24, 0,                                // motors 2 and 5
       3,    0x78, 0xEC, 0xFF, 0xFF, 0x70, 0x17, 0,    0,  // theta first: its output is lower
@@ -40,23 +39,22 @@ next = true
       7,    2,    1,    0,    0,                          //
       9,                                                  //
       0};
-  EXPECT_EQ(*bytes, expected);
+  EXPECT_EQ(bytes, expected);
   bushd_program read;
-  EXPECT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
+  EXPECT_EQ(bushd_program_check(bytes.data(), bytes.size(), 0x24, &read), BUSHD_OK);
 }
 
 TEST_F(CompiledPrograms, AMoveMayEndByAnInput) {
-  const auto bytes = compile(
+  const auto bytes = good(compile(
       parsed("[[frame]]\nmove_by = { theta = -2 }\nuntil_input = \"trigger\"\nactive = false\n"
-             "after = 0.5\nspeed = 2\n[[frame]]\nmove_by = { x = 7 }\nuntil_input = 3\n"));
-  ASSERT_TRUE(bytes) << bytes.error().text();
+             "after = 0.5\nspeed = 2\n[[frame]]\nmove_by = { x = 7 }\nuntil_input = 3\n")));
   const std::vector<std::uint8_t> expected = {
       11, 4,    0, 19, 0, 200, 0, 0, 0, 0xE0, 0xFC, 0xFF, 0xFF, 32, 0,  //
       11, 0x20, 0, 3,  1, 0,   0, 0, 0, 7,    0,    0,    0,    0,  0,  //
       0};
-  EXPECT_EQ(std::vector<std::uint8_t>(bytes->begin() + 22, bytes->end()), expected);
+  EXPECT_EQ(std::vector<std::uint8_t>(bytes.begin() + 22, bytes.end()), expected);
   bushd_program read;
-  EXPECT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
+  EXPECT_EQ(bushd_program_check(bytes.data(), bytes.size(), 0x24, &read), BUSHD_OK);
 }
 
 TEST_F(CompiledPrograms, TellTheLawOfALineAndItsFeed) {
@@ -71,18 +69,16 @@ TEST_F(CompiledPrograms, TellTheLawOfALineAndItsFeed) {
   bytes = compile(in_steps);
   ASSERT_TRUE(bytes);
   EXPECT_EQ((*bytes)[at + 1], 250) << "10 ms are so many units of 40 us";
-  EXPECT_NE(compile(parsed(line + "feed = 1\n"))
-                .error()
-                .text()
-                .find("400 per deg for motor \"theta\" and 1 per steps for motor \"x\": use speed"),
-            std::string::npos);
+  EXPECT_THAT(
+      error_of(compile(parsed(line + "feed = 1\n"))),
+      HasSubstr("400 per deg for motor \"theta\" and 1 per steps for motor \"x\": use speed"));
   motors_[0].coordinates = motors_[1].coordinates;
   bytes = compile(parsed(line + "feed = 1\n"));
   ASSERT_TRUE(bytes);
   EXPECT_EQ((*bytes)[at + 1], 63) << "400 steps/s";
   mcu_.elementary = false;
-  EXPECT_NE(compile(parsed(line)).error().text().find("MCU 3 makes no lines by the elementary law"),
-            std::string::npos);
+  EXPECT_THAT(error_of(compile(parsed(line))),
+              HasSubstr("MCU 3 makes no lines by the elementary law"));
 }
 
 TEST_F(CompiledPrograms, KeepTheSpeedLimitsOfTheirMotors) {
@@ -111,7 +107,7 @@ TEST_F(CompiledPrograms, AreRefusedWithTheFigure) {
     return bytes ? std::string("taken") : bytes.error().text();
   };
   const auto says = [](const std::string& text, const char* what) {
-    EXPECT_NE(text.find(what), std::string::npos) << text;
+    EXPECT_THAT(text, HasSubstr(what));
   };
   says(refusal("[[frame]]\nmove_to = [1.5, 0]\n", true), "p.toml:2: motor \"x\": not a whole");
   says(refusal("[[frame]]\nmove_to = [1, 1e9]\n"), "p.toml:2: motor \"theta\"");
@@ -148,9 +144,7 @@ TEST_F(CompiledPrograms, ThatBeginAtPowerOnHaveRangesOfDistances) {
   EXPECT_EQ(x.least_steps, -50) << "its scale is turned, and an offset is none of a distance";
   EXPECT_EQ(x.most_steps, 10);
   bytes = of_range("{ theta = [-20, 20], x = [0, 0] }");  // 16000 steps
-  ASSERT_FALSE(bytes);
-  EXPECT_NE(bytes.error().text().find("wider than the way between its soft limits"),
-            std::string::npos);
+  EXPECT_THAT(error_of(bytes), HasSubstr("wider than the way between its soft limits"));
 }
 
 }  // namespace

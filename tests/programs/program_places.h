@@ -1,6 +1,7 @@
 // Two motors of an MCU, and programs for them.
 #pragma once
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -9,8 +10,11 @@
 
 #include "engine/tables.h"
 #include "programs/compile.h"
+#include "results.h"
 
 namespace bushd::test {
+
+using testing::HasSubstr;
 
 inline Law program_law() {
   Law law;
@@ -53,9 +57,7 @@ class ProgramPlaces : public testing::Test {
     return programs::parse(text, "p.toml", points);
   }
   static programs::Program parsed(const std::string& frames) {
-    auto program = parse("motors = [\"x\", \"theta\"]\n" + frames);
-    EXPECT_TRUE(program) << program.error().text();
-    return program ? *program : programs::Program{};
+    return good(parse("motors = [\"x\", \"theta\"]\n" + frames));
   }
   Result<std::vector<std::uint8_t>> compile(const programs::Program& program) {
     return programs::compile(program, mcu_, motors_);

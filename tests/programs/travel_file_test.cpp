@@ -21,34 +21,31 @@ class TravelFiles : public ProgramPlaces {
 };
 
 TEST_F(TravelFiles, ATravelHasItsBytes) {
-  const auto bytes = compile(
+  const auto bytes = good(compile(
       parsed("[[frame]]\ntravel_by = { x = -60 }\nafter_edge_s = 0.15\nreturn_s = 0.3\n[[frame]]\n"
-             "travel_by = { theta = 1 }\n"));
-  ASSERT_TRUE(bytes) << bytes.error().text();
+             "travel_by = { theta = 1 }\n")));
   const std::vector<std::uint8_t> expected = {
       10, 0x20, 0, 1, 1, 0xF0, 0x49, 2, 0, 0xE0, 0x93, 4, 0, 0xC4, 0xFF, 0xFF, 0xFF,  //
       10, 4,    0, 3, 0, 0,    0,    0, 0, 50,   0,    0, 0, 0x90, 1,    0,    0,     //
       0};
-  EXPECT_EQ(std::vector<std::uint8_t>(bytes->begin() + 22, bytes->end()), expected);
+  EXPECT_EQ(std::vector<std::uint8_t>(bytes.begin() + 22, bytes.end()), expected);
   bushd_program read;
-  EXPECT_EQ(bushd_program_check(bytes->data(), bytes->size(), 0x24, &read), BUSHD_OK);
+  EXPECT_EQ(bushd_program_check(bytes.data(), bytes.size(), 0x24, &read), BUSHD_OK);
 }
 
 TEST_F(TravelFiles, ADryRunGoesThereAndBack) {
-  const auto told = rehearse("[[frame]]\ntravel_by = { x = 3 }\nreturn_s = 0.0256\n");
-  ASSERT_TRUE(told) << told.error().text();
+  const auto told = good(rehearse("[[frame]]\ntravel_by = { x = 3 }\nreturn_s = 0.0256\n"));
   // Delays 250, 200, 240 units of 40 us are 27.6 ms.
-  EXPECT_EQ(told->ticks, 2u * 11 + 10);
-  EXPECT_EQ(told->motors[0].most_steps, 3);
-  EXPECT_EQ(told->motors[0].end_steps, 0);
-  EXPECT_EQ(told->motors[0].edges, 6u);
-  EXPECT_FALSE(told->endless);
-  const auto edges = rehearse("[[frame]]\ntravel_by = { x = 3 }\nafter_edge_s = 0.0256\n");
-  ASSERT_TRUE(edges) << edges.error().text();
-  EXPECT_TRUE(edges->endless);
-  EXPECT_TRUE(edges->waits_for_inputs);
-  EXPECT_NE(rehearse("[[frame]]\ntravel_by = { x = 6001 }\n").error().text().find("may go from"),
-            std::string::npos);
+  EXPECT_EQ(told.ticks, 2u * 11 + 10);
+  EXPECT_EQ(told.motors[0].most_steps, 3);
+  EXPECT_EQ(told.motors[0].end_steps, 0);
+  EXPECT_EQ(told.motors[0].edges, 6u);
+  EXPECT_FALSE(told.endless);
+  const auto edges = good(rehearse("[[frame]]\ntravel_by = { x = 3 }\nafter_edge_s = 0.0256\n"));
+  EXPECT_TRUE(edges.endless);
+  EXPECT_TRUE(edges.waits_for_inputs);
+  EXPECT_THAT(error_of(rehearse("[[frame]]\ntravel_by = { x = 6001 }\n")),
+              HasSubstr("may go from"));
 }
 
 TEST_F(TravelFiles, CodesAreMadeAsTheyAreWritten) {
@@ -60,21 +57,18 @@ TEST_F(TravelFiles, CodesAreMadeAsTheyAreWritten) {
   const TestTable written(law, true);
   mcu_.line_table = written.view();
   mcu_.line_bank = 8;
-  const auto program = parse("motors = [\"x\"]\n" + kCodes +
-                             "[[frame]]\nline_by = [[-6]]\n[[frame]]\ntravel_by = [4]\n");
-  ASSERT_TRUE(program) << program.error().text();
+  const auto program = good(parse("motors = [\"x\"]\n" + kCodes +
+                                  "[[frame]]\nline_by = [[-6]]\n[[frame]]\ntravel_by = [4]\n"));
   const auto one = std::span(motors_).first(1);
-  const auto bytes = programs::compile(*program, mcu_, one);
-  ASSERT_TRUE(bytes) << bytes.error().text();
+  const auto bytes = good(programs::compile(program, mcu_, one));
   const std::vector<std::uint8_t> expected = {
       4,  0x20, 0, 8, 0, 0, 1, 0, 0xFA, 0xFF, 0xFF, 0xFF,                 //
       10, 0x20, 0, 8, 0, 0, 0, 0, 0,    50,   0,    0,    0, 4, 0, 0, 0,  //
       0};
-  EXPECT_EQ(std::vector<std::uint8_t>(bytes->begin() + 13, bytes->end()), expected);
-  const auto told = programs::rehearse(*program, mcu_, one, *bytes);
-  ASSERT_TRUE(told) << told.error().text();
+  EXPECT_EQ(std::vector<std::uint8_t>(bytes.begin() + 13, bytes.end()), expected);
+  const auto told = good(programs::rehearse(program, mcu_, one, bytes));
   // 300 + 100 + 200 + 90 + 90 + 400 units are 59 ms; 300 + 100 + 200 + 400 there and back, 50 ms.
-  EXPECT_EQ(told->ticks, 24u + 2 * 20 + 1);
+  EXPECT_EQ(told.ticks, 24u + 2 * 20 + 1);
 }
 
 TEST_F(TravelFiles, CodesOfATableHaveItsRule) {
@@ -124,19 +118,17 @@ TEST_F(TravelFiles, AreRefusedWithPlaceAndRemedy) {
   const TestTable written(law, true);
   mcu_.line_table = written.view();
   for (const auto& one_case : kCases) {
-    EXPECT_NE(refusal(one_case.text).find(one_case.says), std::string::npos)
+    EXPECT_THAT(refusal(one_case.text), HasSubstr(one_case.says))
         << one_case.text << refusal(one_case.text);
   }
   mcu_.has_trigger = false;
-  EXPECT_NE(
-      refusal(one + "[[frame]]\ntravel_by = [1]\nafter_edge_s = 1\n").find("no trigger input"),
-      std::string::npos);
+  EXPECT_THAT(refusal(one + "[[frame]]\ntravel_by = [1]\nafter_edge_s = 1\n"),
+              HasSubstr("no trigger input"));
   mcu_.line_table = nullptr;
-  EXPECT_NE(refusal(one + kCodes + "[[frame]]\ntravel_by = [4]\n").find("no table bank left"),
-            std::string::npos);
+  EXPECT_THAT(refusal(one + kCodes + "[[frame]]\ntravel_by = [4]\n"),
+              HasSubstr("no table bank left"));
   mcu_.travels = false;
-  EXPECT_NE(refusal(one + "[[frame]]\ntravel_by = [1]\n").find("does not travel"),
-            std::string::npos);
+  EXPECT_THAT(refusal(one + "[[frame]]\ntravel_by = [1]\n"), HasSubstr("does not travel"));
 }
 
 }  // namespace

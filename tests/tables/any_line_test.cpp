@@ -24,76 +24,71 @@ std::uint64_t decel_ns(const bushd_table& table, std::uint32_t k) {
   return std::uint64_t{std::max(bushd_table_decel(&table, k), table.cruise)} * table.time_unit_ns;
 }
 
-TEST(AnyLine, NoEnvelopeIsAboveIt) {
-  const bool holds = rc::check("any motors, any shares", [] {
-    std::vector<std::unique_ptr<TestTable>> tables;
-    std::vector<const bushd_table*> views;
-    const int motors = between(1, 4);
+// Tables of some motors, in one time unit: else each would round in its own.
+class AnyMotors {
+ public:
+  explicit AnyMotors(int motors) {
     const std::uint32_t unit_ns = any_law().unit_ns;
     for (int i = 0; i < motors; ++i) {
       Law law = any_law();
-      law.unit_ns = unit_ns;  // else both round, each in its own unit
-      tables.push_back(std::make_unique<TestTable>(law, false));
-      views.push_back(tables.back()->view());
+      law.unit_ns = unit_ns;
+      tables_.push_back(std::make_unique<TestTable>(law, false));
+      views.push_back(tables_.back()->view());
     }
-    const auto any = tables::any_line_table(views, "any");
+  }
+
+  std::vector<const bushd_table*> views;
+
+ private:
+  std::vector<std::unique_ptr<TestTable>> tables_;
+};
+
+void no_slower(const bushd_table& envelope, const bushd_table& table) {
+  RC_ASSERT(envelope.time_unit_ns == table.time_unit_ns);
+  const std::uint32_t codes = 2u + std::max(envelope.accel.count, table.accel.count) +
+                              std::max(envelope.decel.count, table.decel.count);
+  for (std::uint32_t k = 0; k < codes; ++k) {
+    RC_ASSERT(accel_ns(table, k) >= accel_ns(envelope, k));
+    RC_ASSERT(decel_ns(table, k) >= decel_ns(envelope, k));
+  }
+}
+
+TEST(AnyLine, NoEnvelopeIsAboveIt) {
+  const bool holds = rc::check("any motors, any shares", [] {
+    const AnyMotors motors(between(1, 4));
+    const auto any = tables::any_line_table(motors.views, "any");
     if (!any) return;  // a side of 2^31 time units, such as no table may have
-    const bushd_table& table = (*any)->view();
     const auto longest =
         between<std::uint32_t>(1, *rc::gen::element<std::uint32_t>(2, 10, 60, 400, 100'000));
     std::vector<LinePart> parts;
-    for (int i = 0; i < motors; ++i) {
-      const auto increment = i == 0 ? longest : between<std::uint32_t>(0, longest);
-      parts.push_back({views[static_cast<std::size_t>(i)], increment});
+    for (const bushd_table* view : motors.views) {
+      parts.push_back({view, parts.empty() ? longest : between<std::uint32_t>(0, longest)});
     }
-    const Envelope envelope(parts, longest);
-    RC_ASSERT(envelope.view().time_unit_ns == table.time_unit_ns);
-    const std::uint32_t codes = 2u + std::max(envelope.view().accel.count, table.accel.count) +
-                                std::max(envelope.view().decel.count, table.decel.count);
-    for (std::uint32_t k = 0; k < codes; ++k) {
-      RC_ASSERT(accel_ns(table, k) >= accel_ns(envelope.view(), k));
-      RC_ASSERT(decel_ns(table, k) >= decel_ns(envelope.view(), k));
-    }
+    no_slower(Envelope(parts, longest).view(), (*any)->view());
   });
   EXPECT_TRUE(holds);
 }
 
 TEST(AnyLine, NoEnvelopeOfTheElementaryLawIsAboveIt) {
   const bool holds = rc::check("any motors, any ways", [] {
-    std::vector<std::unique_ptr<TestTable>> tables;
-    std::vector<const bushd_table*> views;
-    const auto motors = between<std::uint8_t>(2, 5);
-    const std::uint32_t unit_ns = any_law().unit_ns;
-    for (int i = 0; i < motors; ++i) {
-      Law law = any_law();
-      law.unit_ns = unit_ns;
-      tables.push_back(std::make_unique<TestTable>(law, false));
-      views.push_back(tables.back()->view());
-    }
-    const auto any = tables::any_line_table(views, "any", motors);
+    const auto count = between<std::uint8_t>(2, 5);
+    const AnyMotors motors(count);
+    const auto any = tables::any_line_table(motors.views, "any", count);
     if (!any) return;
-    const bushd_table& table = (*any)->view();
     const auto most = *rc::gen::element<std::uint32_t>(2, 10, 60, 400, 100'000);
     bushd_elementary line;
     bushd_elementary_clear(&line);
     std::vector<LinePart> parts;
-    for (std::uint8_t i = 0; i < motors; ++i) {
-      parts.push_back({views[i], between<std::uint32_t>(i == 0 ? 1 : 0, most)});
+    for (std::uint8_t i = 0; i < count; ++i) {
+      parts.push_back({motors.views[i], between<std::uint32_t>(i == 0 ? 1 : 0, most)});
       bushd_elementary_add(&line, i, parts.back().increment);
     }
-    for (std::uint8_t i = 0; i < motors; ++i) {
+    for (std::uint8_t i = 0; i < count; ++i) {
       if (parts[i].increment == 0) continue;
       parts[i].apart = bushd_elementary_apart(&line, i);
       parts[i].late = bushd_elementary_late(&line, i);
     }
-    const Envelope envelope(parts, line.sum);
-    RC_ASSERT(envelope.view().time_unit_ns == table.time_unit_ns);
-    const std::uint32_t codes = 2u + std::max(envelope.view().accel.count, table.accel.count) +
-                                std::max(envelope.view().decel.count, table.decel.count);
-    for (std::uint32_t k = 0; k < codes; ++k) {
-      RC_ASSERT(accel_ns(table, k) >= accel_ns(envelope.view(), k));
-      RC_ASSERT(decel_ns(table, k) >= decel_ns(envelope.view(), k));
-    }
+    no_slower(Envelope(parts, line.sum).view(), (*any)->view());
   });
   EXPECT_TRUE(holds);
 }

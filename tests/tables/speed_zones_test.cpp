@@ -5,11 +5,13 @@
 
 #include <string>
 
+#include "results.h"
 #include "tables/table.h"
 
 namespace bushd::tables {
 namespace {
 
+using test::good;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -33,10 +35,9 @@ TEST(SpeedZones, AreReadFromAFile) {
 }
 
 TEST(SpeedZones, GoByDistancesInStepsIfTheFileSaysNoMore) {
-  const auto zones = parse_zones("table = \"t\"\nzones = [[0, 100]]\nend = 30\n", "f");
-  ASSERT_TRUE(zones) << zones.error().text();
-  EXPECT_EQ(zones->by, SpeedZones::By::kDistance);
-  EXPECT_EQ(zones->steps_of(7), 7);
+  const auto zones = good(parse_zones("table = \"t\"\nzones = [[0, 100]]\nend = 30\n", "f"));
+  EXPECT_EQ(zones.by, SpeedZones::By::kDistance);
+  EXPECT_EQ(zones.steps_of(7), 7);
 }
 
 TEST(SpeedZones, WrittenAsTextAreReadAgain) {
@@ -45,9 +46,8 @@ TEST(SpeedZones, WrittenAsTextAreReadAgain) {
                          .steps_per_unit = 1.0 / 3,
                          .zones = {{0, 0.1}, {-0.3, 1e-3}},
                          .end = -1e6};
-  const auto read = parse_zones(to_text(zones), "f");
-  ASSERT_TRUE(read) << read.error().text();
-  EXPECT_EQ(*read, zones);
+  const auto read = good(parse_zones(to_text(zones), "f"));
+  EXPECT_EQ(read, zones);
 }
 
 TEST(SpeedZones, WhatIsWrongIsRefusedWithItsLineKeyAndRemedy) {

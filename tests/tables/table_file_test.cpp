@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "results.h"
 #include "tables/random_table.h"
 #include "tables/temp_directory.h"
 #include "tables/toml_file.h"
@@ -16,6 +17,7 @@
 namespace bushd::tables {
 namespace {
 
+using test::good;
 using test::TempDirectory;
 using testing::HasSubstr;
 
@@ -24,13 +26,13 @@ std::vector<std::uint16_t> codes_of(const bushd_ramp& side) {
 }
 
 TEST(TableFile, SymmetricTableSharesOneSide) {
-  const auto table = parse("name = \"t\"\ntime_unit_ns = 40000\naccel = [250, 20, 10]\n", "t.toml");
-  ASSERT_TRUE(table.has_value()) << table.error().text();
-  EXPECT_EQ((*table)->name(), "t");
-  EXPECT_EQ((*table)->description(), "");
-  EXPECT_EQ((*table)->path(), "t.toml");
-  EXPECT_TRUE((*table)->symmetric());
-  const bushd_table& view = (*table)->view();
+  const auto table =
+      good(parse("name = \"t\"\ntime_unit_ns = 40000\naccel = [250, 20, 10]\n", "t.toml"));
+  EXPECT_EQ(table->name(), "t");
+  EXPECT_EQ(table->description(), "");
+  EXPECT_EQ(table->path(), "t.toml");
+  EXPECT_TRUE(table->symmetric());
+  const bushd_table& view = table->view();
   EXPECT_EQ(view.time_unit_ns, 40000u);
   EXPECT_EQ(view.cruise, 10);
   EXPECT_EQ(codes_of(view.accel), (std::vector<std::uint16_t>{250, 20, 10}));
@@ -41,21 +43,20 @@ TEST(TableFile, SymmetricTableSharesOneSide) {
 }
 
 TEST(TableFile, DecelIsListedFastToSlowAndKeptSlowToFast) {
-  const auto table = parse(
-      "name = \"t\"\ntime_unit_ns = 1\naccel = [9, 5]\ndecel = [6, 7, 8]\ncruise = 4\n"
-      "description = \"unequal sides\"\n",
-      "t.toml");
-  ASSERT_TRUE(table.has_value()) << table.error().text();
-  EXPECT_FALSE((*table)->symmetric());
-  EXPECT_EQ(codes_of((*table)->view().decel), (std::vector<std::uint16_t>{8, 7, 6}));
-  EXPECT_EQ((*table)->view().cruise, 4);
-  EXPECT_EQ((*table)->description(), "unequal sides");
+  const auto table =
+      good(parse("name = \"t\"\ntime_unit_ns = 1\naccel = [9, 5]\ndecel = [6, 7, 8]\ncruise = 4\n"
+                 "description = \"unequal sides\"\n",
+                 "t.toml"));
+  EXPECT_FALSE(table->symmetric());
+  EXPECT_EQ(codes_of(table->view().decel), (std::vector<std::uint16_t>{8, 7, 6}));
+  EXPECT_EQ(table->view().cruise, 4);
+  EXPECT_EQ(table->description(), "unequal sides");
 }
 
 TEST(TableFile, DecelThatMirrorsAccelIsSymmetric) {
-  const auto table = parse("name='t'\ntime_unit_ns=1\naccel=[9,5,1]\ndecel=[1,5,9]\n", "t.toml");
-  ASSERT_TRUE(table.has_value()) << table.error().text();
-  EXPECT_TRUE((*table)->symmetric());
+  const auto table =
+      good(parse("name='t'\ntime_unit_ns=1\naccel=[9,5,1]\ndecel=[1,5,9]\n", "t.toml"));
+  EXPECT_TRUE(table->symmetric());
 }
 
 TEST(TableFile, ViewAgreesWithTheFileForRandomTables) {
@@ -223,10 +224,9 @@ TEST(HostileTableFile, DeepestKeysInDeepestValuesAreRefusedWithoutACrash) {
 TEST(HostileTableFile, DotsThatAreNotKeysCostNothing) {
   const std::string dots(200, '.');
   const auto table =
-      parse("# " + dots + "\nname = \"t\"\ntime_unit_ns = 1\naccel = [1]\n" +
-                "description = \"\"\"" + dots + "\n\\\"\"\" " + dots + "\"\"\" # " + dots,
-            "dots.toml");
-  ASSERT_TRUE(table.has_value()) << table.error().text();
+      good(parse("# " + dots + "\nname = \"t\"\ntime_unit_ns = 1\naccel = [1]\n" +
+                     "description = \"\"\"" + dots + "\n\\\"\"\" " + dots + "\"\"\" # " + dots,
+                 "dots.toml"));
   const auto floats = parse(kHead + "accel = [" + repeated("1.5", 100) + "]\n", "floats.toml");
   ASSERT_FALSE(floats.has_value());
   EXPECT_EQ(floats.error().key, "accel[0]");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "results.h"
 #include "tables/move_time.h"
 #include "tables/profiles/diagnostics.h"
 #include "tables/profiles/random_spec.h"
@@ -261,18 +262,17 @@ TEST(Torque, BandIsPassedWithAllTheTorqueThereIs) {
 }
 
 TEST(TorqueCsv, UnitsAreThoseOfTheHeader) {
-  const auto curve =
-      parse_torque_csv("# a motor\nspeed_rpm, torque_ncm\r\n0,50\n\n600,20.5\n", 400, "m.csv");
-  ASSERT_TRUE(curve) << curve.error().text();
-  ASSERT_EQ(curve->size(), 2U);
-  EXPECT_DOUBLE_EQ((*curve)[1].speed_hz, 4000);
-  EXPECT_DOUBLE_EQ((*curve)[1].torque_nm, 0.205);
+  const auto curve = good(
+      parse_torque_csv("# a motor\nspeed_rpm, torque_ncm\r\n0,50\n\n600,20.5\n", 400, "m.csv"));
+  ASSERT_EQ(curve.size(), 2U);
+  EXPECT_DOUBLE_EQ(curve[1].speed_hz, 4000);
+  EXPECT_DOUBLE_EQ(curve[1].torque_nm, 0.205);
 }
 
 TEST(TorqueCsv, AsSpreadsheetsOfWindowsWriteIt) {
-  const auto curve = parse_torque_csv("\xEF\xBB\xBFspeed_hz,torque_nm\r\n0,0.5\r\n", 200, "m.csv");
-  ASSERT_TRUE(curve) << curve.error().text();
-  EXPECT_EQ(curve->size(), 1U);
+  const auto curve =
+      good(parse_torque_csv("\xEF\xBB\xBFspeed_hz,torque_nm\r\n0,0.5\r\n", 200, "m.csv"));
+  EXPECT_EQ(curve.size(), 1U);
 }
 
 TEST(TorqueCsv, EveryBadLineIsNamed) {

@@ -11,6 +11,7 @@
 
 #include "config/config.h"
 #include "config/config_file.h"
+#include "results.h"
 #include "tables/temp_directory.h"
 
 namespace bushctl {
@@ -18,6 +19,7 @@ namespace {
 
 namespace api = bushd::api;
 using bushd::test::ConfigFile;
+using bushd::test::good;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -70,16 +72,14 @@ struct Saving : testing::Test {
 
 TEST_F(Saving, WritesWhatIsWantedAndNothingElse) {
   ASSERT_EQ(chmod(file.path().c_str(), 0640), 0);
-  const auto saved = save(wanted());
-  ASSERT_TRUE(saved) << saved.error().text();
-  EXPECT_EQ(saved->kind, api::Configure::Kind::kSaved);
-  EXPECT_EQ(saved->changes, (std::vector<api::Configure::Change>{
-                                {"slit", "offset", "2.5"}, {"theta", "soft_limits", "[-1, 2]"}}));
+  const auto saved = good(save(wanted()));
+  EXPECT_EQ(saved.kind, api::Configure::Kind::kSaved);
+  EXPECT_EQ(saved.changes, (std::vector<api::Configure::Change>{
+                               {"slit", "offset", "2.5"}, {"theta", "soft_limits", "[-1, 2]"}}));
   EXPECT_THAT(text(), HasSubstr("unit = \"mm\" # thick\nsteps_per_unit = 400\noffset = 2.5\n"));
-  const auto now = file.load();
-  ASSERT_TRUE(now) << now.error().text();
-  EXPECT_EQ(now->text_sha256, saved->file_sha256);
-  EXPECT_EQ(now->motors[0].soft_limits, (bushd::units::SoftLimits{-1, 2}));
+  const auto now = good(file.load());
+  EXPECT_EQ(now.text_sha256, saved.file_sha256);
+  EXPECT_EQ(now.motors[0].soft_limits, (bushd::units::SoftLimits{-1, 2}));
   struct stat status{};
   ASSERT_EQ(stat(file.path().c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777, 0640u);

@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include "config/config.h"
+#include "results.h"
 
 namespace bushctl {
 namespace {
 
+using bushd::test::good;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -33,22 +35,20 @@ bushd::Result<bushd::config::Config> parsed(const std::vector<FoundBus>& buses,
 }
 
 TEST(Setup, EachMcuHasAMotorAndLcmTakesNoCommands) {
-  const auto config = parsed({bus("/dev/a", {mcu_found(2, 1), mcu_found(1, 2, 4)})});
-  ASSERT_TRUE(config) << config.error().text();
-  ASSERT_EQ(config->mcus.size(), 2u);
-  EXPECT_EQ(config->buses[0].port, "/dev/a");
-  EXPECT_EQ(config->motors[0].name, "m1-0");
-  EXPECT_EQ(config->mcus[1].id, "bus1:2");
-  EXPECT_FALSE(config->lcm.commands);
+  const auto config = good(parsed({bus("/dev/a", {mcu_found(2, 1), mcu_found(1, 2, 4)})}));
+  ASSERT_EQ(config.mcus.size(), 2u);
+  EXPECT_EQ(config.buses[0].port, "/dev/a");
+  EXPECT_EQ(config.motors[0].name, "m1-0");
+  EXPECT_EQ(config.mcus[1].id, "bus1:2");
+  EXPECT_FALSE(config.lcm.commands);
 }
 
 TEST(Setup, SeveralBusesHaveMotorsOfDifferentNames) {
   const auto config =
-      parsed({bus("/dev/a", {mcu_found(1, 1)}), bus("/dev/b", {mcu_found(1, 2)}, 1'000'000)});
-  ASSERT_TRUE(config) << config.error().text();
-  EXPECT_EQ(config->motors[0].name, "bus1-m1-0");
-  EXPECT_EQ(config->motors[1].name, "bus2-m1-0");
-  EXPECT_EQ(config->buses[1].baud, 1'000'000u);
+      good(parsed({bus("/dev/a", {mcu_found(1, 1)}), bus("/dev/b", {mcu_found(1, 2)}, 1'000'000)}));
+  EXPECT_EQ(config.motors[0].name, "bus1-m1-0");
+  EXPECT_EQ(config.motors[1].name, "bus2-m1-0");
+  EXPECT_EQ(config.buses[1].baud, 1'000'000u);
 }
 
 TEST(Setup, ASlowLineAndManyMcusFitWithLongerTicks) {
@@ -65,9 +65,8 @@ TEST(Setup, McusThatCannotBeNamedAreComments) {
   Found old = mcu_found(7, 9);
   old.identity.protocol_version = 1;
   const FoundBus found = bus("/dev/a", {mcu_found(1, 0xAA), mcu_found(1, 0xBB), old});
-  const auto config = parsed({found});
-  ASSERT_TRUE(config) << config.error().text();
-  EXPECT_EQ(config->mcus.size(), 1u);
+  const auto config = good(parsed({found}));
+  EXPECT_EQ(config.mcus.size(), 1u);
   const std::string text = configuration_text({found}, 2560, "x");
   EXPECT_THAT(text, AllOf(HasSubstr("# address 1 is that of another MCU too: 'bushctl address PORT "
                                     "00000000000000bb NEW --baud B' gives it another"),
@@ -79,9 +78,8 @@ TEST(Setup, McusThatCannotBeNamedAreComments) {
 }
 
 TEST(Setup, NamesOfPortsAreQuoted) {
-  const auto config = parsed({bus("/dev/a\"b\\c", {mcu_found(1, 1)})});
-  ASSERT_TRUE(config) << config.error().text();
-  EXPECT_EQ(config->buses[0].port, "/dev/a\"b\\c");
+  const auto config = good(parsed({bus("/dev/a\"b\\c", {mcu_found(1, 1)})}));
+  EXPECT_EQ(config.buses[0].port, "/dev/a\"b\\c");
 }
 
 TEST(Setup, WithNothingFoundItSaysWhatToLookAtAndOffersTheSimulatedBus) {
