@@ -13,11 +13,13 @@
 #include "lcm/oracle.h"
 #include "lcm/random_message.h"
 #include "lcm/wire.h"
+#include "results.h"
 
 namespace bushd::lcm {
 namespace {
 
 using test::expect_arrives;
+using test::good;
 using test::kId;
 
 // Nothing where the daemon's clients take it for no message of this kind.
@@ -36,17 +38,15 @@ std::optional<Content> said(const Packet& packet) {
 }
 
 void expect_reply_arrives(const api::Reply& reply) {
-  const auto packets = encode(12, kId, reply);
-  ASSERT_TRUE(packets) << packets.error().text();
-  ASSERT_EQ(packets->size(), 1u);
-  const auto arrived = heard<ReplyMessage>(packets->front());
+  const auto packets = good(encode(12, kId, reply));
+  ASSERT_EQ(packets.size(), 1u);
+  const auto arrived = heard<ReplyMessage>(packets.front());
   ASSERT_TRUE(arrived);
   EXPECT_EQ(arrived->id, kId);
   EXPECT_EQ(arrived->reply, reply);
-  const auto again = encode(12, arrived->id, arrived->reply);
-  ASSERT_TRUE(again) << again.error().text();
-  ASSERT_EQ(again->size(), 1u);
-  EXPECT_EQ(again->front().payload, packets->front().payload);
+  const auto again = good(encode(12, arrived->id, arrived->reply));
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again.front().payload, packets.front().payload);
 }
 
 template <class... Content>
@@ -250,18 +250,17 @@ TEST(Codec, PlansAndTablesDoToo) {
 
 // Its parts, decoded in this order of their indices and put together, are this reply.
 void expect_put_together(const api::Reply& reply, const std::vector<std::size_t>& order) {
-  const auto packets = encode(1, kId, reply);
-  ASSERT_TRUE(packets) << packets.error().text();
+  const auto packets = good(encode(1, kId, reply));
   ReplyParts parts;
   std::optional<api::Reply> whole;
   for (const std::size_t part : order) {
     EXPECT_FALSE(whole);
-    const Packet& packet = packets->at(part);
+    const Packet& packet = packets.at(part);
     EXPECT_LE(packet.payload.size(), kMaxMessageBytes);
     const auto message = heard<ReplyMessage>(packet);
     ASSERT_TRUE(message);
     EXPECT_EQ(message->id, kId);
-    EXPECT_EQ(message->parts, static_cast<std::int32_t>(packets->size()));
+    EXPECT_EQ(message->parts, static_cast<std::int32_t>(packets.size()));
     whole = parts.add(*message);
   }
   ASSERT_TRUE(whole);

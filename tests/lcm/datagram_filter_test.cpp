@@ -1,52 +1,32 @@
 // What the kernel lets through to a socket.
 #include "lcm/datagram_filter.h"
 
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <string>
 #include <vector>
+
+#include "lcm/loopback_pair.h"
 
 namespace bushd::lcm {
 namespace {
 
 using testing::ElementsAre;
 
-class DatagramFilter : public testing::Test {
+class DatagramFilter : public test::LoopbackPair {
  protected:
-  DatagramFilter() {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(bind(receiver_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    socklen_t size = sizeof address;
-    EXPECT_EQ(getsockname(receiver_, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    EXPECT_EQ(connect(sender_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  }
-  ~DatagramFilter() override {
-    close(receiver_);
-    close(sender_);
-  }
   static std::string message(const std::string& channel, const std::string& magic = "LC02") {
     return magic + "seqn" + channel + std::string("\0payload", 8);
   }
-  // Over loopback a datagram has arrived, or has been dropped, when send() returns.
   std::vector<std::string> passed(const std::vector<std::string>& datagrams) const {
     std::vector<std::string> through;
     for (const std::string& datagram : datagrams) {
-      EXPECT_GE(send(sender_, datagram.data(), datagram.size(), 0), 0);
-      std::string heard(100, '\0');
-      const ssize_t n = recv(receiver_, heard.data(), heard.size(), MSG_DONTWAIT);
-      if (n >= 0) through.push_back(datagram);
+      send_one(datagram);
+      if (receive_one()) through.push_back(datagram);
     }
     return through;
   }
-
-  int receiver_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  int sender_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 };
 
 TEST_F(DatagramFilter, TakesWholeMessagesOnly) {

@@ -1,12 +1,11 @@
 // A burst of datagrams that nobody reads yet, and how many of it the kernel keeps.
 #include "lcm/receive_buffer.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <string>
+
+#include "lcm/loopback_pair.h"
 
 namespace bushd::lcm {
 namespace {
@@ -18,38 +17,18 @@ int receive_buffer(int socket) {
   return bytes;
 }
 
-class ReceiveBuffer : public testing::Test {
+class ReceiveBuffer : public test::LoopbackPair {
  protected:
-  ReceiveBuffer() {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(bind(receiver_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    socklen_t size = sizeof address;
-    EXPECT_EQ(getsockname(receiver_, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    EXPECT_EQ(connect(sender_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  }
-  ~ReceiveBuffer() override {
-    close(receiver_);
-    close(sender_);
-  }
   void limit(int bytes) const {
     ASSERT_EQ(setsockopt(receiver_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes), 0);
   }
   // How many are kept of so many that are sent at once.
   int kept(int datagrams) const {
-    const std::string datagram(2000, 'x');
-    for (int i = 0; i < datagrams; ++i) {
-      EXPECT_GE(send(sender_, datagram.data(), datagram.size(), 0), 0);
-    }
-    char heard = 0;
+    for (int i = 0; i < datagrams; ++i) send_one(std::string(2000, 'x'));
     int kept = 0;
-    while (recv(receiver_, &heard, 1, MSG_DONTWAIT | MSG_TRUNC) > 0) ++kept;
+    while (receive_one()) ++kept;
     return kept;
   }
-
-  int receiver_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  int sender_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 };
 
 TEST_F(ReceiveBuffer, HasRoomForTheStateOfManyMotors) {
