@@ -8,11 +8,13 @@ import unittest
 
 from bench import REST
 from bushd import NoDaemon, Refused, model
+from bushd_epics.compare import Compare
 from bushd_epics.events import Post, Speeds
 from bushd_epics.flights import Flights
 from bushd_epics.people import People
 from bushd_epics.profile import Profile
 from bushd_epics.record import Putter, Record
+from bushd_epics.trigger import Trigger
 
 RESULT = model.MotorResult(
     motor="theta", outcome=model.Outcome.REACHED, position=1.5, dial=1.5, position_steps=150, unit="deg", precision=3,
@@ -258,16 +260,16 @@ class Profiles(unittest.IsolatedAsyncioTestCase):
 class Compares(unittest.IsolatedAsyncioTestCase):
     async def asyncSetUp(self):
         self.world = World()
-        self.values = {}
+        self.compares = {name: Compare(name) for name in self.world.records}
         for name, record in self.world.records.items():
-            self.values[name] = self.world.flights.add_compare(record, lambda field, value: None).values
+            self.world.flights.add_beside(record, self.compares[name], lambda field, value: None)
 
     async def put(self, name, field, value):
-        self.world.flights.put_compare(self.world.records[name], field, value, self.world.by(name))
+        self.world.flights.put(self.compares[name], field, value, self.world.by(name))
         await settle()
 
     def on(self):
-        return [name for name, values in self.values.items() if values["PCOEnable_RBV"]]
+        return [name for name, one in self.compares.items() if one.is_on]
 
     async def test_an_mcu_compares_for_one_motor(self):
         await self.put("theta", "PCOStartPosition", 2.0)
@@ -291,12 +293,14 @@ class Triggers(unittest.IsolatedAsyncioTestCase):
     async def asyncSetUp(self):
         self.world = World()
         self.record = self.world.records["theta"]
-        self.values = self.world.flights.add_trigger(self.record, lambda field, value: None).values
+        self.trigger = Trigger("theta")
+        self.values = self.trigger.values
+        self.world.flights.add_beside(self.record, self.trigger, lambda field, value: None)
         self.record.put("VELO", 2.0, Putter(), 0.0)
         self.put("_trgDistance", 1.5)
 
     def put(self, field, value):
-        self.world.flights.put_trigger(self.record, field, value, self.world.by(f"{field} {value}"))
+        self.world.flights.put(self.trigger, field, value, self.world.by(f"{field} {value}"))
 
     def whats(self):
         return [what for _, what, _ in self.world.sent]

@@ -16,6 +16,7 @@ from .deferred import Waiting
 from .events import End
 from .people import People
 from .record import Record
+from .tasks import Tasks, loop_time
 from .turns import Turn, Turns
 
 LOG = logging.getLogger("bushd-epics")
@@ -43,7 +44,7 @@ class Asks:
         self._names = names
         self._deliver = deliver
         self._turns = Turns()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = Tasks()
         self._jogs: dict[int, bushd.aio.Jog] = {}  # that the daemon has accepted
         self._open_jogs: set[int] = set()  # that were asked for
         self._let_go: set[int] = set()  # of these, those that were ended before they were accepted
@@ -54,17 +55,17 @@ class Asks:
             case events.Move():
                 self.start_group([(record, ask)])
             case events.Stop():
-                self._spawn(self._stop_one(record, ask, self._stop([record], _who(ask), lambda client: self._stop_and_look(client, record))))
+                self._tasks.spawn(self._stop_one(record, ask, self._stop([record], _who(ask), lambda client: self._stop_and_look(client, record))))
             case events.EndJog():
-                self._spawn(self._end_jog(record, ask))
+                self._tasks.spawn(self._end_jog(record, ask))
             case _:
                 if isinstance(ask, events.Jog):
                     self._open_jogs.add(ask.number)
-                self._spawn(self._carry_out(self._turns.take(_who(ask), [record]), record, ask))
+                self._tasks.spawn(self._carry_out(self._turns.take(_who(ask), [record]), record, ask))
 
     def start_group(self, group: list[Waiting]) -> None:
         """Moves that are asked for as one."""
-        self._spawn(self._move(self._turns.take(_who(group[0][1]), [record for record, _ in group]), group))
+        self._tasks.spawn(self._move(self._turns.take(_who(group[0][1]), [record for record, _ in group]), group))
 
     def stop_all(self, who: str) -> asyncio.Task[None]:
         """Raises BushdError when it is awaited."""
@@ -72,18 +73,11 @@ class Asks:
         async def stop(client: bushd.aio.Client) -> None:
             await client.stop()
 
-        return self._spawn(self._stop(list(self._names), who, stop))
+        return self._tasks.spawn(self._stop(list(self._names), who, stop))
 
     async def finish(self) -> None:
         """Once nothing is under way any more."""
-        if self._tasks:
-            await asyncio.wait(set(self._tasks))
-
-    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        task = asyncio.get_running_loop().create_task(coroutine)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-        return task
+        await self._tasks.finish()
 
     # -- moves
 
@@ -138,7 +132,7 @@ class Asks:
         for record, ask in group:
             one = result[self._names[record]]
             if status is None:
-                record.observe(motor.seen_at_end(record.seen, one), _now())
+                record.observe(motor.seen_at_end(record.seen, one), loop_time())
             else:
                 self._observe(record, status)
             self._tell(record, record.ended, ask.number, ENDS[one.outcome], "" if one.outcome.succeeded else result.reason)
@@ -284,10 +278,10 @@ class Asks:
     def _observe(self, record: Record, status: model.Status | None) -> None:
         name = self._names[record]
         if status is not None and name in status.motors:
-            record.observe(motor.seen(status.motors[name]), _now())
+            record.observe(motor.seen(status.motors[name]), loop_time())
 
     def _tell(self, record: Record, told: Callable[..., None], *what: Any) -> None:
-        told(*what, _now())
+        told(*what, loop_time())
         self._deliver(record)
 
 
@@ -306,7 +300,3 @@ async def status_of(client: bushd.aio.Client) -> model.Status | None:
 
 def _who(ask: events.Ask) -> str:
     return str(ask.who or "bushd-epics")
-
-
-def _now() -> float:
-    return asyncio.get_running_loop().time()

@@ -18,6 +18,7 @@ from .events import End, Speeds
 from .flights import Flights
 from .people import People, connect
 from .record import Record
+from .tasks import loop_time
 
 LOG = logging.getLogger("bushd-epics")
 
@@ -96,7 +97,7 @@ class Daemon:
             look_at = float("-inf")
             try:
                 async for status in client.watch(TELLS_EVERY_S):
-                    now = _now()
+                    now = loop_time()
                     self._heard_at = now
                     self._take(status, now)
                     if now >= look_at and (looking is None or looking.done()):
@@ -140,7 +141,7 @@ class Daemon:
     async def _watch_silence(self) -> None:
         while True:
             await asyncio.sleep(SILENT_AFTER_S / 4)
-            if self.records and not self._silent and _now() > self._heard_at + SILENT_AFTER_S:
+            if self.records and not self._silent and loop_time() > self._heard_at + SILENT_AFTER_S:
                 self._fall_silent(f"bushd has not been heard for {SILENT_AFTER_S:g} s")
 
     def _fall_silent(self, why: str) -> None:
@@ -150,7 +151,7 @@ class Daemon:
 
     def _silence(self, record: Record, why: str) -> None:
         if record.silent != why:
-            record.fall_silent(why, _now())
+            record.fall_silent(why, loop_time())
             self.deliver(record)
 
     # -- speeds
@@ -236,7 +237,7 @@ class Daemon:
         if isinstance(ask, events.Move) and self.deferred.on:
             before = self.deferred.take(record, ask)
             if before is not None:
-                record.ended(before.number, End.STOPPED, "", _now())
+                record.ended(before.number, End.STOPPED, "", loop_time())
             return
         if isinstance(ask, events.Stop):
             self._drop_deferred(record)
@@ -245,7 +246,7 @@ class Daemon:
     def _drop_deferred(self, record: Record) -> None:
         dropped = self.deferred.drop(record)
         if dropped is not None:
-            record.refused(dropped.number, "stopped before the deferred moves began", _now())
+            record.refused(dropped.number, "stopped before the deferred moves began", loop_time())
 
     def defer(self, on: bool) -> None:
         self.deferred.on = on
@@ -259,7 +260,7 @@ class Daemon:
         self.flights.no_more()
         for record in self.records.values():
             self._drop_deferred(record)
-            record.halt(who, _now())
+            record.halt(who, loop_time())
             self.deliver(record)
         await stopping
 
@@ -276,13 +277,9 @@ class Daemon:
 
     def _tick(self, record: Record) -> None:
         self._timers.pop(record, None)
-        record.tick(_now())
+        record.tick(loop_time())
         self.deliver(record)
 
 
 def _same(before: model.Motor | None, told: model.Motor) -> bool:
     return before is told or before == told
-
-
-def _now() -> float:
-    return asyncio.get_running_loop().time()

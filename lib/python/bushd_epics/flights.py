@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 import bushd
@@ -19,12 +19,14 @@ from .events import End, Seen
 from .people import People
 from .profile import BadProfile, Profile, Trajectory
 from .record import Putter, Record
+from .tasks import Tasks, loop_time
 from .trigger import Trigger
 
 LOG = logging.getLogger("bushd-epics")
 POINTS_ARE_TOLD_EVERY_S = 0.1
 
 Show = Callable[[str, Any], None]  # a field and its value
+Work = Callable[[bushd.aio.Client], Awaitable[tuple[str, str]]]  # how it has ended, and why
 
 
 class Flight:
@@ -41,49 +43,38 @@ class Flights:
         self._deliver_record = deliver
         self._under_way: dict[Profile | Trigger, Flight] = {}
         self._shows: dict[Profile | Compare | Trigger, Show] = {}
-        self._compares: dict[Record, Compare] = {}
+        self._records_of: dict[Compare | Trigger, Record] = {}
         self._triggers: dict[Record, Trigger] = {}
         self._comparing = asyncio.Lock()  # what was put last holds
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = Tasks()
 
     def add(self, one: Profile, show: Show) -> None:
         self._shows[one] = show
 
-    def add_compare(self, record: Record, show: Show) -> Compare:
-        made = self._compares[record] = Compare(record.name)
-        self._shows[made] = show
-        return made
+    def add_beside(self, record: Record, one: Compare | Trigger, show: Show) -> None:
+        self._records_of[one] = record
+        self._shows[one] = show
+        if isinstance(one, Trigger):
+            self._triggers[record] = one
 
-    def add_trigger(self, record: Record, show: Show) -> Trigger:
-        made = self._triggers[record] = Trigger(record.name)
-        self._shows[made] = show
-        return made
-
-    def put(self, one: Profile, field: str, value: Any, by: Putter) -> None:
-        one.put(field, value, by, self._where)
+    def put(self, one: Profile | Compare | Trigger, field: str, value: Any, by: Putter) -> None:
+        if isinstance(one, Profile):
+            one.put(field, value, by, self._where)
+        else:
+            one.put(field, value, by)
         self._deliver(one)
-
-    def put_compare(self, record: Record, field: str, value: Any, by: Putter) -> None:
-        one = self._compares[record]
-        one.put(field, value, by)
-        self._deliver_compare(record, one)
-
-    def put_trigger(self, record: Record, field: str, value: Any, by: Putter) -> None:
-        one = self._triggers[record]
-        one.put(field, value, by)
-        self._deliver_trigger(record, one)
 
     def look(self, record: Record) -> None:
         """Its motor may wait for an edge, or have begun to move by one."""
         one = self._triggers.get(record)
         if one is not None:
             one.see(record.seen)
-            self._deliver_trigger(record, one)
+            self._deliver(one)
 
     async def finish(self) -> None:
         """Once nothing is under way any more."""
-        while self._tasks:
-            await asyncio.wait(set(self._tasks))
+        while self._tasks.any:
+            await self._tasks.finish()
 
     # -- stops
 
@@ -103,7 +94,7 @@ class Flights:
             if by.token is not None:
                 by.token(error)
 
-        self._spawn(self._stop(motors, str(by.who), answer))
+        self._tasks.spawn(self._stop(motors, str(by.who), answer))
 
     def no_more(self) -> None:
         """All motors are being stopped: nothing of what flies begins any more."""
@@ -126,34 +117,47 @@ class Flights:
             self._people.end(who)
         answer(error)
 
-    # -- profiles
+    # -- what they ask for
 
-    def _deliver(self, one: Profile) -> None:
+    def _deliver(self, one: Profile | Compare | Trigger) -> None:
         for event in one.take():
             match event:
-                case events.Post() | events.Done():
-                    self._tell(one, event)
-                case profile.Check():
-                    self._spawn(self._check(one, event))
-                case profile.Fly():
+                case events.Post():
+                    self._shows[one](event.field, event.value)
+                case events.Done():
+                    self._answer(one, event)
+                case profile.Check() if isinstance(one, Profile):
+                    self._tasks.spawn(self._check(one, event))
+                case profile.Fly() if isinstance(one, Profile):
                     # Before anything else has its turn: a stop that comes now ends it.
                     self._under_way[one] = Flight(event.trajectory.motors)
-                    self._spawn(self._fly(one, event))
-                case profile.Abort():
-                    self._abort(one, event.by, lambda: self._deliver(one))
+                    self._tasks.spawn(self._fly(one, event))
+                case compare.Set() if isinstance(one, Compare):
+                    self._tasks.spawn(self._set_compare(one, event))
+                case trigger.Arm() if isinstance(one, Trigger):
+                    self._under_way[one] = Flight((self._motor(self._records_of[one]),))
+                    self._tasks.spawn(self._arm(one, event))
+                case profile.Abort() | trigger.Disarm() if not isinstance(one, Compare):
+                    self._abort(one, event.by)
 
-    def _abort(self, one: Profile | Trigger, by: Putter, deliver: Callable[[], None]) -> None:
+    def _answer(self, one: Profile | Compare | Trigger, done: events.Done) -> None:
+        """What a profile says names it."""
+        if done.error:
+            LOG.warning("%s%s", "" if isinstance(one, Profile) else f"{one.name}: ", done.error)
+        done.token(done.error)
+
+    def _abort(self, one: Profile | Trigger, by: Putter) -> None:
         flight = self._under_way.get(one)
         if flight is None:
             one.aborted(by)
-            return deliver()
+            return self._deliver(one)
         flight.stopped = True
 
         def answer(error: str) -> None:
             one.aborted(by, error)
-            deliver()
+            self._deliver(one)
 
-        self._spawn(self._stop(list(flight.motors), str(by.who), answer))
+        self._tasks.spawn(self._stop(list(flight.motors), str(by.who), answer))
 
     async def _check(self, one: Profile, ask: profile.Check) -> None:
         made = ask.trajectory
@@ -181,8 +185,11 @@ class Flights:
                 result = await self._leg(flight, client, follow, one)
             return await self._ended(flight, client, result)
 
-        end, reason = await self._over(str(ask.who), flies)
-        del self._under_way[one]
+        await self._end(one, str(ask.who), flies)
+
+    async def _end(self, one: Profile | Trigger, who: str, work: Work) -> None:
+        end, reason = await self._over(who, work)
+        flight = self._under_way.pop(one)
         one.over(End.STOPPED if flight.stopped and end != End.REACHED else end, reason)
         self._deliver(one)
 
@@ -212,30 +219,29 @@ class Flights:
             return End.STOPPED, NEVER_BEGAN
         rest = {one.motor: one for one in result} if result.outcome.succeeded else {}
         status = None if result.outcome.succeeded else await status_of(client)
-        now = asyncio.get_running_loop().time()
+        at = loop_time()
         for name, record in self._records.items():
             if name in rest:
-                record.comes_to_rest(motor.seen_at_end(record.seen, rest[name]), now)
+                record.comes_to_rest(motor.seen_at_end(record.seen, rest[name]), at)
             elif name in flight.motors and status is not None and name in status.motors:
                 seen = motor.seen(status.motors[name])
                 if seen.moving or seen.busy:
-                    record.observe(seen, now)
+                    record.observe(seen, at)
                 else:
-                    record.comes_to_rest(seen, now)
+                    record.comes_to_rest(seen, at)
             else:
                 continue
             self._deliver_record(record)
         return ENDS[result.outcome], "" if result.outcome.succeeded else result.reason
 
     async def _tell_points(self, one: Profile) -> None:
-        loop = asyncio.get_running_loop()
-        began = loop.time()
+        began = loop_time()
         while True:
             await asyncio.sleep(POINTS_ARE_TOLD_EVERY_S)
-            one.passed(loop.time() - began)
+            one.passed(loop_time() - began)
             self._deliver(one)
 
-    async def _over(self, who: str, work: Callable[[bushd.aio.Client], Awaitable[tuple[str, str]]]) -> tuple[str, str]:
+    async def _over(self, who: str, work: Work) -> tuple[str, str]:
         """Over the connection of this user; how it has ended."""
         self._people.begin(who)
         try:
@@ -266,29 +272,14 @@ class Flights:
             raise BadProfile(f"{motor}: {record.silent or 'its MCU is offline'}")
         return record.seen
 
-    def _tell(self, one: Profile | Compare | Trigger, event: events.Post | events.Done, where: str = "") -> None:
-        """`where`: begins the line of the log, where the error does not say it."""
-        if isinstance(event, events.Post):
-            self._shows[one](event.field, event.value)
-            return
-        if event.error:
-            LOG.warning("%s%s", where, event.error)
-        event.token(event.error)
-
     def _motor(self, record: Record) -> str:
         return next((motor for motor, other in self._records.items() if other is record), "")
 
     # -- position compare
 
-    def _deliver_compare(self, record: Record, one: Compare) -> None:
-        for event in one.take():
-            match event:
-                case events.Post() | events.Done():
-                    self._tell(one, event, f"{one.name}: ")
-                case compare.Set():
-                    self._spawn(self._set_compare(record, one, event))
+    async def _set_compare(self, one: Compare, ask: compare.Set) -> None:
+        record = self._records_of[one]
 
-    async def _set_compare(self, record: Record, one: Compare, ask: compare.Set) -> None:
         async def asks(client: bushd.aio.Client) -> tuple[str, str]:
             await client.position_compare(
                 self._motor(record), ask.position, positive=ask.on, negative=ask.on, width_us=ask.width_us
@@ -298,29 +289,18 @@ class Flights:
         async with self._comparing:
             end, reason = await self._over(str(ask.by.who), asks)
         one.answered(ask, "" if end == End.REACHED else reason or end)
-        self._deliver_compare(record, one)
+        self._deliver(one)
         if end == End.REACHED and ask.on:
-            for other, its in self._compares.items():
-                if other is not record and its.is_on and _mcu(other) == _mcu(record):
-                    its.replaced()
-                    self._deliver_compare(other, its)
+            for other, its in self._records_of.items():
+                if isinstance(other, Compare) and its is not record and other.is_on and _mcu(its) == _mcu(record):
+                    other.replaced()
+                    self._deliver(other)
 
     # -- triggers
 
-    def _deliver_trigger(self, record: Record, one: Trigger) -> None:
-        for event in one.take():
-            match event:
-                case events.Post() | events.Done():
-                    self._tell(one, event, f"{one.name}: ")
-                case trigger.Arm():
-                    self._under_way[one] = Flight((self._motor(record),))
-                    self._spawn(self._arm(record, one, event))
-                case trigger.Disarm():
-                    self._abort(one, event.by, lambda: self._deliver_trigger(record, one))
-
-    async def _arm(self, record: Record, one: Trigger, ask: trigger.Arm) -> None:
+    async def _arm(self, one: Trigger, ask: trigger.Arm) -> None:
         """The daemon disarms it when this process has ended: nobody would be told of the move any more."""
-        flight = self._under_way[one]
+        record, flight = self._records_of[one], self._under_way[one]
         (name,) = flight.motors
 
         async def waits(client: bushd.aio.Client) -> tuple[str, str]:
@@ -335,15 +315,7 @@ class Flights:
 
             return await self._ended(flight, client, await self._leg(flight, client, arm))
 
-        end, reason = await self._over(str(ask.who), waits)
-        del self._under_way[one]
-        one.over(End.STOPPED if flight.stopped and end != End.REACHED else end, reason)
-        self._deliver_trigger(record, one)
-
-    def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.get_running_loop().create_task(coroutine)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        await self._end(one, str(ask.who), waits)
 
 
 def _mcu(record: Record) -> str:

@@ -13,12 +13,15 @@ import caproto
 from . import beside, channels, compare, events, trigger
 from .access import Access
 from .circuits import Circuit, Context
+from .compare import Compare
 from .daemon import Daemon
 from .fields import FIELDS, Kind, Value
 from .jogs import Jogs
 from .leaves import Leaves
 from .profile import Profile, all_fields
 from .record import Putter, Record
+from .tasks import Tasks, loop_time
+from .trigger import Trigger
 
 LOG = logging.getLogger("bushd-epics")
 
@@ -42,8 +45,7 @@ class Pages:
         self._fields: dict[str, Any] = {}
         record.shown = set(DESCRIBING)
         self._able: Any = None
-        self._compare: Leaves | None = None
-        self._trigger: Leaves | None = None
+        self._beside: dict[type[Compare | Trigger], Leaves] = {}
         self._held = False
 
     def field(self, name: str) -> Any:
@@ -68,24 +70,18 @@ class Pages:
             self._able.reason = self._reason
         return self._able
 
-    def compare(self, name: str) -> Any:
-        """`NAMEPCOEnable` and what belongs to it. Raises KeyError."""
-        if self._compare is None:
-            made = self._flights.add_compare(self.record, lambda field, value: leaves.show(field, value))
-            leaves = Leaves(compare.FIELDS, made.values, self._put_compare, self._alarm)
-            self._compare = leaves
-        channel = self._compare.find(name)
-        self._compare.describe(str(self.record.values["EGU"]), int(self.record.values["PREC"]))
-        return channel
-
-    def trigger(self, name: str) -> Any:
-        """`NAME_trgArm` and what belongs to it. Raises KeyError."""
-        if self._trigger is None:
-            made = self._flights.add_trigger(self.record, lambda field, value: leaves.show(field, value))
-            leaves = Leaves(trigger.FIELDS, made.values, self._put_trigger, self._alarm)
-            self._trigger = leaves
-        channel = self._trigger.find(name)
-        self._trigger.describe(str(self.record.values["EGU"]), int(self.record.values["PREC"]))
+    def beside(self, name: str) -> Any:
+        """`NAMEPCOEnable`, `NAME_trgArm`, and what belongs to them. Raises KeyError."""
+        kind: type[Compare | Trigger] = Compare if name in compare.FIELDS else Trigger
+        leaves = self._beside.get(kind)
+        if leaves is None:
+            made = kind(self.record.name)
+            fields = compare.FIELDS if kind is Compare else trigger.FIELDS
+            leaves = Leaves(fields, made.values, lambda field, value, by: self._flights.put(made, field, value, by), self._alarm)
+            self._beside[kind] = leaves
+            self._flights.add_beside(self.record, made, leaves.show)
+        channel = leaves.find(name)
+        leaves.describe(str(self.record.values["EGU"]), int(self.record.values["PREC"]))
         return channel
 
     def post(self, event: events.Post) -> None:
@@ -104,9 +100,8 @@ class Pages:
         )
         for channel in [*self._fields.values(), *([] if self._able is None else [self._able])]:
             channel.take_alarm()
-        for leaves in (self._compare, self._trigger):
-            if leaves is not None:
-                leaves.alarm_has_changed()
+        for leaves in self._beside.values():
+            leaves.alarm_has_changed()
 
     def held(self, held: bool) -> None:
         if held != self._held:
@@ -127,20 +122,14 @@ class Pages:
         )
 
     def _put(self, name: str, value: Value, by: Putter) -> None:
-        if name in ("JOGF", "JOGR") and value and self._jogs.renew(self.record, name, by.circuit, _now()):
+        if name in ("JOGF", "JOGR") and value and self._jogs.renew(self.record, name, by.circuit, loop_time()):
             by.token("")
             return
         if self._flights.flies(self.record) and (name == "STOP" and value or name == "SPMG" and not value):
             self._flights.stop(self.record, by)
             by = dataclasses.replace(by, token=None)
-        self.record.put(name, value, by, _now())
+        self.record.put(name, value, by, loop_time())
         self._deliver(self.record)
-
-    def _put_compare(self, name: str, value: Any, by: Putter) -> None:
-        self._flights.put_compare(self.record, name, value, by)
-
-    def _put_trigger(self, name: str, value: Any, by: Putter) -> None:
-        self._flights.put_trigger(self.record, name, value, by)
 
     def _put_able(self, value: Value, by: Putter) -> None:
         self.record.hold(bool(value), by)
@@ -164,7 +153,7 @@ class Server(Context):
         self._common: dict[str, Any] = {}
         self._profiles: dict[str, tuple[Profile, Leaves]] = {}  # by what their names begin with
         self._refused: set[str] = set()
-        self._work: set[asyncio.Task[None]] = set()
+        self._work = Tasks()
 
     def add_daemon(self, daemon: Daemon) -> None:
         self._all.append(daemon)
@@ -233,7 +222,7 @@ class Server(Context):
         pages = self._pages[motor]
         if pages.record.is_axis:
             raise KeyError(name)
-        return pages.compare(field) if field in compare.FIELDS else pages.trigger(field)
+        return pages.beside(field)
 
     async def look_up_names(self) -> None:
         """Of hosts that may put, as long as some were not found: at boot the network may not be there yet."""
@@ -248,9 +237,9 @@ class Server(Context):
         while True:
             await asyncio.sleep(JOGS_ARE_LOOKED_AT_S)
             records = list(self._daemons)
-            for record, circuit, why in self.jogs.look(records, Circuit.waiting_bytes, _now()):
+            for record, circuit, why in self.jogs.look(records, Circuit.waiting_bytes, loop_time()):
                 LOG.warning("%s: its jog ends: %s", record.name, why)
-                record.client_gone(circuit, _now())
+                record.client_gone(circuit, loop_time())
                 self._daemons[record].deliver(record)
             # Something has to be on the way to a PC that is gone, for its silence to be seen.
             for circuit in {job.circuit for record in records for job in self.jogs.of(record)}:
@@ -258,7 +247,7 @@ class Server(Context):
 
     def client_gone(self, circuit: Circuit) -> None:
         for record, daemon in self._daemons.items():
-            record.client_gone(circuit, _now())
+            record.client_gone(circuit, loop_time())
             daemon.deliver(record)
 
     def tell_refused(self, who: str, host: str, name: str) -> None:
@@ -303,7 +292,7 @@ class Server(Context):
         if not value:
             by.token("")
             return
-        self._start(self._stop_all(by))
+        self._work.spawn(self._stop_all(by))
 
     async def _stop_all(self, by: Putter) -> None:
         ended = await asyncio.gather(*(daemon.stop_all(str(by.who)) for daemon in self._all), return_exceptions=True)
@@ -318,12 +307,3 @@ class Server(Context):
         for daemon in self._all:
             daemon.defer(bool(value))
         by.token("")
-
-    def _start(self, coroutine: Any) -> None:
-        task = asyncio.get_running_loop().create_task(coroutine)
-        self._work.add(task)
-        task.add_done_callback(self._work.discard)
-
-
-def _now() -> float:
-    return asyncio.get_running_loop().time()
