@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "config/keys.h"
+
 namespace bushd::config {
 
 using tables::TomlReader;
@@ -16,19 +18,21 @@ Result<Converter> read_converter(const TomlReader& bus) {
   }
   const auto reader = bus.section("converter", "a table such as { max_hz = 2500, max_code = 250 }");
   if (!reader) return fail(reader.error());
-  if (auto known = reader->only({"max_hz", "max_code"}); !known) return fail(known.error());
-  const auto max_hz = reader->integer("max_hz", kLeastHzPerCode, kMaxConverterHz, "Hz");
-  if (!max_hz) return fail(max_hz.error());
-  const auto max_code = reader->integer("max_code", 1, kMaxConverterCode);
-  if (!max_code) return fail(max_code.error());
-  if (*max_hz < kLeastHzPerCode * *max_code) {
+  Converter converter{};
+  const Keys keys =
+      Keys(*reader)
+          .only({"max_hz", "max_code"})
+          .needed_whole("max_hz", &converter.max_hz, kLeastHzPerCode, kMaxConverterHz, "Hz")
+          .needed_whole("max_code", &converter.max_code, 1, kMaxConverterCode);
+  if (!keys.result()) return fail(keys.result().error());
+  const auto least_hz = kLeastHzPerCode * converter.max_code;
+  if (converter.max_hz < least_hz) {
     return fail(reader->error(
         "max_hz", fmt::format("is {} Hz, which gives code 1 less than {} Hz; allowed with max_code "
                               "= {}: {} Hz and more. Use a smaller max_code",
-                              *max_hz, kLeastHzPerCode, *max_code, kLeastHzPerCode * *max_code)));
+                              converter.max_hz, kLeastHzPerCode, converter.max_code, least_hz)));
   }
-  return Converter{.max_hz = static_cast<std::uint32_t>(*max_hz),
-                   .max_code = static_cast<std::uint32_t>(*max_code)};
+  return converter;
 }
 
 // How the board times its steps.
@@ -39,10 +43,7 @@ Result<void> read_pace(const TomlReader& reader, Bus* bus) {
     bus->converter = *converter;
     return {};
   }
-  const auto start_hz = reader.integer("start_hz", 1, 100, "Hz");
-  if (!start_hz) return fail(start_hz.error());
-  bus->start_hz = static_cast<std::uint32_t>(*start_hz);
-  return {};
+  return Keys(reader).needed_whole("start_hz", &bus->start_hz, 1, 100, "Hz").result();
 }
 
 }  // namespace
@@ -50,11 +51,7 @@ Result<void> read_pace(const TomlReader& reader, Bus* bus) {
 Result<void> read_board(const TomlReader& reader, Bus* bus) {
   if (auto pace = read_pace(reader, bus); !pace) return pace;
   bus->answer_ms = 100;
-  if (!reader.has("answer_ms")) return {};
-  const auto answer_ms = reader.integer("answer_ms", 10, 10'000, "ms");
-  if (!answer_ms) return fail(answer_ms.error());
-  bus->answer_ms = static_cast<std::uint32_t>(*answer_ms);
-  return {};
+  return Keys(reader).whole("answer_ms", &bus->answer_ms, 10, 10'000, "ms").result();
 }
 
 Result<void> check_board_motor(const TomlReader& reader, const std::string& board,

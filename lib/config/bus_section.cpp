@@ -8,8 +8,8 @@
 
 #include "config/board_section.h"
 #include "config/checks.h"
+#include "config/keys.h"
 #include "config/serial_pulse_section.h"
-#include "config/words.h"
 
 namespace bushd::config {
 namespace {
@@ -39,14 +39,13 @@ Result<void> read_rs485(const TomlReader& reader, Bus* bus) {
   const auto baud = read_baud(reader);
   if (!baud) return fail(baud.error());
   bus->baud = *baud;
-  const auto tick_us =
-      reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
-  if (!tick_us) return fail(tick_us.error());
-  bus->tick_us = static_cast<std::uint32_t>(*tick_us);
-  const auto format = read_word(reader, "format", {"fine", "coarse"});
-  if (!format) return fail(format.error());
-  bus->format = *format == 0 ? BUSHD_FORMAT_FINE : BUSHD_FORMAT_COARSE;
-  return {};
+  bool coarse = false;
+  const Keys keys = Keys(reader)
+                        .needed_whole("tick_us", &bus->tick_us, BUSHD_MIN_TICK_NS / 1000,
+                                      BUSHD_MAX_TICK_NS / 1000, "us")
+                        .needed_word("format", &coarse, {"fine", "coarse"});
+  bus->format = coarse ? BUSHD_FORMAT_COARSE : BUSHD_FORMAT_FINE;
+  return keys.result();
 }
 
 // Reads the keys of a bus of kind "commutator".
@@ -65,11 +64,8 @@ Result<void> read_commutator(const TomlReader& reader, Bus* bus) {
 }  // namespace
 
 Result<void> read_bus_kind(const TomlReader& reader, Bus* bus) {
-  if (reader.has("kind")) {
-    const auto kind = read_word(reader, "kind", kBusKinds);
-    if (!kind) return fail(kind.error());
-    bus->kind = static_cast<BusKind>(*kind);
-  }
+  const Keys kind = Keys(reader).word("kind", &bus->kind, kBusKinds);
+  if (!kind.result()) return kind.result();
   switch (bus->kind) {
     case BusKind::kSerialPulse:
       return read_serial_pulse(reader, bus);
@@ -83,33 +79,23 @@ Result<void> read_bus_kind(const TomlReader& reader, Bus* bus) {
 
 // The keys of a bus that may be left out.
 Result<void> read_manners(const TomlReader& reader, Bus* bus) {
-  if (reader.has("moves")) {
-    const auto moves = read_word(reader, "moves", {"stream", "table"});
-    if (!moves) return fail(moves.error());
-    bus->table_runs = *moves == 1;
-  }
-  bus->streams = bus->table_runs ? Streams::kRefuse : Streams::kFit;
-  if (reader.has("streams")) {
-    const auto streams = read_word(reader, "streams", {"fit", "refuse", "queue"});
-    if (!streams) return fail(streams.error());
-    bus->streams = static_cast<Streams>(*streams);
-  }
-  if (reader.has("frames")) {
-    const auto frames = read_word(reader, "frames", {"auto", "ticks"});
-    if (!frames) return fail(frames.error());
-    bus->table_ticks = *frames == 0;
-  }
-  if (reader.has("emergency_stop")) {
-    const auto mode = read_word(reader, "emergency_stop", {"ramp", "immediate", "disable"});
-    if (!mode) return fail(mode.error());
-    static_assert(BUSHD_STOP_RAMP == 0 && BUSHD_STOP_IMMEDIATE == 1 && BUSHD_STOP_DISABLE == 2);
-    bus->emergency_stop = static_cast<bushd_stop_mode>(*mode);
-    if (bus->emergency_stop == BUSHD_STOP_DISABLE && bus->kind != BusKind::kRs485) {
-      return fail(reader.error("emergency_stop",
-                               "is \"disable\", but nothing on a bus of this kind can disable "
-                               "drivers; allowed: \"ramp\" or \"immediate\". Use \"immediate\", "
-                               "and cut the power of the motors by a relay"));
-    }
+  static_assert(BUSHD_STOP_RAMP == 0 && BUSHD_STOP_IMMEDIATE == 1 && BUSHD_STOP_DISABLE == 2);
+  bool ticks_alone = false;
+  std::optional<Streams> streams;
+  const Keys keys =
+      Keys(reader)
+          .word("moves", &bus->table_runs, {"stream", "table"})
+          .word("streams", &streams, {"fit", "refuse", "queue"})
+          .word("frames", &ticks_alone, {"auto", "ticks"})
+          .word("emergency_stop", &bus->emergency_stop, {"ramp", "immediate", "disable"});
+  if (!keys.result()) return keys.result();
+  bus->streams = streams.value_or(bus->table_runs ? Streams::kRefuse : Streams::kFit);
+  bus->table_ticks = !ticks_alone;
+  if (bus->emergency_stop == BUSHD_STOP_DISABLE && bus->kind != BusKind::kRs485) {
+    return fail(reader.error("emergency_stop",
+                             "is \"disable\", but nothing on a bus of this kind can disable "
+                             "drivers; allowed: \"ramp\" or \"immediate\". Use \"immediate\", "
+                             "and cut the power of the motors by a relay"));
   }
   return {};
 }

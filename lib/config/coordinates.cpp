@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "config/keys.h"
 #include "config/setting.h"
 
 namespace bushd::config {
@@ -85,17 +86,11 @@ Result<void> read_scale(const TomlReader& reader, Motor* motor) {
     if (!negative) return fail(negative.error());
     scale.negative = *negative;
   }
-  if (reader.has("offset")) {
-    const auto offset = reader.number("offset", "a number");
-    if (!offset) return fail(offset.error());
-    scale.offset = *offset;
-  }
-  if (reader.has("precision")) {
-    const auto decimals =
-        reader.integer("precision", 0, units::Coordinates::kMostDecimals, "decimals");
-    if (!decimals) return fail(decimals.error());
-    scale.decimals = static_cast<int>(*decimals);
-  }
+  const Keys keys =
+      Keys(reader)
+          .number("offset", &scale.offset, "a number")
+          .whole("precision", &scale.decimals, 0, units::Coordinates::kMostDecimals, "decimals");
+  if (!keys.result()) return keys.result();
   auto coordinates = units::Coordinates::make(std::move(scale));
   if (!coordinates) return fail(reader.error("offset", coordinates.error().message));
   motor->coordinates = std::move(*coordinates);
@@ -124,67 +119,23 @@ Result<units::SoftLimits> read_soft_limits(const TomlReader& reader, const Motor
   return limits;
 }
 
-Result<double> read_max_speed(const TomlReader& reader, const Motor& motor) {
-  constexpr std::string_view kKey = "max_speed";
-  const auto speed = reader.number(kKey, "a number above 0");
-  if (!speed) return speed;
-  if (const auto good = check_user_speed(motor.coordinates, *speed); !good) {
-    return fail(reader.error(kKey, good.error().message));
-  }
-  if (motor.drive.moved_by_people()) {
-    return fail(
-        reader.error(kKey,
-                     "does not hold for local motion, which the MCU makes by the "
-                     "table alone; leave out `local` and `keypad`, or give the group a slower "
-                     "table"));
-  }
-  return speed;
+Result<void> check_max_speed(const Motor& motor, double speed) {
+  if (const auto good = check_user_speed(motor.coordinates, speed); !good) return good;
+  if (!motor.drive.moved_by_people()) return {};
+  return fail(
+      "does not hold for local motion, which the MCU makes by the table alone; leave out `local` "
+      "and `keypad`, or give the group a slower table");
 }
 
-Result<double> read_acceleration(const TomlReader& reader) {
-  constexpr std::string_view kKey = "acceleration";
-  const auto share = reader.number(kKey, "a number above 0 and at most 1");
-  if (!share) return share;
-  if (const auto good = check_acceleration_share(*share); !good) {
-    return fail(reader.error(kKey, good.error().message));
+Result<void> check_backlash(const units::Coordinates& coordinates, double backlash) {
+  const auto steps = coordinates.steps_of_distance(backlash);
+  if (!steps) return fail(steps.error());
+  if (!coordinates.has_unit() && backlash != static_cast<double>(*steps)) {
+    return fail(fmt::format("is {}; allowed without `unit`: whole steps", backlash));
   }
-  return share;
-}
-
-Result<void> read_backlash(const TomlReader& reader, Motor* motor) {
-  if (reader.has("backlash")) {
-    const auto backlash = reader.number("backlash", "a number; 0 is none");
-    if (!backlash) return fail(backlash.error());
-    const auto steps = motor->coordinates.steps_of_distance(*backlash);
-    if (!steps) return fail(reader.error("backlash", steps.error().message));
-    if (!motor->coordinates.has_unit() && *backlash != static_cast<double>(*steps)) {
-      return fail(reader.error(
-          "backlash", fmt::format("is {}; allowed without `unit`: whole steps", *backlash)));
-    }
-    if (*steps == 0 && *backlash != 0) {
-      return fail(reader.error("backlash", fmt::format("is {}, which is no step; allowed: one "
-                                                       "step or more, or 0: none",
-                                                       *backlash)));
-    }
-    motor->backlash = *backlash;
-  }
-  if (reader.has("backlash_speed")) {
-    constexpr std::string_view kKey = "backlash_speed";
-    if (motor->backlash == 0) {
-      return fail(reader.error(kKey, "needs `backlash`: it is the speed of its last approach"));
-    }
-    const auto speed = reader.number(kKey, "a number above 0");
-    if (!speed) return fail(speed.error());
-    if (const auto good = check_user_speed(motor->coordinates, *speed); !good) {
-      return fail(reader.error(kKey, good.error().message));
-    }
-    motor->backlash_speed = *speed;
-  }
-  if (!reader.has("settle_ms")) return {};
-  const auto settle_ms = reader.integer("settle_ms", 0, kMostSettleMs, "milliseconds");
-  if (!settle_ms) return fail(settle_ms.error());
-  motor->settle_ms = *settle_ms;
-  return {};
+  if (*steps != 0 || backlash == 0) return {};
+  return fail(
+      fmt::format("is {}, which is no step; allowed: one step or more, or 0: none", backlash));
 }
 
 }  // namespace
@@ -203,17 +154,26 @@ Result<void> read_coordinates(const TomlReader& reader, Motor* motor) {
       return fail(reader.error(key, "needs `unit`: positions of a motor without one are steps"));
     }
   }
-  if (reader.has("max_speed")) {
-    const auto speed = read_max_speed(reader, *motor);
-    if (!speed) return fail(speed.error());
-    motor->max_speed = *speed;
+  const units::Coordinates& coordinates = motor->coordinates;
+  const Keys keys =
+      Keys(reader)
+          .number("max_speed", &motor->max_speed, "a number above 0",
+                  [&](double speed) { return check_max_speed(*motor, speed); })
+          .number("acceleration", &motor->drive.acceleration, "a number above 0 and at most 1",
+                  check_acceleration_share)
+          .number("backlash", &motor->backlash, "a number; 0 is none",
+                  [&](double backlash) { return check_backlash(coordinates, backlash); });
+  if (!keys.result()) return keys.result();
+  if (reader.has("backlash_speed") && motor->backlash == 0) {
+    return fail(
+        reader.error("backlash_speed", "needs `backlash`: it is the speed of its last approach"));
   }
-  if (reader.has("acceleration")) {
-    const auto share = read_acceleration(reader);
-    if (!share) return fail(share.error());
-    motor->drive.acceleration = *share;
-  }
-  if (auto read = read_backlash(reader, motor); !read) return read;
+  const Keys approach =
+      Keys(reader)
+          .number("backlash_speed", &motor->backlash_speed, "a number above 0",
+                  [&](double speed) { return check_user_speed(coordinates, speed); })
+          .whole("settle_ms", &motor->settle_ms, 0, kMostSettleMs, "milliseconds");
+  if (!approach.result()) return approach.result();
   if (!reader.has("soft_limits")) return {};
   const auto limits = read_soft_limits(reader, *motor);
   if (!limits) return fail(limits.error());

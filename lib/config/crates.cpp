@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "config/words.h"
+#include "config/keys.h"
 
 namespace bushd::config {
 namespace {
@@ -27,23 +27,6 @@ struct Place {
   std::size_t page;    // which of the module's programs moves it: kBushd2 has four
 };
 using Places = std::map<std::size_t, Place>;  // by MotorId
-
-Result<std::vector<TomlReader>> sections(const TomlReader& parent, const std::string& file,
-                                         std::string_view key, const std::string& place) {
-  const std::string allowed = fmt::format("sections [[{}]]", place);
-  const auto elements = parent.array(key, allowed);
-  if (!elements) return fail(elements.error());
-  std::vector<TomlReader> readers;
-  for (const toml::node& node : **elements) {
-    const toml::table* table = node.as_table();
-    if (table == nullptr) {
-      return fail(parent.error(key, readers.size(),
-                               fmt::format("is {}; allowed: {}", tables::describe(node), allowed)));
-    }
-    readers.emplace_back(*table, file, fmt::format("{}[{}]", place, readers.size()));
-  }
-  return readers;
-}
 
 // Which motor has this name, for a key or an element of it.
 Result<MotorId> find_motor(const TomlReader& reader, std::string_view key,
@@ -93,30 +76,21 @@ Result<void> read_motors(const TomlReader& reader, const std::string& where, con
 
 Result<void> read_bushd2(const TomlReader& reader, const std::string& where, const Config& config,
                          CamacModule* module, Places* places) {
-  if (auto known = reader.only({"station", "type", "without_computer", "f_start_hz", "motors"});
-      !known)
-    return known;
-  if (reader.has("f_start_hz")) {
-    const auto f_start = reader.integer("f_start_hz", kLeastStartHz, kMostStartHz, "Hz");
-    if (!f_start) return fail(f_start.error());
-    module->f_start_hz = static_cast<int>(*f_start);
-  }
+  const Keys keys =
+      Keys(reader)
+          .only({"station", "type", "without_computer", "f_start_hz", "motors"})
+          .whole("f_start_hz", &module->f_start_hz, kLeastStartHz, kMostStartHz, "Hz");
+  if (!keys.result()) return keys.result();
   return read_motors(reader, where, config, module, places);
 }
 
 Result<void> read_bushd1(const TomlReader& reader, const std::string& where, const Config& config,
                          CamacModule* module, Places* places) {
-  if (auto known =
-          reader.only({"station", "type", "without_computer", "adjustable_delay", "motor"});
-      !known) {
-    return known;
-  }
-  if (reader.has("adjustable_delay")) {
-    const auto of = read_word(reader, "adjustable_delay", {"return", "opening"});
-    if (!of) return fail(of.error());
-    module->adjustable_delay =
-        *of == 0 ? CamacModule::AdjustableDelay::kReturn : CamacModule::AdjustableDelay::kOpening;
-  }
+  static_assert(static_cast<int>(CamacModule::AdjustableDelay::kOpening) == 1);
+  const Keys keys = Keys(reader)
+                        .only({"station", "type", "without_computer", "adjustable_delay", "motor"})
+                        .word("adjustable_delay", &module->adjustable_delay, {"return", "opening"});
+  if (!keys.result()) return keys.result();
   const auto name = reader.string("motor", "the name of a motor");
   if (!name) return fail(name.error());
   const auto motor = find_motor(reader, "motor", std::nullopt, *name, config);
@@ -152,15 +126,12 @@ Result<void> read_module(const TomlReader& reader, const Config& config, Crate* 
                                                     "allowed: each once",
                                                     number, crate->number)));
   }
-  const auto type = read_word(reader, "type", {"bushd-1", "bushd-2"});
-  if (!type) return fail(type.error());
-  CamacModule module{.station = number,
-                     .type = *type == 0 ? CamacModule::Type::kBushd1 : CamacModule::Type::kBushd2};
-  if (reader.has("without_computer")) {
-    const auto alone = reader.boolean("without_computer");
-    if (!alone) return fail(alone.error());
-    module.without_computer = *alone;
-  }
+  static_assert(static_cast<int>(CamacModule::Type::kBushd2) == 1);
+  CamacModule module{.station = number};
+  const Keys keys = Keys(reader)
+                        .needed_word("type", &module.type, {"bushd-1", "bushd-2"})
+                        .flag("without_computer", &module.without_computer);
+  if (!keys.result()) return keys.result();
   const std::string where = fmt::format("station {} of crate {}", number, crate->number);
   const auto read = module.type == CamacModule::Type::kBushd1 ? read_bushd1 : read_bushd2;
   if (auto good = read(reader, where, config, &module, places); !good) return good;
@@ -198,7 +169,7 @@ Result<void> check_groups(const TomlReader& root, const Config& config, const Pl
 
 Result<void> read_crates(const TomlReader& root, Config* config) {
   if (!root.has("crate")) return {};
-  const auto crates = sections(root, config->path, "crate", "crate");
+  const auto crates = read_elements(root, config->path, "crate", "crate");
   if (!crates) return fail(crates.error());
   Places places;
   for (std::size_t i = 0; i < crates->size(); ++i) {
@@ -212,7 +183,7 @@ Result<void> read_crates(const TomlReader& root, Config* config) {
           "number", fmt::format("crate {} is already there; allowed: each once", crate.number)));
     }
     const auto modules =
-        sections(reader, config->path, "module", fmt::format("crate[{}].module", i));
+        read_elements(reader, config->path, "module", fmt::format("crate[{}].module", i));
     if (!modules) return fail(modules.error());
     for (const TomlReader& module : *modules) {
       if (auto read = read_module(module, *config, &crate, &places); !read) return read;

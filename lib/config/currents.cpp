@@ -1,20 +1,10 @@
 #include "config/currents.h"
 
-#include "config/words.h"
+#include "config/keys.h"
 
 namespace bushd::config {
-namespace {
 
 using tables::TomlReader;
-
-Result<void> read_ma(const TomlReader& reader, std::string_view key, std::uint16_t* ma) {
-  const auto value = reader.integer(key, 1, BUSHD_MAX_CURRENT_MA, "mA");
-  if (!value) return fail(value.error());
-  *ma = static_cast<std::uint16_t>(*value);
-  return {};
-}
-
-}  // namespace
 
 Result<std::optional<Currents>> read_currents(const TomlReader& motor, const Mcu& mcu) {
   constexpr std::string_view kKey = "currents";
@@ -27,20 +17,15 @@ Result<std::optional<Currents>> read_currents(const TomlReader& motor, const Mcu
   auto reader =
       motor.section(kKey, "a table such as { ramp_ma = 1500, cruise_ma = 1000, hold_ma = 300 }");
   if (!reader) return fail(reader.error());
-  if (auto known = reader->only({"ramp_ma", "cruise_ma", "hold_ma", "decay"}); !known) {
-    return fail(known.error());
-  }
   Currents currents;
-  for (const auto& [key, ma] :
-       {std::pair{"ramp_ma", &currents.ramp_ma}, std::pair{"cruise_ma", &currents.cruise_ma},
-        std::pair{"hold_ma", &currents.hold_ma}}) {
-    if (auto read = read_ma(*reader, key, ma); !read) return fail(read.error());
-  }
-  if (reader->has("decay")) {
-    const auto decay = read_word(*reader, "decay", {"slow", "fast"});
-    if (!decay) return fail(decay.error());
-    currents.fast_decay = *decay == 1;
-  }
+  const Keys keys =
+      Keys(*reader)
+          .only({"ramp_ma", "cruise_ma", "hold_ma", "decay"})
+          .needed_whole("ramp_ma", &currents.ramp_ma, 1, BUSHD_MAX_CURRENT_MA, "mA")
+          .needed_whole("cruise_ma", &currents.cruise_ma, 1, BUSHD_MAX_CURRENT_MA, "mA")
+          .needed_whole("hold_ma", &currents.hold_ma, 1, BUSHD_MAX_CURRENT_MA, "mA")
+          .word("decay", &currents.fast_decay, {"slow", "fast"});
+  if (!keys.result()) return fail(keys.result().error());
   return currents;
 }
 

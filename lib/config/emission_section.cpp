@@ -5,6 +5,7 @@
 #include <array>
 #include <string>
 
+#include "config/keys.h"
 #include "config/words.h"
 
 namespace bushd::config {
@@ -16,14 +17,6 @@ constexpr std::int64_t kMaxUs = UINT16_MAX;
 // Where the first step of a tick would begin together with the change of DIR: enough for slow
 // drivers.
 constexpr std::uint16_t kDirSetupUs = 5;
-
-Result<void> read_us(const TomlReader& reader, std::string_view key, std::int64_t lowest,
-                     std::uint16_t* us) {
-  const auto value = reader.integer(key, lowest, kMaxUs, "us");
-  if (!value) return fail(value.error());
-  *us = static_cast<std::uint16_t>(*value);
-  return {};
-}
 
 // A motor has to move for it, so it is measured only where that is asked for.
 Result<void> read_settle(const TomlReader& reader, std::uint16_t* us) {
@@ -39,7 +32,7 @@ Result<void> read_settle(const TomlReader& reader, std::uint16_t* us) {
     *us = BUSHD_SETTLE_MEASURED;
     return {};
   }
-  if (auto read = read_us(reader, kKey, 0, us); !read) {
+  if (auto read = Keys(reader).whole(kKey, us, 0, kMaxUs, "us").result(); !read) {
     read.error().message += fmt::format(" or \"{}\"", kMeasured);
     return read;
   }
@@ -90,25 +83,19 @@ Result<void> refuse_idle_keys(const TomlReader& reader, Steps steps) {
 
 Result<std::uint8_t> read_mode(const TomlReader& reader) {
   Steps steps = kEven;
-  if (reader.has("steps")) {
-    const auto word = read_word(reader, "steps", fieldbus::kStepsNames);
-    if (!word) return fail(word.error());
-    steps = static_cast<Steps>(*word);
-  }
   bool common = false;
-  if (reader.has("direction")) {
-    const auto word = read_word(reader, "direction", fieldbus::kDirectionNames);
-    if (!word) return fail(word.error());
-    common = *word == 1;
-    // Steps at their own times cannot wait for the one DIR; windings have none.
-    if ((bit(steps) & kPeriodic) == 0 && (common || steps == kPhases)) {
-      return fail(reader.error(
-          "direction",
-          fmt::format("is \"{}\" with steps = \"{}\"; allowed: {}",
-                      fieldbus::kDirectionNames[common ? 1 : 0], fieldbus::kStepsNames[steps],
-                      steps == kPhases ? "only with drivers, which have STEP and DIR; remove it"
-                                       : "\"common\" only with steps = " + names_of(kPeriodic))));
-    }
+  const Keys keys = Keys(reader)
+                        .word("steps", &steps, fieldbus::kStepsNames)
+                        .word("direction", &common, fieldbus::kDirectionNames);
+  if (!keys.result()) return fail(keys.result().error());
+  // Steps at their own times cannot wait for the one DIR; windings have none.
+  if (reader.has("direction") && (bit(steps) & kPeriodic) == 0 && (common || steps == kPhases)) {
+    return fail(reader.error(
+        "direction",
+        fmt::format("is \"{}\" with steps = \"{}\"; allowed: {}",
+                    fieldbus::kDirectionNames[common ? 1 : 0], fieldbus::kStepsNames[steps],
+                    steps == kPhases ? "only with drivers, which have STEP and DIR; remove it"
+                                     : "\"common\" only with steps = " + names_of(kPeriodic))));
   }
   if (auto idle = refuse_idle_keys(reader, steps); !idle) return fail(idle.error());
   switch (steps) {
@@ -145,39 +132,24 @@ Result<fieldbus::EmissionSetup> read_emission(const TomlReader& reader) {
   if (!mode) return fail(mode.error());
   settings.mode = *mode;
   const bool periodic = bushd_emission_has_periods(settings.mode);
-  if (periodic) {
-    if (auto read = read_us(reader, "step_us", 1, &settings.step_us); !read) {
-      return fail(read.error());
-    }
-  }
-  const auto optional_us = [&](std::string_view key, std::int64_t lowest,
-                               std::uint16_t* us) -> Result<void> {
-    return reader.has(key) ? read_us(reader, key, lowest, us) : Result<void>{};
-  };
+  Keys keys(reader);
+  if (periodic) keys.needed_whole("step_us", &settings.step_us, 1, kMaxUs, "us");
+  if (!keys.result()) return fail(keys.result().error());
   if (bushd_emission_is_staggered(settings.mode)) {
     if (auto read = read_settle(reader, &settings.settle_us); !read) return fail(read.error());
   }
   if (periodic && !bushd_emission_has_common_dir(settings.mode)) {
     settings.dir_setup_us = kDirSetupUs;
   }
-  if (auto read = optional_us("dir_setup_us", 0, &settings.dir_setup_us); !read) {
-    return fail(read.error());
-  }
-  if (auto read = optional_us("pulse_us", 0, &settings.pulse_us); !read) return fail(read.error());
   if (settings.mode == BUSHD_EMISSION_PHASES) {
     settings.sequence = BUSHD_PHASES_FULL;
     settings.hold_current = true;
   }
-  if (reader.has("phase_sequence")) {
-    const auto sequence = read_word(reader, "phase_sequence", fieldbus::kSequenceNames);
-    if (!sequence) return fail(sequence.error());
-    settings.sequence = static_cast<std::uint8_t>(*sequence);
-  }
-  if (reader.has("hold_current")) {
-    const auto hold = reader.boolean("hold_current");
-    if (!hold) return fail(hold.error());
-    settings.hold_current = *hold;
-  }
+  keys.whole("dir_setup_us", &settings.dir_setup_us, 0, kMaxUs, "us")
+      .whole("pulse_us", &settings.pulse_us, 0, kMaxUs, "us")
+      .word("phase_sequence", &settings.sequence, fieldbus::kSequenceNames)
+      .flag("hold_current", &settings.hold_current);
+  if (!keys.result()) return fail(keys.result().error());
   setup.mode_at = reader.error(reader.has("steps") ? "steps" : "", "");
   setup.step_at = reader.error("step_us", "");
   setup.dir_setup_at = reader.error("dir_setup_us", "");

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "config/keys.h"
 #include "config/setting.h"
 
 namespace bushd::config {
@@ -33,52 +34,6 @@ Result<bool> read_direction(const TomlReader& reader) {
       reader.error("direction", fmt::format("is \"{}\"; allowed: negative, positive", *direction)));
 }
 
-Result<void> read_numbers(const TomlReader& reader, Home* home) {
-  const auto most = reader.integer("most_steps", 1, kMostOfWay, "steps");
-  if (!most) return fail(most.error());
-  home->most_steps = static_cast<std::uint32_t>(*most);
-  if (reader.has("position_steps")) {
-    const auto position = reader.integer("position_steps", -kMostSteps + kStepsBeyond,
-                                         kMostSteps - kStepsBeyond, "steps");
-    if (!position) return fail(position.error());
-    home->position_steps = static_cast<std::int32_t>(*position);
-  }
-  if (reader.has("slow_steps_per_s")) {
-    const auto slow = reader.integer("slow_steps_per_s", kSlowest, kFastest, "steps/s");
-    if (!slow) return fail(slow.error());
-    home->slow_steps_per_s = static_cast<std::uint32_t>(*slow);
-  }
-  if (reader.has("slow_most_steps")) {
-    const auto slow_most = reader.integer("slow_most_steps", 1, kMostOfWay, "steps");
-    if (!slow_most) return fail(slow_most.error());
-    home->slow_most_steps = static_cast<std::uint32_t>(*slow_most);
-  }
-  if (reader.has("order")) {
-    const auto order = reader.integer("order", 1, kLastOrder);
-    if (!order) return fail(order.error());
-    home->order = static_cast<std::int32_t>(*order);
-  }
-  return {};
-}
-
-// In the motor's unit.
-Result<void> read_user_numbers(const TomlReader& reader, Home* home) {
-  if (reader.has("speed")) {
-    const auto speed = reader.number("speed", "a number above 0");
-    if (!speed) return fail(speed.error());
-    if (!(*speed > 0)) {
-      return fail(reader.error("speed", fmt::format("is {}; allowed: a number above 0", *speed)));
-    }
-    home->speed = *speed;
-  }
-  if (reader.has("then")) {
-    const auto then = reader.number("then", "a position");
-    if (!then) return fail(then.error());
-    home->then = *then;
-  }
-  return {};
-}
-
 }  // namespace
 
 Result<Home> read_home(const TomlReader& motor) {
@@ -94,13 +49,22 @@ Result<Home> read_home(const TomlReader& motor) {
   const auto positive = read_direction(*reader);
   if (!positive) return fail(positive.error());
   home.positive = *positive;
-  if (auto read = read_numbers(*reader, &home); !read) return fail(read.error());
-  if (auto read = read_user_numbers(*reader, &home); !read) return fail(read.error());
-  if (reader->has("at_start")) {
-    const auto at_start = reader->boolean("at_start");
-    if (!at_start) return fail(at_start.error());
-    home.at_start = *at_start;
-  }
+  constexpr std::int64_t kFarthest = kMostSteps - kStepsBeyond;
+  const auto above_0 = [](double speed) -> Result<void> {
+    if (speed > 0) return {};
+    return fail(fmt::format("is {}; allowed: a number above 0", speed));
+  };
+  const Keys keys =
+      Keys(*reader)
+          .needed_whole("most_steps", &home.most_steps, 1, kMostOfWay, "steps")
+          .whole("position_steps", &home.position_steps, -kFarthest, kFarthest, "steps")
+          .whole("slow_steps_per_s", &home.slow_steps_per_s, kSlowest, kFastest, "steps/s")
+          .whole("slow_most_steps", &home.slow_most_steps, 1, kMostOfWay, "steps")
+          .whole("order", &home.order, 1, kLastOrder)
+          .number("speed", &home.speed, "a number above 0", above_0)
+          .number("then", &home.then, "a position")
+          .flag("at_start", &home.at_start);
+  if (!keys.result()) return fail(keys.result().error());
   return home;
 }
 

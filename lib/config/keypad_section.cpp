@@ -6,26 +6,12 @@
 #include <string>
 #include <utility>
 
+#include "config/keys.h"
 #include "config/port_check.h"
 #include "config/words.h"
 
 namespace bushd::config {
-namespace {
-
-using tables::TomlReader;
-
-Result<void> read_number(const TomlReader& reader, const char* key, std::int64_t least,
-                         std::int64_t most, const char* unit, std::uint32_t* value) {
-  if (!reader.has(key)) return {};
-  const auto number = reader.integer(key, least, most, unit);
-  if (!number) return fail(number.error());
-  *value = static_cast<std::uint32_t>(*number);
-  return {};
-}
-
-}  // namespace
-
-Result<Keypad> read_keypad(const TomlReader& reader, const Config& config) {
+Result<Keypad> read_keypad(const tables::TomlReader& reader, const Config& config) {
   if (auto known = reader.only(
           {"port", "baud", "motor", "mode", "delay_us", "slower_us", "slowest_us", "keepalive_ms"});
       !known) {
@@ -46,19 +32,14 @@ Result<Keypad> read_keypad(const TomlReader& reader, const Config& config) {
   const auto found = std::ranges::find(config.motors, *motor, &Motor::name);
   if (found == config.motors.end()) return refuse(reader, "motor", *motor, "the name of a motor");
   keypad.motor = MotorId{static_cast<std::size_t>(found - config.motors.begin())};
-  if (reader.has("mode")) {
-    const auto mode = read_word(reader, "mode", {"hold", "latch"});
-    if (!mode) return fail(mode.error());
-    keypad.latched = *mode == 1;
-  }
-  for (const auto& read :
-       {read_number(reader, "baud", 50, 4'000'000, "bit/s", &keypad.baud),
-        read_number(reader, "delay_us", 10, 10'000'000, "us", &keypad.delay_us),
-        read_number(reader, "slower_us", 1, 10'000'000, "us", &keypad.slower_us),
-        read_number(reader, "slowest_us", 10, 10'000'000, "us", &keypad.slowest_us),
-        read_number(reader, "keepalive_ms", 50, 10'000, "ms", &keypad.keepalive_ms)}) {
-    if (!read) return fail(read.error());
-  }
+  const Keys keys = Keys(reader)
+                        .word("mode", &keypad.latched, {"hold", "latch"})
+                        .whole("baud", &keypad.baud, 50, 4'000'000, "bit/s")
+                        .whole("delay_us", &keypad.delay_us, 10, 10'000'000, "us")
+                        .whole("slower_us", &keypad.slower_us, 1, 10'000'000, "us")
+                        .whole("slowest_us", &keypad.slowest_us, 10, 10'000'000, "us")
+                        .whole("keepalive_ms", &keypad.keepalive_ms, 50, 10'000, "ms");
+  if (!keys.result()) return fail(keys.result().error());
   if (keypad.slowest_us < keypad.delay_us) {
     const char* const key = reader.has("slowest_us") ? "slowest_us" : "delay_us";
     return fail(reader.error(key, fmt::format("slowest_us = {} is below delay_us = {}; allowed: "

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "config/keys.h"
 #include "config/words.h"
 
 namespace bushd::config {
@@ -51,14 +52,11 @@ Result<Input> read_input(const TomlReader& inputs, std::string_view key) {
   }
   const auto reader = inputs.section(key, kInputRule);
   if (!reader) return fail(reader.error());
-  if (auto known = reader->only({"input", "active"}); !known) return fail(known.error());
-  const auto number = reader->integer("input", 0, kLastInput);
-  if (!number) return fail(number.error());
-  input.number = static_cast<std::uint8_t>(*number);
-  if (!reader->has("active")) return input;
-  const auto active = read_word(*reader, "active", {"closed", "open"});
-  if (!active) return fail(active.error());
-  input.active_open = *active == 1;
+  const Keys keys = Keys(*reader)
+                        .only({"input", "active"})
+                        .needed_whole("input", &input.number, 0, kLastInput)
+                        .word("active", &input.active_open, {"closed", "open"});
+  if (!keys.result()) return fail(keys.result().error());
   return input;
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/csv/number_csv.h"
 #include "config/coordinates.h"
+#include "config/keys.h"
 #include "config/words.h"
 #include "tables/toml_file.h"
 
@@ -255,11 +256,10 @@ Result<Pseudo> read_pseudo(const TomlReader& reader, const Config& config) {
   auto axes = read_axes(reader);
   if (!axes) return fail(axes.error());
   if (auto read = read_limits(reader, &*axes); !read) return fail(read.error());
-  if (reader.has("precision")) {
-    const auto decimals =
-        reader.integer("precision", 0, units::Coordinates::kMostDecimals, "decimals");
-    if (!decimals) return fail(decimals.error());
-    for (PseudoAxis& axis : *axes) axis.decimals = static_cast<int>(*decimals);
+  for (PseudoAxis& axis : *axes) {
+    const Keys keys = Keys(reader).whole("precision", &axis.decimals, 0,
+                                         units::Coordinates::kMostDecimals, "decimals");
+    if (!keys.result()) return fail(keys.result().error());
   }
   auto motors = read_motors(reader, config);
   if (!motors) return fail(motors.error());

@@ -19,6 +19,7 @@
 #include "config/idle_section.h"
 #include "config/inputs.h"
 #include "config/keypad_section.h"
+#include "config/keys.h"
 #include "config/output_levels.h"
 #include "config/port_check.h"
 #include "config/programs_section.h"
@@ -39,34 +40,21 @@ constexpr std::size_t kMaxPrefix = 48;
 constexpr std::string_view kPrefixRule =
     "1..48 characters of A-Z a-z 0-9 _ . -, the first one no -";
 
-Result<std::string> read_name(const TomlReader& reader, std::string_view key = "name",
-                              std::size_t longest = kLongestName,
-                              std::string_view rule = kNameRule) {
-  auto name = reader.string(key, rule);
-  if (!name || is_name(*name, longest)) return name;
-  return refuse(reader, key, *name, rule);
+Result<std::string> read_name(const TomlReader& reader) {
+  auto name = reader.string("name", kNameRule);
+  if (!name || is_name(*name, kLongestName)) return name;
+  return refuse(reader, "name", *name, kNameRule);
 }
 
 // The elements of `[[key]]`; a section that may be left out and is yields none.
 Result<std::vector<TomlReader>> read_array(const TomlReader& root, const std::string& file,
                                            const std::string& key, bool needed) {
-  std::vector<TomlReader> readers;
-  if (!needed && !root.has(key)) return readers;
-  const std::string allowed = fmt::format("sections [[{}]]", key);
-  const auto elements = root.array(key, allowed);
-  if (!elements) return fail(elements.error());
-  for (const toml::node& node : **elements) {
-    const toml::table* table = node.as_table();
-    if (table == nullptr) {
-      return fail(root.error(key, readers.size(),
-                             fmt::format("is {}; allowed: {}", tables::describe(node), allowed)));
-    }
-    readers.emplace_back(*table, file, fmt::format("{}[{}]", key, readers.size()));
+  if (!needed && !root.has(key)) return std::vector<TomlReader>();
+  auto elements = read_elements(root, file, key, key);
+  if (elements && needed && elements->empty()) {
+    return fail(root.error(key, fmt::format("is empty; allowed: sections [[{}]]", key)));
   }
-  if (needed && readers.empty()) {
-    return fail(root.error(key, fmt::format("is empty; allowed: {}", allowed)));
-  }
-  return readers;
+  return elements;
 }
 
 // Names already taken and the line that took them.
@@ -106,62 +94,45 @@ Result<Index> resolve(const TomlReader& reader, std::string_view key,
   return Index{static_cast<std::size_t>(found - elements.begin())};
 }
 
-Result<void> read_lcm(const TomlReader& root, Config* config) {
-  if (!root.has("lcm")) return {};
-  const toml::table* section = root.table("lcm");
-  if (section == nullptr) return fail(root.error("lcm", "is not a section; allowed: one [lcm]"));
-  const TomlReader reader(*section, config->path, "lcm");
-  if (auto known = reader.only({"url", "prefix", "commands"}); !known) return known;
-  if (reader.has("url")) {
-    constexpr std::string_view kUrlRule = "a URL beginning with udpm://, tcpq:// or memq://";
-    auto url = reader.string("url", kUrlRule);
-    if (!url) return fail(url.error());
+Result<void> read_lcm(const TomlReader& reader, Config* config) {
+  const auto is_url = [](const std::string& url) {
     constexpr std::array<std::string_view, 3> kProviders = {"udpm://", "tcpq://", "memq://"};
-    const bool good = std::any_of(kProviders.begin(), kProviders.end(),
-                                  [&](std::string_view start) { return url->starts_with(start); });
-    if (!good) return refuse(reader, "url", *url, kUrlRule);
-    config->lcm.url = std::move(*url);
-  }
-  if (reader.has("prefix")) {
-    auto prefix = read_name(reader, "prefix", kMaxPrefix, kPrefixRule);
-    if (!prefix) return fail(prefix.error());
-    config->lcm.prefix = std::move(*prefix);
-  }
-  if (reader.has("commands")) {
-    const auto commands = reader.boolean("commands");
-    if (!commands) return fail(commands.error());
-    config->lcm.commands = *commands;
-  }
-  return {};
+    return std::ranges::any_of(kProviders,
+                               [&](std::string_view start) { return url.starts_with(start); });
+  };
+  return Keys(reader)
+      .only({"url", "prefix", "commands"})
+      .text("url", &config->lcm.url, "a URL beginning with udpm://, tcpq:// or memq://", is_url)
+      .text("prefix", &config->lcm.prefix, kPrefixRule,
+            [](const std::string& prefix) { return is_name(prefix, kMaxPrefix); })
+      .flag("commands", &config->lcm.commands)
+      .result();
 }
 
-Result<void> read_control(const TomlReader& root, Config* config) {
-  if (!root.has("control")) return {};
-  const toml::table* section = root.table("control");
+Result<void> read_control(const TomlReader& reader, Config* config) {
+  const auto is_path = [](const std::string& path) {
+    constexpr std::size_t kMaxPath = 107;  // as long as the kernel takes
+    return path.empty() || (path.starts_with('/') && path.size() <= kMaxPath);
+  };
+  if (reader.has("group")) config->control.group_at = reader.error("group", "");
+  return Keys(reader)
+      .only({"path", "group"})
+      .text("path", &config->control.path,
+            "an absolute path of up to 107 characters, or \"\" for no socket", is_path)
+      .text("group", &config->control.group, "the name of a group of users",
+            [](const std::string&) { return true; })
+      .result();
+}
+
+// A section that there is once, or not at all.
+Result<void> read_section(const TomlReader& root, std::string_view key, Config* config,
+                          Result<void> (*read)(const TomlReader&, Config*)) {
+  if (!root.has(key)) return {};
+  const toml::table* section = root.table(key);
   if (section == nullptr) {
-    return fail(root.error("control", "is not a section; allowed: one [control]"));
+    return fail(root.error(key, fmt::format("is not a section; allowed: one [{}]", key)));
   }
-  const TomlReader reader(*section, config->path, "control");
-  if (auto known = reader.only({"path", "group"}); !known) return known;
-  if (reader.has("path")) {
-    // As long as the kernel takes.
-    constexpr std::size_t kMaxPath = 107;
-    constexpr std::string_view kPathRule =
-        "an absolute path of up to 107 characters, or \"\" for no socket";
-    auto path = reader.string("path", kPathRule);
-    if (!path) return fail(path.error());
-    if (!path->empty() && (!path->starts_with('/') || path->size() > kMaxPath)) {
-      return refuse(reader, "path", *path, kPathRule);
-    }
-    config->control.path = std::move(*path);
-  }
-  if (reader.has("group")) {
-    auto group = reader.string("group", "the name of a group of users");
-    if (!group) return fail(group.error());
-    config->control.group = std::move(*group);
-    config->control.group_at = reader.error("group", "");
-  }
-  return {};
+  return read(TomlReader(*section, config->path, std::string(key)), config);
 }
 
 Result<void> read_buses(Loading* loading) {
@@ -247,11 +218,8 @@ Result<void> read_mcus(const std::vector<TomlReader>& readers, Config* config) {
     if (auto taken = ids.take(reader, "address", mcu.id, what); !taken) return taken;
     if (auto read = read_inputs(reader, &mcu); !read) return read;
     if (auto read = read_idle(reader, &mcu); !read) return read;
-    if (reader.has("keypad_ms")) {
-      const auto ms = reader.integer("keypad_ms", 0, kMostKeypadMs, "ms");
-      if (!ms) return fail(ms.error());
-      mcu.keypad_ms = static_cast<std::uint32_t>(*ms);
-    }
+    const Keys keypad = Keys(reader).whole("keypad_ms", &mcu.keypad_ms, 0, kMostKeypadMs, "ms");
+    if (!keypad.result()) return keypad.result();
     if (auto read = read_programs(reader, &mcu); !read) return read;
     config->mcus.push_back(std::move(mcu));
   }
@@ -312,19 +280,11 @@ Result<void> read_motion_of_its_own(const TomlReader& reader, Motor* motor) {
     if (!home) return fail(home.error());
     motor->home = *home;
   }
-  if (reader.has("never_disable")) {
-    const auto never = reader.boolean("never_disable");
-    if (!never) return fail(never.error());
-    motor->never_disable = *never;
-  }
-  for (const auto& [key, at] :
-       {std::pair{"local", &motor->drive.local}, std::pair{"keypad", &motor->drive.keypad}}) {
-    if (!reader.has(key)) continue;
-    const auto value = reader.boolean(key);
-    if (!value) return fail(value.error());
-    *at = *value;
-  }
-  return {};
+  return Keys(reader)
+      .flag("never_disable", &motor->never_disable)
+      .flag("local", &motor->drive.local)
+      .flag("keypad", &motor->drive.keypad)
+      .result();
 }
 
 bool another_names_its_input(const Config& config, const Motor& motor) {
@@ -463,9 +423,10 @@ Result<void> read_sections(const TomlReader& root, Loading* loading) {
       !known) {
     return known;
   }
-  if (auto read = read_lcm(root, &loading->config); !read) return read;
-  if (auto read = read_control(root, &loading->config); !read) return read;
-  if (auto read = read_state(root, &loading->config); !read) return read;
+  Config* const config = &loading->config;
+  if (auto read = read_section(root, "lcm", config, read_lcm); !read) return read;
+  if (auto read = read_section(root, "control", config, read_control); !read) return read;
+  if (auto read = read_section(root, "state", config, read_state); !read) return read;
   auto buses = read_array(root, file, "bus", true);
   if (!buses) return fail(buses.error());
   loading->buses = std::move(*buses);

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "config/inputs.h"
+#include "config/keys.h"
 #include "config/words.h"
 
 namespace bushd::config {
@@ -28,14 +29,12 @@ Result<Input> read_line(const TomlReader& inputs, std::string_view key) {
   }
   const auto reader = inputs.section(key, kLineRule);
   if (!reader) return fail(reader.error());
-  if (auto known = reader->only({"line", "active"}); !known) return fail(known.error());
-  const auto line = read_word(*reader, "line", kLines);
-  if (!line) return fail(line.error());
-  Input input{.number = static_cast<std::uint8_t>(*line)};
-  if (!reader->has("active")) return input;
-  const auto active = read_word(*reader, "active", {"on", "off"});
-  if (!active) return fail(active.error());
-  input.active_open = *active == 1;
+  Input input;
+  const Keys keys = Keys(*reader)
+                        .only({"line", "active"})
+                        .needed_word("line", &input.number, kLines)
+                        .word("active", &input.active_open, {"on", "off"});
+  if (!keys.result()) return fail(keys.result().error());
   return input;
 }
 
@@ -44,13 +43,13 @@ Result<void> read_lines(const TomlReader& bus, MotorInputs* lines) {
       bus.section("inputs", "a table such as { home = \"cd\", positive = \"dsr\" }");
   if (!reader) return fail(reader.error());
   if (auto known = reader->only({"positive", "negative", "home"}); !known) return known;
-  struct Use {
+  struct Named {
     std::string_view key;
     std::optional<Input> MotorInputs::* input;
   };
-  for (const Use& use :
-       {Use{"positive", &MotorInputs::positive}, Use{"negative", &MotorInputs::negative},
-        Use{"home", &MotorInputs::home}}) {
+  for (const Named& use :
+       {Named{"positive", &MotorInputs::positive}, Named{"negative", &MotorInputs::negative},
+        Named{"home", &MotorInputs::home}}) {
     if (!reader->has(use.key)) continue;
     const auto input = read_line(*reader, use.key);
     if (!input) return fail(input.error());
@@ -75,22 +74,15 @@ Result<void> read_direction_line(const TomlReader& bus, SerialPulse* pulse) {
     if (bus.has("direction_line") && !bus.is_string("direction_line")) {
       return fail(bus.error("direction_line", fmt::format("allowed: {}", kRule)));
     }
-    const auto line = read_word(bus, "direction_line", {"dtr", "rts"});
-    if (!line) return fail(line.error());
-    pulse->rts = *line == 1;
-    return {};
+    return Keys(bus).needed_word("direction_line", &pulse->rts, {"dtr", "rts"}).result();
   }
   const auto reader = bus.section("direction_line", kRule);
   if (!reader) return fail(reader.error());
-  if (auto known = reader->only({"line", "active"}); !known) return known;
-  const auto line = read_word(*reader, "line", {"dtr", "rts"});
-  if (!line) return fail(line.error());
-  pulse->rts = *line == 1;
-  if (!reader->has("active")) return {};
-  const auto active = read_word(*reader, "active", {"on", "off"});
-  if (!active) return fail(active.error());
-  pulse->positive_off = *active == 1;
-  return {};
+  return Keys(*reader)
+      .only({"line", "active"})
+      .needed_word("line", &pulse->rts, {"dtr", "rts"})
+      .word("active", &pulse->positive_off, {"on", "off"})
+      .result();
 }
 
 }  // namespace
@@ -106,12 +98,9 @@ Result<void> read_serial_pulse(const TomlReader& reader, Bus* bus) {
     if (auto read = read_lines(reader, &bus->serial_pulse.inputs); !read) return read;
   }
   bus->tick_us = kTickUs;
-  if (!reader.has("tick_us")) return {};
-  const auto tick_us =
-      reader.integer("tick_us", BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us");
-  if (!tick_us) return fail(tick_us.error());
-  bus->tick_us = static_cast<std::uint32_t>(*tick_us);
-  return {};
+  return Keys(reader)
+      .whole("tick_us", &bus->tick_us, BUSHD_MIN_TICK_NS / 1000, BUSHD_MAX_TICK_NS / 1000, "us")
+      .result();
 }
 
 Result<void> take_serial_pulse(const TomlReader& reader, const Bus& bus, Motor* motor) {

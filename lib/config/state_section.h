@@ -6,7 +6,8 @@
 
 namespace bushd::config {
 
-Result<void> read_state(const tables::TomlReader& root, Config* config);
+// Of [state].
+Result<void> read_state(const tables::TomlReader& reader, Config* config);
 // `restored` of a motor.
 Result<void> read_restored(const tables::TomlReader& reader, Motor* motor);
 

@@ -1,8 +1,8 @@
 #include "config/velocity.h"
 
-#include <array>
 #include <string_view>
 
+#include "config/keys.h"
 #include "engine/velocity.h"
 
 namespace bushd::config {
@@ -20,17 +20,15 @@ Result<std::optional<Velocity>> read_velocity(const tables::TomlReader& reader,
       kKey,
       "a table such as { min_steps_per_s = 100, max_steps_per_s = 1500, steps_per_s2 = 500 }");
   if (!section) return fail(section.error());
-  const std::array keys = {"min_steps_per_s", "max_steps_per_s", "steps_per_s2"};
-  if (auto known = section->only({keys[0], keys[1], keys[2]}); !known) return fail(known.error());
-  const auto least = section->integer(keys[0], 1, kMostStepsPerS, "steps/s");
-  if (!least) return fail(least.error());
-  const auto most = section->integer(keys[1], *least, kMostStepsPerS, "steps/s");
-  if (!most) return fail(most.error());
-  const auto acceleration = section->integer(keys[2], 1, BUSHD_VELOCITY_MOST, "steps/s^2");
-  if (!acceleration) return fail(acceleration.error());
-  return Velocity{.min_steps_per_s = static_cast<std::int32_t>(*least),
-                  .max_steps_per_s = static_cast<std::int32_t>(*most),
-                  .steps_per_s2 = static_cast<std::int32_t>(*acceleration)};
+  Velocity velocity;
+  Keys keys(*section);
+  keys.only({"min_steps_per_s", "max_steps_per_s", "steps_per_s2"})
+      .needed_whole("min_steps_per_s", &velocity.min_steps_per_s, 1, kMostStepsPerS, "steps/s");
+  keys.needed_whole("max_steps_per_s", &velocity.max_steps_per_s, velocity.min_steps_per_s,
+                    kMostStepsPerS, "steps/s")
+      .needed_whole("steps_per_s2", &velocity.steps_per_s2, 1, BUSHD_VELOCITY_MOST, "steps/s^2");
+  if (!keys.result()) return fail(keys.result().error());
+  return velocity;
 }
 
 }  // namespace bushd::config
