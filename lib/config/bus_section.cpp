@@ -8,8 +8,8 @@
 
 #include "config/board_section.h"
 #include "config/checks.h"
-#include "config/keys.h"
 #include "config/serial_pulse_section.h"
+#include "config/words.h"
 
 namespace bushd::config {
 namespace {

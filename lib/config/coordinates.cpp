@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "config/keys.h"
 #include "config/setting.h"
+#include "config/words.h"
 
 namespace bushd::config {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "config/keys.h"
+#include "config/words.h"
 
 namespace bushd::config {
 namespace {

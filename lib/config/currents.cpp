@@ -1,6 +1,6 @@
 #include "config/currents.h"
 
-#include "config/keys.h"
+#include "config/words.h"
 
 namespace bushd::config {
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <string>
 
-#include "config/keys.h"
 #include "config/words.h"
 
 namespace bushd::config {

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "config/keys.h"
 #include "config/setting.h"
+#include "config/words.h"
 
 namespace bushd::config {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "config/keys.h"
+#include "config/words.h"
 
 namespace bushd::config {
 

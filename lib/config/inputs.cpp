@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "config/keys.h"
 #include "config/motor_inputs.h"
 #include "config/words.h"
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "config/keys.h"
 #include "config/port_check.h"
 #include "config/words.h"
 

@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "config/keys.h"
 #include "config/words.h"
 
 namespace bushd::config {

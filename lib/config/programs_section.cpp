@@ -1,6 +1,6 @@
 #include "config/programs_section.h"
 
-#include "config/keys.h"
+#include "config/words.h"
 
 namespace bushd::config {
 

@@ -10,7 +10,6 @@
 
 #include "base/csv/number_csv.h"
 #include "config/coordinates.h"
-#include "config/keys.h"
 #include "config/words.h"
 #include "tables/toml_file.h"
 

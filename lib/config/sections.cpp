@@ -19,7 +19,6 @@
 #include "config/idle_section.h"
 #include "config/inputs.h"
 #include "config/keypad_section.h"
-#include "config/keys.h"
 #include "config/output_levels.h"
 #include "config/port_check.h"
 #include "config/programs_section.h"
@@ -119,8 +118,7 @@ Result<void> read_control(const TomlReader& reader, Config* config) {
       .only({"path", "group"})
       .text("path", &config->control.path,
             "an absolute path of up to 107 characters, or \"\" for no socket", is_path)
-      .text("group", &config->control.group, "the name of a group of users",
-            [](const std::string&) { return true; })
+      .text("group", &config->control.group, "the name of a group of users")
       .result();
 }
 

@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "config/inputs.h"
-#include "config/keys.h"
 #include "config/words.h"
 
 namespace bushd::config {

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "config/keys.h"
+#include "config/words.h"
 #include "engine/velocity.h"
 
 namespace bushd::config {

@@ -1,14 +1,11 @@
-// Keys whose value is a name, or one of a few words.
+// Names, and how keys are read.
 #pragma once
 
 #include <cstddef>
-#include <initializer_list>
-#include <span>
 #include <string>
 #include <string_view>
 
-#include "base/result.h"
-#include "tables/toml_reader.h"
+#include "tables/toml_keys.h"
 
 namespace bushd::config {
 
@@ -21,16 +18,8 @@ bool is_name(std::string_view text, std::size_t longest);
 // "Theta" and "theta" are two motors to a program, and one to people.
 std::string lower_case(std::string text);
 
-// "is X; allowed: A" for a value of the right type.
-tl::unexpected<Error> refuse(const tables::TomlReader& reader, std::string_view key,
-                             std::string_view value, std::string_view allowed);
-
-// Which of the words stands there, counted from 0.
-Result<int> read_word(const tables::TomlReader& reader, std::string_view key,
-                      std::span<const std::string_view> words);
-inline Result<int> read_word(const tables::TomlReader& reader, std::string_view key,
-                             std::initializer_list<std::string_view> words) {
-  return read_word(reader, key, std::span(words.begin(), words.end()));
-}
+using tables::Keys;
+using tables::read_word;
+using tables::refuse;
 
 }  // namespace bushd::config

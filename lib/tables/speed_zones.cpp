@@ -9,7 +9,7 @@
 #include "tables/table_text.h"
 #include "tables/text_file.h"
 #include "tables/toml_file.h"
-#include "tables/toml_reader.h"
+#include "tables/toml_keys.h"
 
 namespace bushd::tables {
 namespace {
@@ -109,39 +109,23 @@ Result<SpeedZones> parse_zones(std::string_view text, const std::string& file) {
   const auto table = parse_toml(text, file);
   if (!table) return fail(table.error());
   const TomlReader toml(*table, file);
-  if (auto only = toml.only({"description", "table", "by", "steps_per_unit", "zones", "end"});
-      !only) {
-    return fail(only.error());
-  }
   SpeedZones read;
-  if (toml.has("description")) {
-    auto description = toml.string("description", "text");
-    if (!description) return fail(description.error());
-    read.description = std::move(*description);
-  }
+  Keys keys(toml);
+  keys.only({"description", "table", "by", "steps_per_unit", "zones", "end"})
+      .text("description", &read.description, "text");
+  if (!keys.result()) return fail(keys.result().error());
   auto name = toml.string("table", "the name of a table");
   if (!name) return fail(name.error());
   if (name->empty()) return fail(toml.error("table", "is empty; allowed: the name of a table"));
   read.table = std::move(*name);
-  if (toml.has("by")) {
-    const auto by = toml.string("by", "\"distance\" or \"position\"");
-    if (!by) return fail(by.error());
-    if (*by != "distance" && *by != "position") {
-      return fail(
-          toml.error("by", fmt::format("is \"{}\"; allowed: \"distance\" or \"position\"", *by)));
-    }
-    read.by = *by == "position" ? SpeedZones::By::kPosition : SpeedZones::By::kDistance;
-  }
-  if (toml.has("steps_per_unit")) {
-    const auto scale = toml.number("steps_per_unit", "a number above 0");
-    if (!scale) return fail(scale.error());
-    if (*scale <= 0) {
-      return fail(
-          toml.error("steps_per_unit",
-                     fmt::format("is {}; allowed: a number above 0, that of the motor", *scale)));
-    }
-    read.steps_per_unit = *scale;
-  }
+  static_assert(static_cast<int>(SpeedZones::By::kPosition) == 1);
+  const auto above_0 = [](double scale) -> Result<void> {
+    if (scale > 0) return {};
+    return fail(fmt::format("is {}; allowed: a number above 0, that of the motor", scale));
+  };
+  keys.word("by", &read.by, {"distance", "position"})
+      .number("steps_per_unit", &read.steps_per_unit, "a number above 0", above_0);
+  if (!keys.result()) return fail(keys.result().error());
   const auto end = toml.number("end", "where the motion ends, a number");
   if (!end) return fail(end.error());
   read.end = *end;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "tables/toml_file.h"
-#include "tables/toml_reader.h"
+#include "tables/toml_keys.h"
 
 namespace bushd::tables {
 namespace {
@@ -35,9 +35,9 @@ Result<TableContent> read_content(const TomlReader& reader) {
   auto name = reader.string("name", fmt::format("a string of 1..{} bytes", kMaxNameLength));
   if (!name) return fail(name.error());
   content.name = std::move(*name);
-  const auto unit = reader.integer("time_unit_ns", 1, kMaxTimeUnitNs, "(nanoseconds)");
-  if (!unit) return fail(unit.error());
-  content.time_unit_ns = static_cast<std::uint32_t>(*unit);
+  const Keys unit = Keys(reader).needed_whole("time_unit_ns", &content.time_unit_ns, 1,
+                                              kMaxTimeUnitNs, "(nanoseconds)");
+  if (!unit.result()) return fail(unit.result().error());
   auto accel = read_codes(reader, "accel");
   if (!accel) return fail(accel.error());
   content.accel = std::move(*accel);
@@ -46,21 +46,11 @@ Result<TableContent> read_content(const TomlReader& reader) {
     if (!decel) return fail(decel.error());
     content.decel = std::move(*decel);
   }
-  if (reader.has("cruise")) {
-    const auto cruise = reader.integer("cruise", kCode.least, kCode.most, kUnits);
-    if (!cruise) return fail(cruise.error());
-    content.cruise = static_cast<std::uint16_t>(*cruise);
-  }
-  if (reader.has("revision")) {
-    const auto revision = reader.integer("revision", 1, kMaxRevision);
-    if (!revision) return fail(revision.error());
-    content.revision = static_cast<std::uint32_t>(*revision);
-  }
-  if (reader.has("description")) {
-    auto description = reader.string("description", "a string");
-    if (!description) return fail(description.error());
-    content.description = std::move(*description);
-  }
+  const Keys keys = Keys(reader)
+                        .whole("cruise", &content.cruise, kCode.least, kCode.most, kUnits)
+                        .whole("revision", &content.revision, 1, kMaxRevision)
+                        .text("description", &content.description, "a string");
+  if (!keys.result()) return fail(keys.result().error());
   return content;
 }
 

@@ -13,16 +13,26 @@
 #include <vector>
 
 #include "base/result.h"
-#include "config/words.h"
 #include "tables/toml_reader.h"
 
-namespace bushd::config {
+namespace bushd::tables {
+
+// "is X; allowed: A" for a value of the right type.
+tl::unexpected<Error> refuse(const TomlReader& reader, std::string_view key, std::string_view value,
+                             std::string_view allowed);
+
+// Which of the words stands there, counted from 0.
+Result<int> read_word(const TomlReader& reader, std::string_view key,
+                      std::span<const std::string_view> words);
+inline Result<int> read_word(const TomlReader& reader, std::string_view key,
+                             std::initializer_list<std::string_view> words) {
+  return read_word(reader, key, std::span(words.begin(), words.end()));
+}
 
 // One key after the other: once one is refused, no more are read. What a key that is not there
 // would set stays as it is.
 class Keys {
  public:
-  using TomlReader = tables::TomlReader;
   explicit Keys(const TomlReader& reader) : reader_(reader) {}
 
   Keys& only(std::initializer_list<std::string_view> keys) {
@@ -93,6 +103,11 @@ class Keys {
     });
   }
 
+  template <class Value>
+  Keys& text(std::string_view key, Value* value, std::string_view allowed) {
+    return text(key, value, allowed, [](const std::string&) { return true; });
+  }
+
   const Result<void>& result() const { return result_; }
 
  private:
@@ -122,8 +137,7 @@ class Keys {
 };
 
 // The elements of `[[place]]`, which is `key` of `parent`.
-Result<std::vector<tables::TomlReader>> read_elements(const tables::TomlReader& parent,
-                                                      const std::string& file, std::string_view key,
-                                                      const std::string& place);
+Result<std::vector<TomlReader>> read_elements(const TomlReader& parent, const std::string& file,
+                                              std::string_view key, const std::string& place);
 
-}  // namespace bushd::config
+}  // namespace bushd::tables
