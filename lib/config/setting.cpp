@@ -4,13 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <span>
-#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "base/parse_number.h"
 #include "config/config.h"
 #include "engine/velocity.h"
 
@@ -31,12 +29,7 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::optional<double> number_of(std::string_view text) {
-  text = trimmed(text);
-  double value = 0;
-  const char* const end = text.data() + text.size();
-  const auto read = std::from_chars(text.data(), end, value);
-  if (read.ec != std::errc() || read.ptr != end || !std::isfinite(value)) return std::nullopt;
-  return value;
+  return parse_number<double>(trimmed(text));
 }
 
 tl::unexpected<Error> refuse(SettingKey key, std::string_view text, std::string_view why = {});
@@ -123,13 +116,8 @@ std::optional<std::vector<std::string_view>> values_of(std::string_view text,
 
 std::optional<std::int32_t> whole_number_of(std::string_view text, std::int64_t lowest,
                                             std::int64_t highest) {
-  std::int32_t value = 0;
-  const char* const end = text.data() + text.size();
-  const auto read = std::from_chars(text.data(), end, value);
-  if (read.ec != std::errc() || read.ptr != end || value < lowest || value > highest) {
-    return std::nullopt;
-  }
-  return value;
+  const auto value = parse_number<std::int32_t>(text);
+  return value && *value >= lowest && *value <= highest ? value : std::nullopt;
 }
 
 Result<Settings> with_velocity(Settings settings, std::string_view text) {

@@ -4,11 +4,11 @@
 #include <glib.h>
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <memory>
 #include <utility>
 
+#include "base/parse_number.h"
 #include "base/printable.h"
 #include "base/shortened.h"
 
@@ -55,11 +55,8 @@ bool is_hash(std::string_view text) {
 }
 
 std::optional<std::int64_t> unix_s(std::string_view text) {
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool all = error == std::errc() && end == text.data() + text.size();
-  if (!all || value < 0 || value > kMaxUnixS) return std::nullopt;
-  return value;
+  const auto value = parse_number<std::int64_t>(text);
+  return value && *value >= 0 && *value <= kMaxUnixS ? value : std::nullopt;
 }
 
 std::string quoted(std::string_view text) {

@@ -2,15 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "base/json_text.h"
+#include "base/parse_number.h"
 #include "base/printable.h"
 #include "commands.h"
 #include "tables/table_text.h"
@@ -51,11 +50,9 @@ struct CamacOptions {
 
 Result<std::uint32_t> number_of(const std::string& word, std::uint32_t most) {
   const bool hex = word.starts_with("0x");
-  const char* first = word.data() + (hex ? 2 : 0);
-  const char* last = word.data() + word.size();
-  std::uint32_t value = 0;
-  const auto [end, error] = std::from_chars(first, last, value, hex ? 16 : 10);
-  if (error == std::errc() && end == last && value <= most) return value;
+  const auto digits = std::string_view(word).substr(hex ? 2 : 0);
+  const auto value = bushd::parse_number<std::uint32_t>(digits, hex ? 16 : 10);
+  if (value && *value <= most) return *value;
   return fail(fmt::format("{} is no number 0..{}", bushd::printable(word), most));
 }
 

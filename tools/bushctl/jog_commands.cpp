@@ -2,11 +2,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <charconv>
-#include <cmath>
 #include <memory>
 #include <optional>
 
+#include "base/parse_number.h"
 #include "base/printable.h"
 #include "commands.h"
 #include "jog_panel.h"
@@ -28,12 +27,7 @@ struct JogOptions {
 };
 
 std::optional<double> number(const std::string& word) {
-  double value = 0;
-  const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
-  const char* end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc{} || stop != end || !std::isfinite(value)) return std::nullopt;
-  return value;
+  return bushd::parse_number<double>(std::string_view(word).substr(word.starts_with('+') ? 1 : 0));
 }
 
 api::Jog jog_at(const JogOptions& options, double speed) {

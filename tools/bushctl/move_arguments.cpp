@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <utility>
 
+#include "base/parse_number.h"
 #include "base/shortened.h"
 
 namespace bushctl {
@@ -20,32 +19,13 @@ using bushd::Result;
 constexpr const char* kMoveUsage =
     "write NAME DISTANCE [NAME DISTANCE...] or NAME --to POSITION [NAME --to POSITION...]";
 
-std::optional<std::int64_t> whole_number(const std::string& word) {
-  std::int64_t value = 0;
-  // from_chars knows no leading plus.
-  const char* begin = word.data() + (word.size() > 1 && word[0] == '+' && word[1] != '-' ? 1 : 0);
-  const char* end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc{} || stop != end) return std::nullopt;
-  return value;
-}
-
-std::optional<double> number(const std::string& word) {
-  double value = 0;
-  const char* begin = word.data() + (word.size() > 1 && word[0] == '+' && word[1] != '-' ? 1 : 0);
-  const char* end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc{} || stop != end || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 Result<api::Amount> amount_of(const std::string& motor, const std::string& word, Numbers numbers) {
   if (numbers == Numbers::kSteps) {
-    if (const auto steps = whole_number(word)) return *steps;
+    if (const auto steps = bushd::parse_signed<std::int64_t>(word)) return *steps;
     return fail(fmt::format("{}: \"{}\" is not a whole number of steps", bushd::shortened(motor),
                             bushd::shortened(word)));
   }
-  if (const auto user = number(word)) return api::UserUnits{*user};
+  if (const auto user = bushd::parse_signed<double>(word)) return api::UserUnits{*user};
   return fail(
       fmt::format("{}: \"{}\" is not a number", bushd::shortened(motor), bushd::shortened(word)));
 }
@@ -54,7 +34,7 @@ Result<api::Amount> amount_of(const std::string& motor, const std::string& word,
 
 Result<std::optional<api::Speed>> parse_speed(const std::string& word, Numbers numbers) {
   if (word.empty()) return std::optional<api::Speed>();
-  const auto per_s = number(word);
+  const auto per_s = bushd::parse_signed<double>(word);
   if (!per_s || !(*per_s > 0)) {
     return fail(fmt::format("--speed: \"{}\" is not a number above 0", bushd::shortened(word)));
   }
@@ -107,7 +87,7 @@ Result<api::MoveLine> parse_move_line(const std::vector<std::string>& words, Num
   if (!feed) return fail(feed.error());
   line.feed = *feed;
   if (options.duration.empty()) return line;
-  line.duration_s = number(options.duration);
+  line.duration_s = bushd::parse_signed<double>(options.duration);
   if (line.duration_s && *line.duration_s > 0) return line;
   return fail(
       fmt::format("--duration: \"{}\" is not a number of seconds above 0", options.duration));
@@ -115,7 +95,7 @@ Result<api::MoveLine> parse_move_line(const std::vector<std::string>& words, Num
 
 Result<std::optional<api::Speed>> parse_feed(const std::string& word, Numbers numbers) {
   if (word.empty()) return std::optional<api::Speed>{};
-  const auto per_s = number(word);
+  const auto per_s = bushd::parse_signed<double>(word);
   if (per_s && *per_s > 0) {
     return std::optional(api::Speed{.per_s = *per_s, .in_steps = numbers == Numbers::kSteps});
   }

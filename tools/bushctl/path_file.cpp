@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <optional>
 #include <utility>
 
 #include "base/csv/number_csv.h"
+#include "base/parse_number.h"
 #include "base/shortened.h"
 
 namespace bushctl {
@@ -39,15 +39,6 @@ std::vector<api::MovePath> in_parts(const api::MovePath& whole) {
   return parts;
 }
 
-std::optional<double> number(std::string_view word) {
-  double value = 0;
-  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc{} || stop != word.data() + word.size() || !std::isfinite(value)) {
-    return std::nullopt;
-  }
-  return value;
-}
-
 struct SpeedAt {
   double position;
   double speed;
@@ -56,8 +47,8 @@ struct SpeedAt {
 Result<SpeedAt> speed_at(const std::string& word) {
   const std::size_t colon = word.find(':');
   if (colon != std::string::npos) {
-    const auto position = number(std::string_view(word).substr(0, colon));
-    const auto speed = number(std::string_view(word).substr(colon + 1));
+    const auto position = bushd::parse_number<double>(std::string_view(word).substr(0, colon));
+    const auto speed = bushd::parse_number<double>(std::string_view(word).substr(colon + 1));
     if (position && speed && *speed > 0) return SpeedAt{*position, *speed};
   }
   return fail(

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "base/parse_number.h"
 #include "config/config.h"
 
 namespace bushsim {
@@ -79,12 +80,11 @@ Result<Images> parse_images(const std::vector<std::string>& choices, const Setup
       return fail(fmt::format("--mcu {}: {}", choice, what));
     };
     const std::size_t equals = choice.find('=');
-    const char* const address_end = choice.data() + std::min(equals, choice.size());
-    std::uint8_t address = 0;
-    const auto [end, error] = std::from_chars(choice.data(), address_end, address);
-    if (equals == std::string::npos || error != std::errc{} || end != address_end) {
+    const auto read = bushd::parse_number<std::uint8_t>(std::string_view(choice).substr(0, equals));
+    if (equals == std::string::npos || !read) {
       return fault("must be ADDRESS=virtual or ADDRESS=CHIP:IMAGE.elf");
     }
+    const std::uint8_t address = *read;
     if (std::ranges::find(setup.addresses, address) == setup.addresses.end()) {
       return fault(fmt::format("bus \"{}\" has no MCU of this address", setup.bus));
     }

@@ -1,10 +1,8 @@
-#include <charconv>
-#include <cmath>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 
+#include "base/parse_number.h"
 #include "options.h"
 
 namespace bushtab {
@@ -12,19 +10,11 @@ namespace {
 
 using bushd::tables::SpeedZones;
 
-std::optional<double> number_of(std::string_view text) {
-  double value = 0;
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc{} || stop != end || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 std::optional<SpeedZones::Zone> zone_of(const std::string& text) {
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) return std::nullopt;
-  const auto from = number_of(std::string_view(text).substr(0, colon));
-  const auto speed = number_of(std::string_view(text).substr(colon + 1));
+  const auto from = bushd::parse_number<double>(std::string_view(text).substr(0, colon));
+  const auto speed = bushd::parse_number<double>(std::string_view(text).substr(colon + 1));
   if (!from || !speed || *speed <= 0) return std::nullopt;
   return SpeedZones::Zone{*from, *speed};
 }
@@ -35,7 +25,7 @@ std::string refuse_no_zone(const std::string& value) {
 }
 
 std::string refuse_no_number(const std::string& value) {
-  return number_of(value) ? std::string() : "\"" + value + "\" is not a number";
+  return bushd::parse_number<double>(value) ? std::string() : "\"" + value + "\" is not a number";
 }
 
 }  // namespace

@@ -1,10 +1,10 @@
 #include <charconv>
-#include <cmath>
 #include <limits>
 #include <string>
 #include <system_error>
 #include <vector>
 
+#include "base/parse_number.h"
 #include "options.h"
 
 namespace bushtab {
@@ -144,12 +144,8 @@ std::function<std::string(const std::string&)> whole_number(std::int64_t least,
 }
 
 std::string refuse_not_positive(const std::string& value) {
-  double number = 0;
-  const char* end = value.data() + value.size();
-  const auto parsed = std::from_chars(value.data(), end, number);
-  const bool positive =
-      parsed.ec == std::errc{} && parsed.ptr == end && std::isfinite(number) && number > 0;
-  return positive ? std::string() : value + " is not a number above 0";
+  const auto number = bushd::parse_number<double>(value);
+  return number && *number > 0 ? std::string() : value + " is not a number above 0";
 }
 
 void add_table_options(CLI::App* command, TableOptions& options, const std::string& json_help) {

@@ -6,15 +6,13 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "base/parse_number.h"
 #include "base/printable.h"
 #include "commands.h"
 #include "diagnostic_text.h"
@@ -136,13 +134,11 @@ Result<void> not_negative(double value) {
 
 Questions::Take number(double& value, double least) {
   return [&value, least](const std::string& answer) -> Result<void> {
-    double given = 0;
-    const auto [end, error] = std::from_chars(answer.data(), answer.data() + answer.size(), given);
-    if (error != std::errc{} || end != answer.data() + answer.size() || !std::isfinite(given) ||
-        given < least) {
+    const auto given = bushd::parse_number<double>(answer);
+    if (!given || *given < least) {
       return bushd::fail(fmt::format("allowed: a number, {} or more", least));
     }
-    value = given;
+    value = *given;
     return {};
   };
 }

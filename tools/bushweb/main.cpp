@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -18,6 +17,7 @@
 
 #include "base/completion.h"
 #include "base/parse_error.h"
+#include "base/parse_number.h"
 #include "base/printable.h"
 #include "base/standard_output.h"
 #include "control/path.h"
@@ -59,9 +59,8 @@ Result<ServerOptions> server_options(const Wanted& wanted) {
                         .certificate = wanted.certificate,
                         .key = wanted.key};
   const std::string port = colon == std::string::npos ? "" : wanted.listen.substr(colon + 1);
-  const auto read = std::from_chars(port.data(), port.data() + port.size(), options.port);
-  const bool good = read.ec == std::errc{} && read.ptr == port.data() + port.size() &&
-                    options.port > 0 && options.port < 65536 && is_address(options.address);
+  options.port = bushd::parse_number<int>(port).value_or(0);
+  const bool good = options.port > 0 && options.port < 65536 && is_address(options.address);
   if (!good) return fail("--listen: ADDRESS:PORT is expected, such as 127.0.0.1:8260");
   std::erase_if(options.address, [](char c) { return c == '[' || c == ']'; });
   if (wanted.certificate.empty() != wanted.key.empty()) {

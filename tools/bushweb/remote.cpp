@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
 #include "base/fields_from_json.h"
+#include "base/parse_number.h"
 #include "shallow_json.h"
 
 namespace bushweb {
@@ -69,9 +69,8 @@ void take_motors(api::StateSnapshot& mcu, const json& told) {
 }
 
 bool is_port(std::string_view text, int& port) {
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), port);
-  return read.ec == std::errc{} && read.ptr == text.data() + text.size() && port > 0 &&
-         port < 65536;
+  port = bushd::parse_number<int>(text).value_or(0);
+  return port > 0 && port < 65536;
 }
 
 }  // namespace

@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <optional>
 #include <unordered_set>
 #include <utility>
 
 #include "base/byte_order_mark.h"
+#include "base/parse_number.h"
 #include "base/printable.h"
 #include "base/shortened.h"
 
@@ -38,16 +37,6 @@ std::vector<Field> fields_of(std::string_view line) {
     if (comma == line.size()) return fields;
     at = comma + 1;
   }
-}
-
-std::optional<double> number_of(std::string_view text) {
-  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-  double number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(number)) {
-    return std::nullopt;
-  }
-  return number;
 }
 
 class Reader {
@@ -94,7 +83,7 @@ class Reader {
                                        fields.size(), table_.columns.size())));
     }
     for (std::size_t i = 0; i < fields.size(); ++i) {
-      const auto number = number_of(fields[i].text);
+      const auto number = parse_signed<double>(fields[i].text);
       if (!number) {
         return fail(error(fields[i].column,
                           fmt::format("\"{}\", as {}; allowed: a decimal number such as -12.5",

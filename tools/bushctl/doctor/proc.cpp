@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdio>
 #include <sstream>
 
+#include "base/parse_number.h"
+
 namespace bushctl::doctor {
 namespace {
+
+using bushd::parse_number;
 
 constexpr std::string_view kScheme = "udpm://";
 constexpr const char* kAddress = "239.255.76.67";
@@ -30,14 +33,6 @@ std::vector<std::vector<std::string>> rows(std::string_view text) {
   return out;
 }
 
-template <class Number>
-std::optional<Number> number(std::string_view text, int base) {
-  Number value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 }  // namespace
 
 std::optional<std::string> route_to(std::string_view text, const std::string& address) {
@@ -52,10 +47,10 @@ std::optional<std::string> route_to(std::string_view text, const std::string& ad
   // Iface Destination Gateway Flags RefCnt Use Metric Mask ...
   for (const auto& row : rows(text)) {
     if (row.size() < 8) continue;
-    const auto destination = number<std::uint32_t>(row[1], 16);
-    const auto flags = number<std::uint32_t>(row[3], 16);
-    const auto metric = number<std::uint32_t>(row[6], 10);
-    const auto mask = number<std::uint32_t>(row[7], 16);
+    const auto destination = parse_number<std::uint32_t>(row[1], 16);
+    const auto flags = parse_number<std::uint32_t>(row[3], 16);
+    const auto metric = parse_number<std::uint32_t>(row[6], 10);
+    const auto mask = parse_number<std::uint32_t>(row[7], 16);
     if (!destination || !flags || !metric || !mask) continue;
     if ((*flags & kUp) == 0 || (*flags & kReject) != 0) continue;
     if ((wanted.s_addr & *mask) != *destination) continue;
@@ -85,7 +80,7 @@ std::uint64_t datagrams_without_room(std::string_view text) {
     }
     const auto place = std::ranges::find(names, "RcvbufErrors") - names.begin();
     if (static_cast<std::size_t>(place) >= row.size()) return 0;
-    return number<std::uint64_t>(row[static_cast<std::size_t>(place)], 10).value_or(0);
+    return parse_number<std::uint64_t>(row[static_cast<std::size_t>(place)], 10).value_or(0);
   }
   return 0;
 }
@@ -99,9 +94,10 @@ std::vector<UdpSocket> udp_sockets(std::string_view text, std::uint32_t port) {
     const auto colon = row[1].find(':');
     const auto queues = row[4].find(':');
     if (colon == std::string::npos || queues == std::string::npos) continue;
-    const auto local = number<std::uint32_t>(std::string_view(row[1]).substr(colon + 1), 16);
-    const auto queued = number<std::uint64_t>(std::string_view(row[4]).substr(queues + 1), 16);
-    const auto drops = number<std::uint64_t>(row[12], 10);
+    const auto local = parse_number<std::uint32_t>(std::string_view(row[1]).substr(colon + 1), 16);
+    const auto queued =
+        parse_number<std::uint64_t>(std::string_view(row[4]).substr(queues + 1), 16);
+    const auto drops = parse_number<std::uint64_t>(row[12], 10);
     if (!local || !queued || !drops || *local != port) continue;
     out.push_back({.port = port, .queued_bytes = *queued, .drops = *drops});
   }
@@ -121,7 +117,7 @@ std::vector<std::int64_t> lock_holders(std::string_view text, std::uint32_t devi
     std::string number_of, kind, advisory, access, pid, file;
     words >> number_of >> kind >> advisory >> access >> pid >> file;
     if (kind == "->" || file != place.data()) continue;
-    if (const auto holder = number<std::int64_t>(pid, 10); holder && *holder > 0) {
+    if (const auto holder = parse_number<std::int64_t>(pid, 10); holder && *holder > 0) {
       out.push_back(*holder);
     }
   }
@@ -135,13 +131,13 @@ LcmSeen lcm_of(const std::string& url) {
   const std::string place = rest.substr(0, rest.find('?'));
   const auto colon = place.find(':');
   lcm.address = place.empty() ? kAddress : place.substr(0, colon);
-  const auto port = colon == std::string::npos
-                        ? std::nullopt
-                        : number<std::uint32_t>(std::string_view(place).substr(colon + 1), 10);
+  const auto port = colon == std::string::npos ? std::nullopt
+                                               : parse_number<std::uint32_t>(
+                                                     std::string_view(place).substr(colon + 1), 10);
   lcm.port = port.value_or(kPort);
   if (const auto ttl = rest.find("ttl="); ttl != std::string::npos) {
     const std::string digits = rest.substr(ttl + 4, rest.find('&', ttl) - (ttl + 4));
-    lcm.ttl = number<int>(digits, 10).value_or(0);
+    lcm.ttl = parse_number<int>(digits, 10).value_or(0);
   }
   return lcm;
 }
