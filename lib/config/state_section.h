@@ -6,7 +6,7 @@
 
 namespace bushd::config {
 
-// Of [state].
+// `reader`: of [state].
 Result<void> read_state(const tables::TomlReader& reader, Config* config);
 // `restored` of a motor.
 Result<void> read_restored(const tables::TomlReader& reader, Motor* motor);
