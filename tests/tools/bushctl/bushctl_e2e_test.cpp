@@ -27,8 +27,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   const Ran ran = bushctl({"status", "--json"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   const auto status = nlohmann::json::parse(ran.out);
@@ -56,8 +55,7 @@ TEST(Bushctl, StatusAsJsonHasTheAgreedKeys) {
 }
 
 TEST(Bushctl, StatusIsATableOfMotorsAndMcus) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   const Ran ran = bushctl({"status"});
   EXPECT_EQ(ran.code, 0);
   EXPECT_THAT(ran.out, HasSubstr("theta  hall:1       0  goniometer"));
@@ -86,8 +84,7 @@ TEST(Bushctl, WithATtlOf0NothingLeavesThisPcWhereverTheRouteLeads) {
             "leak1 up && ip addr add 10.9.0.1/24 dev leak0") != 0) {
     GTEST_SKIP() << "no veth here";
   }
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   ASSERT_EQ(bushctl({"status"}).code, 0);
   ASSERT_EQ(shell("ip route del 239.255.76.67/32; ip route add 239.255.76.67/32 dev leak0"), 0);
   const auto sent = [&] {
@@ -110,8 +107,7 @@ TEST(Bushctl, WithATtlOf0NothingLeavesThisPcWhereverTheRouteLeads) {
 }
 
 TEST(Bushctl, WatchTellsOfLosses) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   Program watch(with_program({"watch", "--count", "20"}));
   ASSERT_TRUE(watch.wait_for("theta"));
   daemon.lose(3);
@@ -148,8 +144,7 @@ class RawSender {
 };
 
 TEST(Bushctl, SurvivesDatagramsThatCrashLcm) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kReached));
+  FakeDaemon daemon(always(Outcome::kReached));
   Program watch(with_program({"watch", "--count", "10"}));
   ASSERT_TRUE(watch.wait_for("theta"));
   const RawSender sender;
@@ -208,8 +203,7 @@ TEST(Bushctl, WithoutDaemonSaysSoAndFails) {
 // LCM is not asked, which would take seconds: a fake daemon that hears nothing shows it.
 TEST(Bushctl, WithoutASocketEveryCommandSaysThatBushdIsNotRunning) {
   unsetenv("LCM_DEFAULT_URL");
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   const std::string path = testing::TempDir() + "bushctl_e2e_test.csv";
   std::ofstream(path) << "theta\n0\n1\n";
   const std::string rows = testing::TempDir() + "bushctl_e2e_test_rows.csv";
@@ -274,8 +268,7 @@ TEST(Bushctl, LcmWithoutARouteIsOneSentence) {
 }
 
 TEST(Bushctl, ASocketThatIsNamedIsMeant) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   const Ran ran = bushctl({"status", "--socket", "/nonexistent/control"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("no control socket at /nonexistent/control"));
@@ -283,16 +276,14 @@ TEST(Bushctl, ASocketThatIsNamedIsMeant) {
 }
 
 TEST(Bushctl, ListensOnTheGivenPrefixOnly) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   EXPECT_EQ(bushctl({"--prefix", "LAB", "status", "--timeout-s", "0.2"}).code, 1);
   EXPECT_EQ(bushctl({"status", "--prefix", "BUSHD"}).code, 0);
 }
 
 TEST(Bushctl, TakesTheUrlFromTheEnvironmentUnlessGiven) {
   setenv("LCM_DEFAULT_URL", "nonsense", 1);
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   EXPECT_THAT(bushctl({"status"}).err, HasSubstr("nonsense"));
   EXPECT_EQ(bushctl({"status", "--url", "udpm://239.255.76.67:7667?ttl=0"}).code, 0);
   use_lcm();
@@ -336,8 +327,7 @@ TEST(Bushctl, SaysItsVersion) {
 }
 
 TEST(Bushctl, TwoDashesBeforeANegativeNumberChangeNothing) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kReached));
+  FakeDaemon daemon(always(Outcome::kReached));
   EXPECT_EQ(bushctl({"move", "theta", "--", "-400", "--wait"}).code, 0);
   const auto requests = daemon.requests();
   ASSERT_EQ(requests.size(), 1u);
@@ -345,8 +335,7 @@ TEST(Bushctl, TwoDashesBeforeANegativeNumberChangeNothing) {
 }
 
 TEST(Bushctl, WatchInAPipePrintsALineForWhatChanged) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   const Ran ran = bushctl({"watch", "--count", "3"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
@@ -359,8 +348,7 @@ TEST(Bushctl, WatchInAPipePrintsALineForWhatChanged) {
 }
 
 TEST(Bushctl, WatchEndsOnInterrupt) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   Program watch(with_program({"watch"}));
   ASSERT_TRUE(watch.wait_for("theta"));
   watch.send_signal(SIGINT);
@@ -368,8 +356,7 @@ TEST(Bushctl, WatchEndsOnInterrupt) {
 }
 
 TEST(Bushctl, WatchLeavesTheTerminalAsItWas) {
-  FakeDaemon daemon;
-  daemon.start();
+  FakeDaemon daemon(silent());
   Program watch(with_program({"watch"}), true);
   ASSERT_TRUE(watch.wait_for("q ends"));
   watch.send_signal(SIGTERM);
@@ -379,8 +366,7 @@ TEST(Bushctl, WatchLeavesTheTerminalAsItWas) {
 }
 
 TEST(Examples, MoveAndWaitInCpp) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kReached));
+  FakeDaemon daemon(always(Outcome::kReached));
   Program example({EXAMPLE_MOVE_AND_WAIT, "theta", "-400", "chi", "5"});
   EXPECT_EQ(example.finish(), 0) << example.err();
   EXPECT_THAT(example.out(), HasSubstr("chi: reached, stands at 7"));
@@ -388,8 +374,7 @@ TEST(Examples, MoveAndWaitInCpp) {
 }
 
 TEST(Examples, MoveAndWaitInPython) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kReached));
+  FakeDaemon daemon(always(Outcome::kReached));
   const std::string script = bushd::test::source_path("tools/examples/python/move_and_wait.py");
   Program example({"/usr/bin/env", "PYTHONPATH=" EXAMPLE_PYTHON_PATH, "python3", "-B", script,
                    "theta", "-400", "chi", "5"});

@@ -60,8 +60,7 @@ std::string written(const std::string& name, const std::string& text) {
 constexpr const char* kText = "motors = [\"theta\", \"chi\"]\n[[frame]]\nline_to = \"way.csv\"\n";
 
 TEST(BushctlProgram, PutSendsTheTextsAndPrintsWhatItWillDo) {
-  FakeDaemon daemon;
-  daemon.start(programs());
+  FakeDaemon daemon(programs());
   written("way.csv", "theta,chi\n400,-5\n");
   const Ran ran = bushctl({"program", "put", "scan", written("scan.toml", kText)});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -79,8 +78,7 @@ TEST(BushctlProgram, PutSendsTheTextsAndPrintsWhatItWillDo) {
 }
 
 TEST(BushctlProgram, ADryRunSaysSoAndJsonIsTheEntry) {
-  FakeDaemon daemon;
-  daemon.start(programs());
+  FakeDaemon daemon(programs());
   written("way.csv", "theta,chi\n400,-5\n");
   const Ran ran =
       bushctl({"program", "put", "scan", written("scan.toml", kText), "--dry-run", "--json"});
@@ -93,8 +91,7 @@ TEST(BushctlProgram, ADryRunSaysSoAndJsonIsTheEntry) {
 }
 
 TEST(BushctlProgram, AWrongTextIsNotSent) {
-  FakeDaemon daemon;
-  daemon.start(programs());
+  FakeDaemon daemon(programs());
   const Ran ran =
       bushctl({"program", "put", "scan", written("wrong.toml", "motors = [\"a\"]\nframes = 3\n")});
   EXPECT_EQ(ran.code, 2);
@@ -103,8 +100,7 @@ TEST(BushctlProgram, AWrongTextIsNotSent) {
 }
 
 TEST(BushctlProgram, ARefusalIsTold) {
-  FakeDaemon daemon;
-  daemon.start([](const api::Request&, int) { return Replies{api::Refused{"no MCU can"}}; });
+  FakeDaemon daemon([](const api::Request&, int) { return Replies{api::Refused{"no MCU can"}}; });
   written("way.csv", "theta,chi\n400,-5\n");
   const std::string file = written("scan.toml", kText);
   for (const std::vector<std::string>& words :
@@ -121,16 +117,14 @@ TEST(BushctlProgram, ARefusalIsTold) {
 }
 
 TEST(BushctlProgram, ListsThem) {
-  FakeDaemon daemon;
-  daemon.start(programs());
+  FakeDaemon daemon(programs());
   EXPECT_THAT(bushctl({"program", "list"}).out, HasSubstr("hall:1  scan     loaded"));
   const auto json = nlohmann::json::parse(bushctl({"program", "list", "--json"}).out);
   EXPECT_EQ(json["programs"][0]["checksum"], "0a1b2c3d");
 }
 
 TEST(BushctlProgram, RunsAndWaits) {
-  FakeDaemon daemon;
-  daemon.start(programs());
+  FakeDaemon daemon(programs());
   const Ran ran = bushctl({"program", "run", "scan", "other", "--wait"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
@@ -165,8 +159,7 @@ TEST(BushctlProgram, CtrlCStopsItsMotors) {
 }
 
 TEST(BushctlProgram, ErasesOne) {
-  FakeDaemon daemon;
-  daemon.start(programs());
+  FakeDaemon daemon(programs());
   EXPECT_EQ(bushctl({"program", "erase", "scan"}).out, "accepted\ndone: erased\n");
   EXPECT_EQ(only<api::EraseProgram>(daemon).program, "scan");
 }

@@ -18,8 +18,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kReached));
+  FakeDaemon daemon(always(Outcome::kReached));
   const Ran ran = bushctl({"move", "theta", "-400", "chi", "20", "--wait"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
@@ -32,8 +31,7 @@ TEST(Bushctl, MoveOfSeveralMotorsIsOneCommand) {
 }
 
 TEST(Bushctl, ArmedMovesNameTheirEdgeAndDelay) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kReached));
+  FakeDaemon daemon(always(Outcome::kReached));
   const Ran ran = bushctl(
       {"arm", "theta", "-400", "chi", "20", "--edge", "falling", "--delay-us", "75", "--wait"});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -46,8 +44,7 @@ TEST(Bushctl, ArmedMovesNameTheirEdgeAndDelay) {
 }
 
 TEST(Bushctl, MoveToPositionsAndMotorsCalledLikeCommands) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kReached));
+  FakeDaemon daemon(always(Outcome::kReached));
   EXPECT_EQ(bushctl({"move", "--wait", "stop", "--to", "-5", "phi", "--to=6"}).code, 0);
   const auto move = only<api::Move>(daemon);
   EXPECT_EQ(move.kind, api::Move::Kind::kAbsolute);
@@ -55,8 +52,7 @@ TEST(Bushctl, MoveToPositionsAndMotorsCalledLikeCommands) {
 }
 
 TEST(Bushctl, WithoutWaitingAcceptedIsEnough) {
-  FakeDaemon daemon;
-  daemon.start([](const api::Request&, int) { return Replies{api::Accepted{}}; });
+  FakeDaemon daemon([](const api::Request&, int) { return Replies{api::Accepted{}}; });
   const Ran ran = bushctl({"move", "theta", "5"});
   EXPECT_EQ(ran.code, 0);
   EXPECT_EQ(ran.out, "accepted\n");
@@ -65,8 +61,7 @@ TEST(Bushctl, WithoutWaitingAcceptedIsEnough) {
 TEST(Bushctl, EveryResultButReachedFails) {
   for (const Outcome outcome :
        {Outcome::kLimit, Outcome::kStopped, Outcome::kLink, Outcome::kFault}) {
-    FakeDaemon daemon;
-    daemon.start(always(outcome));
+    FakeDaemon daemon(always(outcome));
     const Ran ran = bushctl({"move", "theta", "5", "--wait"});
     EXPECT_EQ(ran.code, 1) << word(outcome);
     EXPECT_THAT(ran.err, HasSubstr(std::string(word(outcome)) + " for a reason"));
@@ -74,16 +69,15 @@ TEST(Bushctl, EveryResultButReachedFails) {
 }
 
 TEST(Bushctl, RefusedPrintsTheReason) {
-  FakeDaemon daemon;
-  daemon.start([](const api::Request&, int) { return Replies{api::Refused{"theta is moving"}}; });
+  FakeDaemon daemon(
+      [](const api::Request&, int) { return Replies{api::Refused{"theta is moving"}}; });
   const Ran ran = bushctl({"move", "theta", "5"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("theta is moving"));
 }
 
 TEST(Bushctl, RepeatsACommandThatGotLost) {
-  FakeDaemon daemon;
-  daemon.start([](const api::Request& command, int times) {
+  FakeDaemon daemon([](const api::Request& command, int times) {
     return times < 3 ? Replies{} : Replies{api::Accepted{}, result(command, Outcome::kReached)};
   });
   EXPECT_EQ(bushctl({"move", "theta", "5", "--wait"}).code, 0);
@@ -91,8 +85,7 @@ TEST(Bushctl, RepeatsACommandThatGotLost) {
 }
 
 TEST(Bushctl, AsksAgainForALostResult) {
-  FakeDaemon daemon;
-  daemon.start([](const api::Request& command, int times) {
+  FakeDaemon daemon([](const api::Request& command, int times) {
     return times < 2 ? Replies{api::Accepted{}}
                      : Replies{api::Accepted{}, result(command, Outcome::kReached)};
   });
@@ -100,8 +93,7 @@ TEST(Bushctl, AsksAgainForALostResult) {
 }
 
 TEST(Bushctl, DoesNotRepeatAMoveToARestartedDaemon) {
-  FakeDaemon daemon;
-  daemon.start([&daemon](const api::Request&, int) { return Replies{api::Accepted{}}; });
+  FakeDaemon daemon([](const api::Request&, int) { return Replies{api::Accepted{}}; });
   Program move(with_program({"move", "theta", "5", "--wait"}));
   ASSERT_TRUE(move.wait_for("accepted"));
   daemon.restart();
@@ -110,8 +102,7 @@ TEST(Bushctl, DoesNotRepeatAMoveToARestartedDaemon) {
 }
 
 TEST(Bushctl, AnEmergencyStopSucceedsIfItIsDoneEverywhere) {
-  FakeDaemon daemon;
-  daemon.start([](const api::Request&, int) {
+  FakeDaemon daemon([](const api::Request&, int) {
     return Replies{api::Accepted{},
                    api::Completed{.outcome = Outcome::kDone, .reason = "done", .detail = {}}};
   });
@@ -129,8 +120,7 @@ void expect_subcommand() {
   if constexpr (kOnlyNamesMotors<Request>) {
     const std::string name(Request::kName.substr(0, Request::kName.find(' ')));
     SCOPED_TRACE(name);
-    FakeDaemon daemon;
-    daemon.start(always(Outcome::kDone));
+    FakeDaemon daemon(always(Outcome::kDone));
     EXPECT_EQ(bushctl({name, "theta", "phi"}).code, 0);
     EXPECT_THAT(only<Request>(daemon).motors, ElementsAre("theta", "phi"));
   }
@@ -146,8 +136,7 @@ TEST(Bushctl, EachRequestThatOnlyNamesMotorsHasASubcommand) {
 }
 
 TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kDone));
+  FakeDaemon daemon(always(Outcome::kDone));
   EXPECT_EQ(bushctl({"stop"}).code, 0);
   EXPECT_EQ(bushctl({"stop", "theta", "--wait"}).code, 0);
   EXPECT_EQ(bushctl({"disable"}).code, 0);
@@ -168,8 +157,7 @@ TEST(Bushctl, OtherCommandsSayWhatTheyAre) {
 }
 
 TEST(Bushctl, SetFailsWhenTheMcuDidNotTakeIt) {
-  FakeDaemon daemon;
-  daemon.start(always(Outcome::kFault));
+  FakeDaemon daemon(always(Outcome::kFault));
   EXPECT_EQ(bushctl({"set", "theta", "0"}).code, 1);
 }
 
@@ -212,8 +200,7 @@ TEST(Bushctl, AfterASecondCtrlCNothingIsWaitedFor) {
 }
 
 TEST(Bushctl, AMoveWhoseProgramIsEndedGoesOn) {
-  FakeDaemon daemon;
-  daemon.start([](const api::Request&, int) { return Replies{api::Accepted{}}; });
+  FakeDaemon daemon([](const api::Request&, int) { return Replies{api::Accepted{}}; });
   Program move(with_program({"move", "theta", "5", "--wait"}));
   ASSERT_TRUE(move.wait_for("accepted"));
   move.send_signal(SIGTERM);

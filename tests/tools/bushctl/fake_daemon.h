@@ -26,7 +26,6 @@ class FakeDaemon {
  public:
   // Two MCUs with two motors each: theta, chi, phi, stop.
   FakeDaemon();
-  ~FakeDaemon();
   FakeDaemon(const FakeDaemon&) = delete;
   FakeDaemon& operator=(const FakeDaemon&) = delete;
 
@@ -34,6 +33,9 @@ class FakeDaemon {
   // before start().
   using Answer = std::function<std::vector<api::Reply>(const api::Request&, int times)>;
   void start(Answer answer = {});
+  // One that has been started.
+  explicit FakeDaemon(Answer answer) : FakeDaemon() { start(std::move(answer)); }
+  ~FakeDaemon();
 
   // Each once, however often it came.
   std::vector<api::Request> requests() const;

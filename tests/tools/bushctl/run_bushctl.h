@@ -39,6 +39,10 @@ inline void use_lcm() {
 
 using Replies = std::vector<api::Reply>;
 
+// To nothing that it is asked.
+inline FakeDaemon::Answer silent() {
+  return {};
+}
 inline FakeDaemon::Answer always(api::Outcome outcome) {
   return [outcome](const api::Request& request, int) {
     return Replies{api::Accepted{}, result(request, outcome)};
