@@ -30,19 +30,17 @@ Result<Config> load(const std::string& keys, const std::string& calibration = ""
 }
 
 std::string pseudo_error(const std::string& keys, const std::string& calibration = "") {
-  const auto config = load(keys, calibration);
-  return config ? "none" : config.error().text();
+  return test::error_of(load(keys, calibration));
 }
 
 const std::string kSlit =
     "name = [\"gap\", \"centre\"]\nunit = \"mm\"\nmotors = [\"left\", \"right\"]\n";
 
 TEST(ConfigPseudo, ASlit) {
-  const auto config =
-      load(kSlit + "kind = \"slit\"\noffset = [0.5, 0]\nsoft_limits = [[0, 10], [-5, 5]]\n");
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  ASSERT_EQ(config->pseudos.size(), 1u);
-  const Pseudo& slit = config->pseudos[0];
+  const auto config = test::good(
+      load(kSlit + "kind = \"slit\"\noffset = [0.5, 0]\nsoft_limits = [[0, 10], [-5, 5]]\n"));
+  ASSERT_EQ(config.pseudos.size(), 1u);
+  const Pseudo& slit = config.pseudos[0];
   EXPECT_THAT(slit.motors, ElementsAre(MotorId{2}, MotorId{3}));
   EXPECT_EQ(slit.axes[0].name, "gap");
   EXPECT_EQ(slit.axes[1].unit, "mm");
@@ -54,11 +52,10 @@ TEST(ConfigPseudo, ASlit) {
 }
 
 TEST(ConfigPseudo, OneAxisNeedsNoLists) {
-  const auto config = load(
-      "name = \"sum\"\nunit = \"mm\"\nmotors = [\"left\", \"right\"]\nmatrix = [[1, 1]]\n"
-      "offset = 2\nsoft_limits = [0, 10.5]\nprecision = 2\n");
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  const Pseudo& sum = config->pseudos[0];
+  const auto config = test::good(
+      load("name = \"sum\"\nunit = \"mm\"\nmotors = [\"left\", \"right\"]\nmatrix = [[1, 1]]\n"
+           "offset = 2\nsoft_limits = [0, 10.5]\nprecision = 2\n"));
+  const Pseudo& sum = config.pseudos[0];
   EXPECT_EQ(sum.axes[0].soft_limits, (units::SoftLimits{0, 10.5}));
   EXPECT_EQ(sum.axes[0].decimals, 2);
   const std::vector<double> motors{1, 2};
@@ -69,9 +66,8 @@ const std::string kEnergy =
     "name = \"energy\"\nunit = \"eV\"\nmotors = [\"left\"]\ncalibration = \"energy.csv\"\n";
 
 TEST(ConfigPseudo, ACalibrationIsBesideTheConfiguration) {
-  const auto config = load(kEnergy, "energy,left\n5000,20\n6000,15\n");
-  ASSERT_TRUE(config.has_value()) << config.error().text();
-  const auto& law = std::get<pseudo::CurvedAxis>(config->pseudos[0].law);
+  const auto config = test::good(load(kEnergy, "energy,left\n5000,20\n6000,15\n"));
+  const auto& law = std::get<pseudo::CurvedAxis>(config.pseudos[0].law);
   EXPECT_EQ(law.range(), (pseudo::Range{5000, 6000}));
 }
 
@@ -87,7 +83,7 @@ TEST(ConfigPseudo, WhatIsWrongInACalibrationNamesBothFiles) {
 
 TEST(ConfigPseudo, WhatCannotBeIsRefused) {
   const std::string matrix = kSlit + "matrix = [[1, 0], [0, 1]]\n";
-  EXPECT_EQ(pseudo_error(matrix), "none");
+  EXPECT_EQ(pseudo_error(matrix), "no error");
   const auto with = [&](const std::string& from, const std::string& to) {
     return pseudo_error(replaced(matrix, from, to));
   };

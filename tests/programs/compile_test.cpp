@@ -103,8 +103,7 @@ TEST_F(CompiledPrograms, AreRefusedWithTheFigure) {
   const auto refusal = [this](const std::string& frames, bool steps = false) {
     programs::Program program = parsed(frames);
     program.steps = steps;
-    const auto bytes = compile(program);
-    return bytes ? std::string("taken") : bytes.error().text();
+    return error_of(compile(program));
   };
   const auto says = [](const std::string& text, const char* what) {
     EXPECT_THAT(text, HasSubstr(what));

@@ -15,8 +15,7 @@ class TravelFiles : public ProgramPlaces {
     if (!program) return program.error().text();
     const auto bytes = programs::compile(*program, mcu_, std::span(motors_).first(1));
     if (!bytes) return bytes.error().text();
-    const auto told = programs::rehearse(*program, mcu_, std::span(motors_).first(1), *bytes);
-    return told ? "taken" : told.error().text();
+    return error_of(programs::rehearse(*program, mcu_, std::span(motors_).first(1), *bytes));
   }
 };
 

@@ -15,23 +15,17 @@ using test::good;
 using testing::AllOf;
 using testing::HasSubstr;
 
-std::string refusal(const std::string& text) {
-  const auto zones = parse_zones(text, "in.envelope");
-  return zones ? "taken" : zones.error().text();
-}
-
 TEST(SpeedZones, AreReadFromAFile) {
-  const auto zones = parse_zones(
-      "description = \"slow at both ends\"\ntable = \"feed\"\nby = \"position\"\n"
-      "steps_per_unit = 12.5\nzones = [[10, 1], [5, 2.5], [-3, 0.5]]\nend = -8\n",
-      "in.envelope");
-  ASSERT_TRUE(zones) << zones.error().text();
-  EXPECT_EQ(*zones, (SpeedZones{.description = "slow at both ends",
-                                .table = "feed",
-                                .by = SpeedZones::By::kPosition,
-                                .steps_per_unit = 12.5,
-                                .zones = {{10, 1}, {5, 2.5}, {-3, 0.5}},
-                                .end = -8}));
+  const auto zones =
+      good(parse_zones("description = \"slow at both ends\"\ntable = \"feed\"\nby = \"position\"\n"
+                       "steps_per_unit = 12.5\nzones = [[10, 1], [5, 2.5], [-3, 0.5]]\nend = -8\n",
+                       "in.envelope"));
+  EXPECT_EQ(zones, (SpeedZones{.description = "slow at both ends",
+                               .table = "feed",
+                               .by = SpeedZones::By::kPosition,
+                               .steps_per_unit = 12.5,
+                               .zones = {{10, 1}, {5, 2.5}, {-3, 0.5}},
+                               .end = -8}));
 }
 
 TEST(SpeedZones, GoByDistancesInStepsIfTheFileSaysNoMore) {
@@ -84,7 +78,9 @@ TEST(SpeedZones, WhatIsWrongIsRefusedWithItsLineKeyAndRemedy) {
            Case{"table = \"t\"\nzone = [[0, 1]]\nend = 9\n", "zone",
                 "unknown key; allowed here: description, table, by, steps_per_unit, zones, end"},
        }) {
-    EXPECT_THAT(refusal(one.text), AllOf(HasSubstr(one.place), HasSubstr(one.why))) << one.text;
+    EXPECT_THAT(test::error_of(parse_zones(one.text, "in.envelope")),
+                AllOf(HasSubstr(one.place), HasSubstr(one.why)))
+        << one.text;
   }
 }
 
@@ -92,9 +88,7 @@ TEST(SpeedZones, ASpeedAboveThatOfTheTableIsRefused) {
   const auto table =
       make({.name = "t", .time_unit_ns = 1'000'000, .accel = {20, 10}, .cruise = 10});
   const SpeedZones zones{.table = "t", .zones = {{0, 50}, {9, 100}, {20, 120}}, .end = 30};
-  const auto checked = check_speeds(zones, (*table)->view());
-  ASSERT_FALSE(checked);
-  EXPECT_EQ(checked.error().text(),
+  EXPECT_EQ(test::error_of(check_speeds(zones, (*table)->view())),
             "zones[2]: has 120 steps/s, and the table \"t\" reaches 100; use a lower speed or a "
             "faster table");
   SpeedZones slower = zones;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <string>
 
+#include "results.h"
 #include "tables/edit.h"
 #include "tables/profiles/random_spec.h"
 #include "tables/random_table.h"
@@ -33,6 +34,13 @@ std::vector<Diagnostic> found(const TableContent& content, const Limits& limits)
   return diagnostics(**tables::make(content), limits);
 }
 
+// The only one.
+Diagnostic only(const TableContent& content, const Limits& limits) {
+  const auto all = found(content, limits);
+  EXPECT_EQ(all.size(), 1U);
+  return all.at(0);
+}
+
 TEST(Diagnostics, GoodTableHasNone) {
   EXPECT_THAT(found(kTable, {.start_hz = 100,
                              .max_hz = 400,
@@ -44,16 +52,14 @@ TEST(Diagnostics, GoodTableHasNone) {
 }
 
 TEST(Diagnostics, StartAndMaximumSpeed) {
-  const auto start = found(kTable, {.start_hz = 99});
-  ASSERT_EQ(start.size(), 1U);
-  EXPECT_EQ(start[0].rule, "start_speed");
-  EXPECT_EQ(start[0].index, 0U);
-  EXPECT_DOUBLE_EQ(start[0].value, 100);
-  EXPECT_EQ(start[0].severity, Severity::kError);
-  const auto max = found(kTable, {.max_hz = 399});
-  ASSERT_EQ(max.size(), 1U);
-  EXPECT_EQ(max[0].rule, "max_speed");
-  EXPECT_THAT(max[0].message, HasSubstr("Set cruise = 26 or more"));
+  const Diagnostic start = only(kTable, {.start_hz = 99});
+  EXPECT_EQ(start.rule, "start_speed");
+  EXPECT_EQ(start.index, 0U);
+  EXPECT_DOUBLE_EQ(start.value, 100);
+  EXPECT_EQ(start.severity, Severity::kError);
+  const Diagnostic max = only(kTable, {.max_hz = 399});
+  EXPECT_EQ(max.rule, "max_speed");
+  EXPECT_THAT(max.message, HasSubstr("Set cruise = 26 or more"));
 }
 
 TEST(Diagnostics, BothSidesAreLookedAtInTheOrderOfTheFile) {
@@ -72,28 +78,24 @@ TEST(Diagnostics, BothSidesAreLookedAtInTheOrderOfTheFile) {
 TEST(Diagnostics, JumpFromASideToItsCruiseIsOneToo) {
   TableContent content = kTable;
   content.cruise = 12;
-  const auto jump = found(content, {});
-  ASSERT_EQ(jump.size(), 1U);
-  EXPECT_EQ(jump[0].rule, "speed_ratio");
-  EXPECT_EQ(jump[0].index, 2U);
+  const Diagnostic jump = only(content, {});
+  EXPECT_EQ(jump.rule, "speed_ratio");
+  EXPECT_EQ(jump.index, 2U);
 }
 
 TEST(Diagnostics, AccelerationCountsWithoutWhatRoundingMayMake) {
   // From 10 ms to 5 ms: 100 steps/s within 7.5 ms; the first code may stand for 9.9 ms.
   EXPECT_THAT(found(kTable, {.acceleration = 26'500}), testing::SizeIs(1));
-  const auto steep = found(kTable, {.acceleration = 12'000});
-  ASSERT_EQ(steep.size(), 1U);
-  EXPECT_EQ(steep[0].rule, "acceleration");
-  EXPECT_EQ(steep[0].index, 2U);
+  const Diagnostic steep = only(kTable, {.acceleration = 12'000});
+  EXPECT_EQ(steep.rule, "acceleration");
+  EXPECT_EQ(steep.index, 2U);
 }
 
 TEST(Diagnostics, TablesOfAProfileKeepItsBound) {
   EXPECT_TRUE(rc::check("no false alarm", [] {
     const Spec spec = random_spec(*rc::gen::element(Profile::kConstant, Profile::kScurve));
-    const auto content = make_content(spec);
-    RC_ASSERT(content.has_value());
-    RC_ASSERT(
-        found(*content, {.speed_ratio = 0, .acceleration = *spec.accel.acceleration}).empty());
+    const auto content = good(make_content(spec));
+    RC_ASSERT(found(content, {.speed_ratio = 0, .acceleration = *spec.accel.acceleration}).empty());
   }));
 }
 
@@ -128,10 +130,9 @@ TEST(Diagnostics, AdvisedScalingIsEnough) {
 TEST(Diagnostics, NoScalingIsAdvisedThatWouldMakeTooManyCodes) {
   // From 1000 to 3000 steps/s within 2/3 ms: for 1 step/s^2 four million steps would be needed.
   const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {1000}, .cruise = 333};
-  const auto steep = found(content, {.speed_ratio = 0, .resolution = 1, .acceleration = 1});
-  ASSERT_EQ(steep.size(), 1U);
-  EXPECT_EQ(steep[0].rule, "acceleration");
-  EXPECT_THAT(steep[0].message, testing::Not(testing::HasSubstr("scale")));
+  const Diagnostic steep = only(content, {.speed_ratio = 0, .resolution = 1, .acceleration = 1});
+  EXPECT_EQ(steep.rule, "acceleration");
+  EXPECT_THAT(steep.message, testing::Not(testing::HasSubstr("scale")));
 }
 
 TEST(Diagnostics, CodesThatAreNotThoseOfBushd) {
@@ -147,10 +148,9 @@ TEST(Diagnostics, McuAndBus) {
   EXPECT_EQ(found(kTable, {.mcu_codes = 2}).at(0).rule, "mcu_memory");
   TableContent fast{.name = "t", .time_unit_ns = 100, .accel = {1000, 500}};
   EXPECT_EQ(found(fast, {.tick_ns = 10'000'000}).at(0).rule, "tick");
-  const auto slots = found(fast, {.tick_ns = 6'000'000, .slots = 128});
-  ASSERT_EQ(slots.size(), 1U);
-  EXPECT_EQ(slots[0].rule, "slots");
-  EXPECT_EQ(slots[0].severity, Severity::kWarning);
+  const Diagnostic slots = only(fast, {.tick_ns = 6'000'000, .slots = 128});
+  EXPECT_EQ(slots.rule, "slots");
+  EXPECT_EQ(slots.severity, Severity::kWarning);
 }
 
 TEST(Diagnostics, TooFastForTheMotorByThirtyPerCent) {
@@ -176,13 +176,12 @@ TEST(Diagnostics, TorqueIsToldInNewtonMetres) {
   const TableContent content{.name = "t", .time_unit_ns = 1000, .accel = {5000, 2500}};
   const Motor motor{
       .torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 5e-5, .friction_nm = 0.01, .safety = 1.5};
-  const auto weak = found(content, {.motor = motor});
-  ASSERT_EQ(weak.size(), 1U);
-  EXPECT_EQ(weak[0].rule, "torque");
-  EXPECT_EQ(weak[0].index, 1U);
-  EXPECT_EQ(weak[0].severity, Severity::kWarning);
-  EXPECT_NEAR(weak[0].value, 5e-5 * 1675.5 + 0.01, 1e-4);
-  EXPECT_DOUBLE_EQ(weak[0].limit, 0.1 / 1.5);
+  const Diagnostic weak = only(content, {.motor = motor});
+  EXPECT_EQ(weak.rule, "torque");
+  EXPECT_EQ(weak.index, 1U);
+  EXPECT_EQ(weak.severity, Severity::kWarning);
+  EXPECT_NEAR(weak.value, 5e-5 * 1675.5 + 0.01, 1e-4);
+  EXPECT_DOUBLE_EQ(weak.limit, 0.1 / 1.5);
 }
 
 // 4 T / (p J) is the square of the greatest jump without friction, in rad/s: 1006.6 steps/s.
@@ -210,9 +209,9 @@ TEST(Diagnostics, MicrostepsStartAsTheirFullSteps) {
   Motor motor = kLight;
   motor.steps_per_turn = 3200;
   motor.torque = {{0, 0.4}, {90000, 0.4}};
-  const auto risky = found({.name = "t", .time_unit_ns = 500, .accel = {125}}, {.motor = motor});
-  ASSERT_EQ(risky.size(), 1U);
-  EXPECT_NEAR(risky[0].limit, 16 * 1006.6 / 1.5, 2);
+  const Diagnostic risky =
+      only({.name = "t", .time_unit_ns = 500, .accel = {125}}, {.motor = motor});
+  EXPECT_NEAR(risky.limit, 16 * 1006.6 / 1.5, 2);
 }
 
 TEST(Diagnostics, JumpOfACoarseCodeThatTheRotorCannotFollow) {
@@ -222,12 +221,11 @@ TEST(Diagnostics, JumpOfACoarseCodeThatTheRotorCannotFollow) {
                              .time_unit_ns = 40'000,
                              .accel = {250, 100, 60, 40, 30, 24, 20, 17, 15, 14, 13, 12, 11, 10}};
   Motor motor{.torque = {{0, 3}, {2000, 3}, {2500, 0.1}, {2600, 0.1}}, .inertia_kgm2 = 1e-4};
-  const auto jump = found(content, {.motor = motor});
-  ASSERT_EQ(jump.size(), 1U);
-  EXPECT_EQ(jump[0].rule, "jump");
-  EXPECT_EQ(jump[0].index, 13U);
-  EXPECT_NEAR(jump[0].value, 2500 - 25000 / 11., 1e-6);
-  EXPECT_THAT(jump[0].message, HasSubstr("shorter time unit"));
+  const Diagnostic jump = only(content, {.motor = motor});
+  EXPECT_EQ(jump.rule, "jump");
+  EXPECT_EQ(jump.index, 13U);
+  EXPECT_NEAR(jump.value, 2500 - 25000 / 11., 1e-6);
+  EXPECT_THAT(jump.message, HasSubstr("shorter time unit"));
 }
 
 TEST(Diagnostics, CruiseThatFrictionDoesNotLetThrough) {
@@ -235,11 +233,10 @@ TEST(Diagnostics, CruiseThatFrictionDoesNotLetThrough) {
   Motor motor{.torque = {{0, 0.1}, {1000, 0.1}}, .inertia_kgm2 = 1e-6, .friction_nm = 0.045};
   EXPECT_THAT(found(content, {.motor = motor}), IsEmpty());
   motor.friction_nm = 0.08;
-  const auto risky = found(content, {.motor = motor});
-  ASSERT_EQ(risky.size(), 1U);
-  EXPECT_EQ(risky[0].rule, "torque");
-  EXPECT_EQ(risky[0].side, "cruise");
-  EXPECT_EQ(risky[0].severity, Severity::kWarning);
+  const Diagnostic risky = only(content, {.motor = motor});
+  EXPECT_EQ(risky.rule, "torque");
+  EXPECT_EQ(risky.side, "cruise");
+  EXPECT_EQ(risky.severity, Severity::kWarning);
   motor.friction_nm = 0.11;
   EXPECT_EQ(found(content, {.motor = motor}).at(0).severity, Severity::kError);
 }

@@ -47,12 +47,11 @@ TEST(MakeTable, EightBitsAreCodesFromTenToTwoHundredAndFifty) {
   spec.accel.acceleration.reset();
   spec.accel.codes = 238;
   spec.code_bits = 8;
-  const auto content = make_content(spec);
-  ASSERT_TRUE(content);
-  EXPECT_EQ(content->accel.size(), 238U);
-  EXPECT_EQ(content->accel.front(), 250);
-  EXPECT_EQ(content->accel.back(), 10);
-  EXPECT_EQ(content->time_unit_ns, 40000U);
+  const auto content = good(make_content(spec));
+  EXPECT_EQ(content.accel.size(), 238U);
+  EXPECT_EQ(content.accel.front(), 250);
+  EXPECT_EQ(content.accel.back(), 10);
+  EXPECT_EQ(content.time_unit_ns, 40000U);
   spec.max_hz = 2800;
   EXPECT_THAT(refusal(spec), HasSubstr("allowed: 10 or more, so that one code changes the speed by "
                                        "10 % at most"));
@@ -83,10 +82,9 @@ TEST(MakeTable, PtoTakesTimesOfBothSides) {
   spec.accel = {.profile = Profile::kPto, .time_s = 0.2};
   EXPECT_THAT(refusal(spec), HasSubstr("--decel-time"));
   spec.decel = {.profile = Profile::kPto, .time_s = 0.1};
-  const auto content = make_content(spec);
-  ASSERT_TRUE(content);
-  EXPECT_EQ(content->accel.size(), 112U);  // (100 + 1000) / 2 * 0.2 = 110 steps
-  EXPECT_EQ(content->decel->size(), 57U);
+  const auto content = good(make_content(spec));
+  EXPECT_EQ(content.accel.size(), 112U);  // (100 + 1000) / 2 * 0.2 = 110 steps
+  EXPECT_EQ(content.decel->size(), 57U);
 }
 
 TEST(MakeTable, ScurveWithAJerkHasAStraightPart) {
@@ -150,10 +148,9 @@ TEST(MakeTable, EndsAreNotFasterByTheLeastShare) {
               .time_unit_ns = unit_ns};
     spec.accel = {.profile = Profile::kConstant,
                   .codes = static_cast<std::uint32_t>(random_in(3, 500))};
-    const auto content = make_content(spec);
-    RC_ASSERT(content.has_value());
-    RC_ASSERT(content->accel.front() == slow + 1);
-    RC_ASSERT(content->accel.back() == fast + 1);
+    const auto content = good(make_content(spec));
+    RC_ASSERT(content.accel.front() == slow + 1);
+    RC_ASSERT(content.accel.back() == fast + 1);
   }));
 }
 
@@ -164,10 +161,9 @@ TEST(MakeTable, EndsThatAreWholeCodesStayThese) {
     Spec spec{.name = "t", .start_hz = 5e6 / slow, .max_hz = 5e6 / fast, .time_unit_ns = 200};
     spec.accel = {.profile = Profile::kConstant,
                   .codes = static_cast<std::uint32_t>(random_in(3, 500))};
-    const auto content = make_content(spec);
-    RC_ASSERT(content.has_value());
-    RC_ASSERT(content->accel.front() == slow);
-    RC_ASSERT(content->accel.back() == fast);
+    const auto content = good(make_content(spec));
+    RC_ASSERT(content.accel.front() == slow);
+    RC_ASSERT(content.accel.back() == fast);
   }));
 }
 

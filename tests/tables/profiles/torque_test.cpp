@@ -107,12 +107,11 @@ void check_ramp(const Spec& spec, Side side, const std::vector<std::uint16_t>& c
 TEST(Torque, RampsAreWithinTwoPerCentOfTheOptimum) {
   EXPECT_TRUE(rc::check("time of either ramp, and never below the optimum", [] {
     const Spec spec = random_torque_spec();
-    const auto content = make_content(spec);
-    RC_ASSERT(content.has_value());
-    check_ramp(spec, Side::kAccel, content->accel, content->time_unit_ns);
-    std::vector<std::uint16_t> braking = content->decel.value_or(content->accel);
-    if (content->decel) std::reverse(braking.begin(), braking.end());
-    check_ramp(spec, Side::kDecel, braking, content->time_unit_ns);
+    const auto content = good(make_content(spec));
+    check_ramp(spec, Side::kAccel, content.accel, content.time_unit_ns);
+    std::vector<std::uint16_t> braking = content.decel.value_or(content.accel);
+    if (content.decel) std::reverse(braking.begin(), braking.end());
+    check_ramp(spec, Side::kDecel, braking, content.time_unit_ns);
   }));
 }
 
@@ -121,9 +120,8 @@ TEST(Torque, RampsAreWithinTwoPerCentOfTheOptimum) {
 TEST(Torque, WholeMovesAreWithinTwoPerCentOfTheOptimum) {
   EXPECT_TRUE(rc::check("of any length from 50 steps on", [] {
     const Spec spec = random_torque_spec();
-    const auto content = make_content(spec);
-    RC_ASSERT(content.has_value());
-    const auto longest = static_cast<std::uint32_t>(4 * content->accel.size());
+    const auto content = good(make_content(spec));
+    const auto longest = static_cast<std::uint32_t>(4 * content.accel.size());
     const std::uint32_t steps = *rc::gen::inRange(50U, 51U + longest);
     const double way = steps - 2;
     const double dx = way / kStretches;
@@ -133,7 +131,7 @@ TEST(Torque, WholeMovesAreWithinTwoPerCentOfTheOptimum) {
       speeds[i] = std::min(speeds[i], braking[braking.size() - 1 - i]);
     }
     const double optimal_s = 2 / spec.start_hz + time_s(speeds, dx);
-    const auto table = tables::make(*content);
+    const auto table = tables::make(content);
     RC_ASSERT(table.has_value());
     const double made_s =
         1e-9 * static_cast<double>(tables::move_time((*table)->view(), steps).time_ns);
@@ -145,10 +143,9 @@ TEST(Torque, WholeMovesAreWithinTwoPerCentOfTheOptimum) {
 TEST(Torque, NeverAsksForMoreThanThereIs) {
   EXPECT_TRUE(rc::check("acceleration within the curve, up to rounding", [] {
     const Spec spec = random_torque_spec();
-    const auto content = make_content(spec);
-    RC_ASSERT(content.has_value());
-    const double unit_s = content->time_unit_ns * 1e-9;
-    const auto delays = delays_of(content->accel, content->time_unit_ns);
+    const auto content = good(make_content(spec));
+    const double unit_s = content.time_unit_ns * 1e-9;
+    const auto delays = delays_of(content.accel, content.time_unit_ns);
     for (std::size_t i = 0; i + 1 < delays.size(); ++i) {
       // The motion during two delays has speeds between the means of their neighbours.
       const double low = i == 0 ? spec.start_hz : 1 / (delays[i - 1]);
@@ -177,15 +174,14 @@ TEST(Torque, NeverSlowerThanTheBestConstantAcceleration) {
     }
     Spec constant = spec;
     constant.accel = {.profile = Profile::kConstant, .acceleration = least};
-    const auto fast = make_content(spec);
-    RC_ASSERT(fast.has_value());
-    constant.time_unit_ns = fast->time_unit_ns;
+    const auto fast = good(make_content(spec));
+    constant.time_unit_ns = fast.time_unit_ns;
     const auto plain = make_content(constant);
     RC_PRE(plain.has_value());
     std::uint64_t fast_units = 0;
     std::uint64_t plain_units = 0;
     for (std::size_t i = 0; i < plain->accel.size(); ++i) {
-      fast_units += i < fast->accel.size() ? fast->accel[i] : fast->accel.back();
+      fast_units += i < fast.accel.size() ? fast.accel[i] : fast.accel.back();
       plain_units += plain->accel[i];
       RC_ASSERT(fast_units <= plain_units + i);
     }
@@ -195,10 +191,9 @@ TEST(Torque, NeverSlowerThanTheBestConstantAcceleration) {
 TEST(Torque, TheCheckAgrees) {
   EXPECT_TRUE(rc::check("no step takes more than there is", [] {
     const Spec spec = random_torque_spec();
-    const auto content = make_content(spec);
-    RC_ASSERT(content.has_value());
+    const auto content = good(make_content(spec));
     for (const auto& diagnostic :
-         tables::profiles::diagnostics(**tables::make(*content), {.motor = spec.motor})) {
+         tables::profiles::diagnostics(**tables::make(content), {.motor = spec.motor})) {
       RC_LOG() << diagnostic.message << "\n";
       RC_ASSERT(diagnostic.rule != "torque");
     }
@@ -215,10 +210,9 @@ TEST(Torque, TheCheckKnowsAllSpeedsOfAStep) {
     spec.motor = Motor{.torque = {{100, 0.6}, {1.0 * corner_hz, 0.4}, {3000, 0.4}},
                        .inertia_kgm2 = 1e-4,
                        .safety = 1};
-    const auto content = make_content(spec);
-    ASSERT_TRUE(content);
+    const auto content = good(make_content(spec));
     for (const auto& diagnostic :
-         tables::profiles::diagnostics(**tables::make(*content), {.motor = spec.motor})) {
+         tables::profiles::diagnostics(**tables::make(content), {.motor = spec.motor})) {
       EXPECT_NE(diagnostic.rule, "torque") << corner_hz << " Hz: " << diagnostic.message;
     }
   }
@@ -277,8 +271,7 @@ TEST(TorqueCsv, AsSpreadsheetsOfWindowsWriteIt) {
 
 TEST(TorqueCsv, EveryBadLineIsNamed) {
   const auto message = [](const char* text) {
-    const auto curve = parse_torque_csv(text, 200, "m.csv");
-    return curve ? std::string("taken") : curve.error().text();
+    return error_of(parse_torque_csv(text, 200, "m.csv"));
   };
   EXPECT_THAT(message(""), HasSubstr("has no point"));
   EXPECT_THAT(message("0,5\n"), HasSubstr("m.csv:1: is no header"));
