@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "base/printable.h"
 
@@ -32,6 +33,29 @@ double user_speed(const api::MotorState& motor, const units::Coordinates& coordi
   return coordinates.scale().negative ? -per_s : per_s;
 }
 
+// By itself, or as a move says.
+const char* moves_text(const api::MotorState& motor) {
+  if (motor.activity == api::Activity::kHoming) return "home";
+  return motor.activity == api::Activity::kLocal ? "local" : "yes";
+}
+
+// Where a motor stands between its soft limits: "-5 |----x---------| 25"; outside of them an arrow
+// points to where it is. "": it has none.
+std::string range_text(const api::MotorState& motor, const api::MotorDescription& description,
+                       std::size_t columns) {
+  const auto coordinates = units::Coordinates::make(description.scale);
+  if (!description.soft_limits || !coordinates) return {};
+  const units::SoftLimits limits = coordinates->on_user_scale(*description.soft_limits);
+  std::string bar(columns, '-');
+  const double place = (motor.user - limits.low) / (limits.high - limits.low);
+  if (has_position(motor) && place < 0) bar.front() = '<';
+  if (has_position(motor) && place > 1) bar.back() = '>';
+  if (has_position(motor) && place >= 0 && place <= 1) {
+    bar[static_cast<std::size_t>(std::lround(place * static_cast<double>(columns - 1)))] = 'x';
+  }
+  return fmt::format("{:g} |{}| {:g}", limits.low, bar, limits.high);
+}
+
 }  // namespace
 
 std::string text_of(const api::TableRef& table) {
@@ -45,11 +69,6 @@ const char* moving_word(const api::MotorState& motor, const char* moves, const c
   if (motor.paused) return "paused";
   if (motor.held && !motor.moving) return "held";
   return motor.moving ? moves : rests;
-}
-
-const char* moves_text(const api::MotorState& motor) {
-  if (motor.activity == api::Activity::kHoming) return "home";
-  return motor.activity == api::Activity::kLocal ? "local" : "yes";
 }
 
 bool has_position(const api::MotorState& motor) {
@@ -95,19 +114,49 @@ std::string speed_text(const api::MotorState& motor, const units::Scale& scale) 
                      bushd::printable(scale.unit));
 }
 
-std::string range_text(const api::MotorState& motor, const api::MotorDescription& description,
-                       std::size_t columns) {
-  const auto coordinates = units::Coordinates::make(description.scale);
-  if (!description.soft_limits || !coordinates) return {};
-  const units::SoftLimits limits = coordinates->on_user_scale(*description.soft_limits);
-  std::string bar(columns, '-');
-  const double place = (motor.user - limits.low) / (limits.high - limits.low);
-  if (has_position(motor) && place < 0) bar.front() = '<';
-  if (has_position(motor) && place > 1) bar.back() = '>';
-  if (has_position(motor) && place >= 0 && place <= 1) {
-    bar[static_cast<std::size_t>(std::lround(place * static_cast<double>(columns - 1)))] = 'x';
+Grid motor_grid(const MotorColumns& columns) {
+  using enum Align;
+  std::vector<Align> align{kLeft};
+  std::vector<std::string> heading{"MOTOR"};
+  if (columns.place) {
+    align.insert(align.end(), {kLeft, kRight, kLeft, kLeft});
+    heading.insert(heading.end(), {"MCU", "OUTPUT", "GROUP", "TABLE"});
   }
-  return fmt::format("{:g} |{}| {:g}", limits.low, bar, limits.high);
+  align.push_back(kRight);
+  heading.push_back("POSITION");
+  if (columns.target) {
+    align.push_back(kRight);
+    heading.push_back("TARGET");
+  }
+  align.insert(align.end(), {kRight, kLeft, kRight, kLeft, kLeft});
+  heading.insert(heading.end(), {"SPEED", "MOVING", "LIMITS", "TRUST", ""});
+  Grid grid(std::move(align));
+  grid.row(std::move(heading));
+  return grid;
+}
+
+std::vector<std::string> motor_row(const api::MotorState& motor,
+                                   const api::MotorDescription& description,
+                                   const api::StateSnapshot& mcu, bool of_mcu,
+                                   const MotorColumns& columns) {
+  const units::Scale& scale = description.scale;
+  std::vector<std::string> out{bushd::printable(motor.name)};
+  if (columns.place) {
+    out.insert(out.end(), {bushd::printable(mcu.mcu),
+                           of_mcu ? fmt::to_string(description.output) : std::string("-"),
+                           bushd::printable(description.group), text_of(description.table)});
+  }
+  out.push_back(position_text(motor, motor.position_steps, motor.user, scale));
+  if (columns.target) {
+    out.push_back(position_text(motor, motor.target_steps, motor.user_target, scale));
+  }
+  // Where there is no room for notes a limit stands in place of what a motor does.
+  const bool at_limit = motor.inhibited.any() && !columns.place;
+  out.insert(out.end(), {speed_text(motor, scale),
+                         moving_word(motor, moves_text(motor), at_limit ? "limit" : "-"),
+                         range_text(motor, description, columns.bar),
+                         std::string(word(motor.trust)), notes_text(motor)});
+  return out;
 }
 
 }  // namespace bushctl

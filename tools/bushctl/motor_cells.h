@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "api/reply.h"
 #include "api/snapshot.h"
 #include "client/status.h"
+#include "grid.h"
 
 namespace bushctl {
 
@@ -21,8 +23,6 @@ std::string text_of(const bushd::api::TableRef& table);
 
 // What it does, in a word for tables.
 const char* moving_word(const bushd::api::MotorState& motor, const char* moves, const char* rests);
-// By itself, or as a move says.
-const char* moves_text(const bushd::api::MotorState& motor);
 
 // Since when it is not heard, which limit switch is active, who has armed it.
 std::string notes_text(const bushd::api::MotorState& motor);
@@ -37,9 +37,18 @@ std::string position_text(const bushd::api::MotorState& motor, std::int64_t step
 // "1.250 mm/s", and bare steps per second of a motor without a unit.
 std::string speed_text(const bushd::api::MotorState& motor, const bushd::units::Scale& scale);
 
-// Where a motor stands between its soft limits: "-5 |----x---------| 25"; outside of them an arrow
-// points to where it is. "": it has none. `columns`: of the bar, at least 2.
-std::string range_text(const bushd::api::MotorState& motor,
-                       const bushd::api::MotorDescription& description, std::size_t columns = 15);
+// Which columns a table of motors has, for the room there is.
+struct MotorColumns {
+  bool place = true;     // MCU, output, group and table
+  std::size_t bar = 15;  // columns between the soft limits, at least 2
+  bool target = true;
+};
+
+// With its heading.
+Grid motor_grid(const MotorColumns& columns);
+std::vector<std::string> motor_row(const bushd::api::MotorState& motor,
+                                   const bushd::api::MotorDescription& description,
+                                   const bushd::api::StateSnapshot& mcu, bool of_mcu,
+                                   const MotorColumns& columns);
 
 }  // namespace bushctl

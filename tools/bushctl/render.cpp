@@ -40,10 +40,8 @@ std::string result_position_text(const api::MotorResult& motor) {
 
 std::vector<std::string> table(const Status& status) {
   using enum Align;
-  Grid motors(
-      {kLeft, kLeft, kRight, kLeft, kLeft, kRight, kRight, kRight, kLeft, kRight, kLeft, kLeft});
-  motors.row({"MOTOR", "MCU", "OUTPUT", "GROUP", "TABLE", "POSITION", "TARGET", "SPEED", "MOVING",
-              "LIMITS", "TRUST", ""});
+  const MotorColumns columns;
+  Grid motors = motor_grid(columns);
   Grid mcus({kLeft, kLeft, kRight, kLeft});
   mcus.row({"MCU", "STATE", "BOOT", "DETAIL"});
   Grid buses({kLeft, kLeft});
@@ -54,15 +52,8 @@ std::vector<std::string> table(const Status& status) {
     const bool is_mcu = status.descriptions.at(i).snapshot.is_mcu();
     for (std::size_t m = 0; m < mcu.motors.size(); ++m) {
       const api::MotorState& motor = mcu.motors[m];
-      const auto description = description_of(status.descriptions.at(i).snapshot, m, motor.name);
-      motors.row({bushd::printable(motor.name), bushd::printable(mcu.mcu),
-                  is_mcu ? fmt::to_string(description.output) : std::string("-"),
-                  bushd::printable(description.group), text_of(description.table),
-                  position_text(motor, motor.position_steps, motor.user, description.scale),
-                  position_text(motor, motor.target_steps, motor.user_target, description.scale),
-                  speed_text(motor, description.scale), moving_word(motor, moves_text(motor), "-"),
-                  range_text(motor, description), std::string(word(motor.trust)),
-                  notes_text(motor)});
+      motors.row(motor_row(motor, description_of(status.descriptions.at(i).snapshot, m, motor.name),
+                           mcu, is_mcu, columns));
     }
     if (!is_mcu) continue;
     mcus.row({bushd::printable(mcu.mcu), std::string(word(mcu.state)), fmt::to_string(mcu.boot),

@@ -8,14 +8,12 @@
 
 #include "api/name_pattern.h"
 #include "base/printable.h"
-#include "grid.h"
 #include "motor_cells.h"
 
 namespace bushctl {
 namespace {
 
 namespace api = bushd::api;
-namespace units = bushd::units;
 using bushd::client::Status;
 
 constexpr std::size_t kMostMcus = 3;  // that do not work, by name
@@ -61,12 +59,7 @@ std::vector<std::string> mcus_that_do_not_work(const Status& status) {
 }
 
 // What there is room for. From the widest to the narrowest.
-struct Layout {
-  bool place;       // MCU, output, group and table
-  std::size_t bar;  // columns between the soft limits
-  bool target;
-};
-constexpr std::array<Layout, 5> kLayouts = {
+constexpr std::array<MotorColumns, 5> kLayouts = {
     {{true, 15, true}, {false, 15, true}, {false, 7, true}, {false, 3, true}, {false, 3, false}}};
 
 }  // namespace
@@ -87,48 +80,6 @@ struct WatchTable::Row {
 };
 
 namespace {
-
-std::vector<Align> alignments(const Layout& layout) {
-  using enum Align;
-  std::vector<Align> out{kLeft};
-  if (layout.place) out.insert(out.end(), {kLeft, kRight, kLeft, kLeft});
-  out.push_back(kRight);
-  if (layout.target) out.push_back(kRight);
-  out.insert(out.end(), {kRight, kLeft, kRight, kLeft, kLeft});
-  return out;
-}
-
-std::vector<std::string> heading(const Layout& layout) {
-  std::vector<std::string> out{"MOTOR"};
-  if (layout.place) out.insert(out.end(), {"MCU", "OUTPUT", "GROUP", "TABLE"});
-  out.push_back("POSITION");
-  if (layout.target) out.push_back("TARGET");
-  out.insert(out.end(), {"SPEED", "MOVING", "LIMITS", "TRUST", ""});
-  return out;
-}
-
-std::vector<std::string> cells(const api::MotorState& motor,
-                               const api::MotorDescription& description,
-                               const api::StateSnapshot& mcu, bool of_mcu, const Layout& layout) {
-  const units::Scale& scale = description.scale;
-  std::vector<std::string> out{bushd::printable(motor.name)};
-  if (layout.place) {
-    out.insert(out.end(), {bushd::printable(mcu.mcu),
-                           of_mcu ? fmt::to_string(description.output) : std::string("-"),
-                           bushd::printable(description.group), text_of(description.table)});
-  }
-  out.push_back(position_text(motor, motor.position_steps, motor.user, scale));
-  if (layout.target) {
-    out.push_back(position_text(motor, motor.target_steps, motor.user_target, scale));
-  }
-  // Where there is no room for notes a limit stands in place of what a motor does.
-  const bool at_limit = motor.inhibited.any() && !layout.place;
-  out.insert(out.end(), {speed_text(motor, scale),
-                         moving_word(motor, moves_text(motor), at_limit ? "limit" : "-"),
-                         range_text(motor, description, layout.bar), std::string(word(motor.trust)),
-                         notes_text(motor)});
-  return out;
-}
 
 std::size_t widest(const std::vector<std::string>& lines) {
   std::size_t most = 0;
@@ -245,16 +196,14 @@ std::vector<std::string> WatchTable::lines(const Status& status, std::size_t col
   const std::size_t first = std::min(page_ * room, all.size());
   const std::size_t last = std::min(first + room, all.size());
   std::vector<std::string> shown;
-  for (const Layout& layout : kLayouts) {
+  for (const MotorColumns& layout : kLayouts) {
     // All motors are in it, so that the columns stay where they are from page to page; their notes
     // are not, as they may be as long as they like.
-    Grid fitted(alignments(layout));
-    Grid grid(alignments(layout));
-    fitted.row(heading(layout));
-    grid.row(heading(layout));
+    Grid fitted = motor_grid(layout);
+    Grid grid = fitted;
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Row& row = all[i];
-      auto texts = cells(*row.motor, row.description, *row.mcu, row.of_mcu, layout);
+      auto texts = motor_row(*row.motor, row.description, *row.mcu, row.of_mcu, layout);
       if (i >= first && i < last) grid.row(texts);
       texts.back().clear();
       fitted.row(std::move(texts));
