@@ -270,7 +270,7 @@ class Demo:
         self.stage("all 32 motors back to 0, in one group start", [(0, 0, ["move", "--wait", *home])])
 
     def cpu_percent(self):
-        """Of bushd, over its whole life."""
+        """The share that bushd takes, over its whole life."""
         stat = pathlib.Path(f"/proc/{self._processes['bushd'].pid}/stat").read_text(encoding="ascii")
         fields = stat.rsplit(")", 1)[1].split()
         hertz = os.sysconf("SC_CLK_TCK")

@@ -20,7 +20,7 @@ def prose(page):
 
 
 def anchors(page):
-    """Of all headings, as a forge makes them: lower case, punctuation left out, blanks as hyphens."""
+    """The anchors of all headings, as a forge makes them: lower case, punctuation left out, blanks as hyphens."""
     headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 

@@ -43,7 +43,7 @@ class Moves(EndToEndTest):
         self.assertEqual(set(results), {"reached", "stopped"})
 
     def check_line_made_by_the_mcus(self, displacement_format):
-        """Of two MCUs, the motors' ways equal: every edge in the slot of its time, until a stop makes ticks of it."""
+        """Two MCUs, the motors' ways equal: every edge in the slot of its time, until a stop makes ticks of it."""
         self.bring_up(displacement_format)
         self.command("move", "--line", "--wait", "a0", "900", "b0", "-900")
         move = self.start_move("--line", "a0", "20000", "b0", "-20000")

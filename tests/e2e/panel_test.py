@@ -68,7 +68,7 @@ class Panel(EndToEndTest):
         return moves
 
     def check_stop_by_the_input(self):
-        """Of MCU 1 alone, until the input is released and the fault cleared."""
+        """MCU 1 alone stops, until the input is released and the fault cleared."""
         mine, other = self.start_both()
         self.press("E")
         self.assertEqual(mine.process.wait(GIVE_UP_S), 1)
@@ -169,7 +169,7 @@ class Panel(EndToEndTest):
         self.assertFalse([time for time in self.steps_of_a0() if enabled[-2][0] + 2 * TICK_NS < time < enabled[-1][0]])
 
     def reset_cause(self):
-        """Of MCU 1, as health has it."""
+        """The cause of the last reset of MCU 1, as health has it."""
         return json.loads(self.command("health", "--json").stdout)["buses"][0]["mcus"][0]["reset_cause"]
 
     def check_reset(self, key, enable_after_reset):

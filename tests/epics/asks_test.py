@@ -256,7 +256,7 @@ class Order(unittest.IsolatedAsyncioTestCase):
 
 
 class Faults(unittest.IsolatedAsyncioTestCase):
-    """Of the bridge itself: a put is answered nevertheless."""
+    """Faults of the bridge itself: a put is answered nevertheless."""
 
     async def asyncSetUp(self):
         self.world = World()

@@ -128,7 +128,7 @@ def entries(*motors):
 
 
 def line(increments, longest, begun):
-    """Of the motors from 0 on; negative: back."""
+    """A line of the motors from 0 on; negative: back."""
     return struct.pack("<BHIII", 0, 0, longest, begun, longest - begun) + b"".join(
         struct.pack("<BI", m | (0x80 if n > 0 else 0), abs(n)) for m, n in enumerate(increments))
 
@@ -151,7 +151,7 @@ def travel(number, kind, edge=0, sensor=0, steps=0, delay_us=0, wait_us=0):
 
 
 def program(frames, flags=0):
-    """Of motors 0 and 1, loaded and committed."""
+    """A program of motors 0 and 1, loaded and committed."""
     text = struct.pack("<BBH", 1, flags, 3) + 2 * struct.pack("<Bii", 0, -300, 300) + frames + b"\0"
     half = len(text) // 2
     return (frame(PROGRAM_PUT, struct.pack("<HH", 0, len(text)) + text[:half])

@@ -314,7 +314,7 @@ class Blocking(PythonTest):
 
 
 class LossyLink(LcmLink):
-    """Of the datagrams, both ways, a quarter is lost, and a quarter comes twice."""
+    """A quarter of the datagrams, both ways, is lost, and a quarter comes twice."""
 
     chance = random.Random(1985)
 

@@ -84,7 +84,7 @@ def way(**values):
 
 
 def made_of_its_type(name):
-    """Of a function that make_told writes: what it is given is what the message says."""
+    """A function that make_told writes: what it is given is what the message says."""
     defaults = type_of(name)()
     said = {field.name: ["m", "n"] if field.count else type(getattr(defaults, field.name))(3) for field in defaults.FIELDS
             if field.name not in ("request", "motor_count")}

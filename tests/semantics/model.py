@@ -16,7 +16,7 @@ class Refused(Exception):
 
 
 def as_written(number: float) -> Fraction:
-    """Of the shortest decimal text that means this double."""
+    """The number that the shortest decimal text of this double means."""
     return Fraction(repr(float(number)))
 
 
@@ -36,7 +36,7 @@ def below(value: Fraction) -> int:
 
 @dataclass
 class Amount:
-    """Of steps, or of user units as somebody has written them."""
+    """An amount of steps, or of user units as somebody has written them."""
     steps: Optional[int] = None
     user: Optional[str] = None
 
@@ -107,7 +107,7 @@ class Motor:
         return -steps if self.negative else steps
 
     def steps_of_distances(self, amount: Amount) -> set:
-        """Of a distance that is no whole number of steps, both: it counts from the target as it was asked for, which may be
+        """Both, for a distance that is no whole number of steps: it counts from the target as it was asked for, which may be
         half a step off on either side (docs/positions.md, "Distances"). tests/daemon/relative_moves_test.cpp has the sums.
         """
         if amount.steps is not None or not self.unit:
@@ -136,7 +136,7 @@ class Motor:
         return verdicts.pop() if len(verdicts) == 1 else None
 
     def shortest_delay(self, speed: Optional[Fraction], in_steps: bool) -> int:
-        """Of all delays of a move, in time units."""
+        """The shortest of all delays of a move, in time units."""
         shortest_delays = [0]
         for value, scale in ((self.max_speed, self.steps_per_unit), (speed, 1 if in_steps else self.steps_per_unit)):
             if value is None:
@@ -196,7 +196,7 @@ class Motor:
             raise Refused("it is held")
 
     def targets(self, absolute: bool, amount: Amount, base: int) -> set:
-        """Of a move that somebody asks for; `base` is where it stands, or its present target."""
+        """The targets of a move that somebody asks for; `base` is where it stands, or its present target."""
         if absolute:
             found = self.steps_of_position(amount)
         else:

@@ -329,7 +329,7 @@ class Sequence(InMotion):
         self.set_number(self.rng.choice(self.motors), Amount(steps=self.rng.randint(-700, 700)))
 
     def set_number(self, motor, amount, **more):
-        """Of steps, whatever they are called."""
+        """Sets a number of steps, whatever they are called."""
         entry = {"name": motor.name, **amount.as_json()}
         try:
             # On the dial it is rounded like any other number.

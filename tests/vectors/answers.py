@@ -7,7 +7,7 @@ from definitions import displacements, encode_displacements, line_position, line
 
 
 def delays_of(table, steps, tick_ns, stop):
-    """Of a move, or of one that is asked to ramp down at the beginning of a tick; and the step that runs then."""
+    """The delays of a move, or of one that is asked to ramp down at the beginning of a tick; and the step that runs then."""
     delays = table.move(steps)
     if stop is None:
         return delays, None

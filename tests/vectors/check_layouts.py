@@ -121,7 +121,7 @@ def check_drawings(text):
 
 
 def check_frames(rows):
-    """Of any two fields of a message that have one width, some frame has different values in them."""
+    """Some frame has different values in any two fields of a message that have one width."""
     problems = []
     for message, (_, layout) in LAYOUTS.items():
         fields = [dict(part.split("=", 1) for part in row["fields"].split())

@@ -256,7 +256,7 @@ ENTRIES = {"run_state": run_state_bytes, "table_run": table_run_bytes, "line": l
 
 
 def is_left_out(name, fields):
-    """Of a report: the section that the field is in, or all motors."""
+    """Whether a report leaves out the section that the field is in, or all motors."""
     if "sections" not in fields:
         return False
     if name == "motor":

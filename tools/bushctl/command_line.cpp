@@ -50,7 +50,7 @@ bushd::client::ClientOptions Connection::options() const {
 }
 
 Command& Command::footer(const std::string& text) {
-  app_->footer(text);
+  if (!text.empty()) app_->footer(text);
   return *this;
 }
 

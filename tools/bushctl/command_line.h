@@ -35,6 +35,7 @@ class Command {
  public:
   Command(CLI::App* app, const Connection& connection) : app_(app), connection_(&connection) {}
 
+  // Below the options in the help; "": what stands there for all commands.
   Command& footer(const std::string& text);
   Command& flag(const std::string& name, bool* value, const std::string& text);
   // Only together with the option `with`.

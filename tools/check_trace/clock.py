@@ -73,7 +73,7 @@ def pairs_of(steps, seen):
 
 
 def pairs_by_move(motor, slot_ns):
-    """Of a motor that has edges of which nobody knows how many: where in its edges each move may lie."""
+    """Where in its edges each move of a motor may lie that has edges of which nobody knows how many."""
     seen = [edge.time_ns for edge in motor.edges]
     pairs = []
     by_move = motor.steps_by_move()

@@ -93,7 +93,7 @@ def settle_slots(move, slots):
 
 
 def staggered_place(move, place, count, places, apart):
-    """Of so many places, `apart` of them for the current to settle."""
+    """The place among so many, `apart` of them for the current to settle."""
     evenly = place * places // count
     if move.settle_ns == 0:
         return evenly, evenly - place

@@ -171,7 +171,7 @@ class LineMove(Move):
         return Run(self.late_ns, self._envelope, event["line"]["to"] - self._from, event.get("shortest_delay", 0))
 
     def _made(self, s):
-        """Of the motor, from the line's beginning, when the run has made `s` steps of it."""
+        """The motor's steps, from the line's beginning, when the run has made `s` steps of it."""
         return (2 * self._increment * s - self._increment + self._longest) // (2 * self._longest)
 
     def _rest(self):
@@ -197,7 +197,7 @@ class LineMove(Move):
         self._rests.append((tick - self.start_tick, self._rest()))
 
     def _time(self, n):
-        """Of step n, counted from 0, exact: over 2 N."""
+        """The time of step n, counted from 0, exact: over 2 N."""
         whole = 2 * self._increment
         s = (2 * (self._first + n) + 1) * self._longest + self._increment - whole * self._from
         before, rest = divmod(s, whole)

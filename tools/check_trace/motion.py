@@ -66,7 +66,7 @@ class Table:
         return self.decel[i] if i < len(self.decel) else self.cruise
 
     def delays(self, steps, shortest_delay):
-        """Of a whole move, in time units, one after the other."""
+        """The delays of a whole move, in time units, one after the other."""
         return (
             max(self.delay_from_start(j - 1), self.delay_before_end(steps - j), self.cruise, shortest_delay)
             for j in range(1, steps + 1)
@@ -272,7 +272,7 @@ class Move:
         return made, 256 * made + (end_ns - plan.begin_ns(made)) * 256 // (delay * plan.unit_ns)
 
     def _place(self, tick, before, after):
-        """Of the steps from `before` to `after` of this tick."""
+        """The place of the steps from `before` to `after` of this tick."""
         if after == self._count() and not (self._plan.begun and (tick + 1) * self.tick_ns <= self._plan.begun[1]):
             return LAST_TICK
         return FIRST_TICK if tick == 0 else INTERIOR

@@ -37,7 +37,7 @@ def number(value):
 
 
 def points(x, y, *shares):
-    """Of a cell whose upper left corner is x, y."""
+    """Points of a cell whose upper left corner is x, y."""
     return " ".join(f"{number(x + COLUMN * across)},{number(y + LINE * down)}" for across, down in shares)
 
 

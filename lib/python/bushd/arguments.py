@@ -51,7 +51,7 @@ class Amounts:
 def amounts(
     motors: str | Mapping[str, float] | None, to: Amount | None, by: Amount | None, unit: str | None
 ) -> Amounts:
-    """Of `move()`: ("theta", to=4), ({"theta": 4}), (by={"theta": 4}) and so on."""
+    """The arguments of `move()`: ("theta", to=4), ({"theta": 4}), (by={"theta": 4}) and so on."""
     if isinstance(motors, Mapping):
         if to is not None or by is not None:
             raise TypeError("positions are given twice: write move({...}), move(to={...}) or move(by={...})")
@@ -83,7 +83,7 @@ def find(status: model.Status, name: str) -> model.Motor:
 
 
 def result_of(exchange: Exchange, check: bool) -> model.Result:
-    """Of an exchange that is over. Raises its error, and RequestFailed where it has not succeeded (with `check`)."""
+    """The result of an exchange that is over. Raises its error, and RequestFailed where it has not succeeded (with `check`)."""
     if exchange.error is not None:
         raise exchange.error
     assert exchange.outcome is not None

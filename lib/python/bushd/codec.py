@@ -28,7 +28,7 @@ EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
 
 
 class Phase(enum.Enum):
-    """Of a reply: REFUSED and nothing more, or ACCEPTED and later exactly one RESULT."""
+    """What a reply says: REFUSED and nothing more, or ACCEPTED and later exactly one RESULT."""
 
     ACCEPTED = messages.reply_header_t.ACCEPTED
     REFUSED = messages.reply_header_t.REFUSED

@@ -66,7 +66,7 @@ class Step:
         self.accepted = asyncio.Event()  # or over
 
     def check(self, name: str) -> None:
-        """Of one that is over: raises what has become of this motor, unless it stands at its target."""
+        """For one that is over: raises what has become of this motor, unless it stands at its target."""
         result = self.task.result()
         if result is None or name in self.never_began:
             result = model.MoveResult(Outcome.STOPPED, f"{name}: stopped before it began")

@@ -74,7 +74,7 @@ class Exchange:
         return self.error is not None or self.outcome is not None
 
     def take(self, reply: Reply, now: float) -> None:
-        """Of one that is not over."""
+        """Takes a reply to one that is not over."""
         if reply.phase is Phase.REFUSED:
             # Who has accepted it does not refuse it: then it is no longer known what became of it.
             self.error = Refused(reply.reason) if not self.accepted else ResultUnknown(

@@ -54,7 +54,7 @@ class StatusCollector:
         return True
 
     def _read(self, index: int) -> None:
-        """Of what was put off of this MCU the newest one that is a state: others may hold anything."""
+        """Reads the newest state among what was put off for this MCU; the others may hold anything."""
         for unread in sorted(self._unread.pop(index, []), key=operator.attrgetter("sequence"), reverse=True):
             state = codec.decode("STATE", unread.content)
             if isinstance(state, Part):
@@ -113,7 +113,7 @@ class StatusCollector:
         )
 
     def _motors(self, index: int, state: Part, description: Part) -> list[model.Motor]:
-        """Of one MCU; while the same is told of them, the same ones."""
+        """The motors of one MCU; the same objects while the same is told of them."""
         known = self._made.get(index)
         if known is not None and _tell_the_same(known[0], state) and _tell_the_same(known[1], description):
             return known[2]
@@ -128,7 +128,7 @@ class StatusCollector:
 
 
 def _tell_the_same(before: Part, part: Part) -> bool:
-    """Of motors, as they are read: what was told before is not made anew (messages.py)."""
+    """Whether both tell the same of the motors: what was told before is not made anew (messages.py)."""
     old, new = before.content, part.content
     return old.mcu == new.mcu and len(old.motors) == len(new.motors) and all(map(operator.is_, old.motors, new.motors))
 

@@ -15,7 +15,7 @@ LookUp = Callable[[str], Iterable[str]]
 
 
 def addresses(host: str) -> list[str]:
-    """Of this name. Raises OSError."""
+    """The addresses of this name. Raises OSError."""
     return [str(found[4][0]) for found in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)]
 
 

@@ -37,7 +37,7 @@ Deliver = Callable[[Record], None]
 
 
 class Asks:
-    """Of the motors of one daemon. `names`: of the motors, by record."""
+    """What is asked of the motors of one daemon. `names`: of the motors, by record."""
 
     def __init__(self, people: People, names: dict[Record, str], deliver: Deliver) -> None:
         self._people = people

@@ -77,7 +77,7 @@ class Board:
 
     @staticmethod
     def next_number() -> int:
-        """Of asks of all records."""
+        """The next number, common to asks of all records."""
         return next(_numbers)
 
 

@@ -182,7 +182,7 @@ class Circuit(caproto_server.VirtualCircuit):
             await self.context.circuit_disconnected(self)
 
     def _bytes_of(self, command: Any) -> list[Any]:
-        """Of values only while they are subscribed to."""
+        """What is sent: values only while they are subscribed to."""
         if command is None:
             return []
         if isinstance(command, (Event, caproto.EventAddResponse)):

@@ -79,7 +79,7 @@ class Log:
 
 @dataclasses.dataclass(frozen=True)
 class Ask:
-    """Of the daemon; answered by `accepted`, `refused`, `ended` or `lost` of the record, with its number."""
+    """Something asked of the daemon; answered by `accepted`, `refused`, `ended` or `lost` of the record, with its number."""
 
     number: int
     who: Any  # who has asked for it, as the shell knows people

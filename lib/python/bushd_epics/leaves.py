@@ -53,7 +53,7 @@ class Leaves:
             channel.take_alarm()
 
     def describe(self, unit: str, precision: int) -> None:
-        """Of those that are positions of a motor."""
+        """Describes those that are positions of a motor."""
         for name, channel in self._channels.items():
             if self._fields[name].is_position:
                 channel.describe(unit, precision, 0.0, 0.0)

@@ -53,7 +53,7 @@ class Job:
 
 @dataclasses.dataclass
 class Ending:
-    """Of a motion that is over but for the time to settle, or for the motor to be heard of."""
+    """How a motion ends that is over but for the time to settle, or for the motor to be heard of."""
 
     until: float
     tokens: list[Any]

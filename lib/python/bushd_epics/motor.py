@@ -59,7 +59,7 @@ def seen_at_end(before: Seen, result: model.MotorResult) -> Seen:
 
 
 def speeds(table: model.Table, entry: model.TableEntry, step: float, max_speed: float | None, share: float) -> Speeds:
-    """Of a motor with this table. `share`: of the table's acceleration; `max_speed`: not exceeded, in units a second.
+    """The speeds of a motor with this table. `share`: of the table's acceleration; `max_speed`: not exceeded, in units a second.
 
     A ramp is as long as its delays together down to the shortest one that is used.
     """

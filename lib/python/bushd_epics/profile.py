@@ -308,7 +308,7 @@ class Profile(Variables[Check | Fly | Abort]):
     # -- for the above
 
     def _points(self, where: Where) -> Points:
-        """Of what was put. Raises BadProfile."""
+        """The points that were put. Raises BadProfile."""
         values = self.values
         count = int(values["NumPoints"])
         axes = tuple(axis for axis in range(1, len(self.motors) + 1) if values[f"M{axis}UseAxis"])
@@ -377,7 +377,7 @@ def _position(seen: Seen) -> float:
 
 
 def severity(field: str, value: int) -> int:
-    """Of the alarm that a variable of states and ends has, by its number."""
+    """The severity of the alarm that a variable of states and ends has, by its number."""
     if field.endswith("State"):
         return 1 if value else 0
     if field.endswith("Status"):

@@ -198,7 +198,7 @@ def _is_waited_for(operation: Any) -> bool:
 
 
 def _host(peer: str) -> str:
-    """Of "10.0.0.1:4711" or "[::1]:4711"."""
+    """The host of "10.0.0.1:4711" or "[::1]:4711"."""
     host = peer.rpartition(":")[0].strip("[]")
     try:
         address = ipaddress.ip_address(host)

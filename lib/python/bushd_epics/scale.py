@@ -36,7 +36,7 @@ class Scale:
 
 @functools.lru_cache(maxsize=1024)
 def resolution(steps_per_unit: str) -> float:
-    """Of a motor with so many steps in a unit, as bushd tells it: "320", "12.5" or "1/3"; "" of one whose unit is steps."""
+    """The resolution of a motor with so many steps in a unit, as bushd tells it: "320", "12.5", "1/3", or "" where its unit is steps."""
     parts = [fractions.Fraction(part) for part in (steps_per_unit or "1").split("/")]
     value = parts[0] / (parts[1] if len(parts) > 1 else 1)
     return float(1 / value) if value > 0 else 1.0

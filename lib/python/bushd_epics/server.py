@@ -169,7 +169,7 @@ class Server(Context):
         self._profiles[begins] = profile, leaves
 
     def make_common(self) -> None:
-        """Of all motors."""
+        """Makes what is common to all motors."""
         stop = channels.make(Kind.SHORT, 0, (), caproto.ChannelAlarm(), "bo")
         stop.putter = self._put_all_stop
         defer = channels.make(Kind.SHORT, 0, (), caproto.ChannelAlarm(), "bo")
@@ -225,7 +225,7 @@ class Server(Context):
         return pages.beside(field)
 
     async def look_up_names(self) -> None:
-        """Of hosts that may put, as long as some were not found: at boot the network may not be there yet."""
+        """Looks up the hosts that may put, as long as some were not found: at boot the network may not be there yet."""
         while True:
             await asyncio.sleep(LOOK_UP_EVERY_S)
             found = bool(self.access.unknown) and await asyncio.to_thread(self.access.look_up)

@@ -11,7 +11,7 @@ from collections.abc import Hashable, Iterable
 
 
 class Turn:
-    """Of something that is asked for."""
+    """The turn of something that is asked for."""
 
     def __init__(self, who: str | None, records: Iterable[Hashable], before: list[Turn]) -> None:
         """`who`: of whose connection; None: it goes over that of somebody else."""

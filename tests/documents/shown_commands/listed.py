@@ -47,5 +47,5 @@ class Listed:
 
 
 def words_of(text):
-    """Of a command line, or of a program that has it as a list; with a line's continuation."""
+    """The words of a command line, or of a program that has it as a list; with a line's continuation."""
     return re.sub(r"[\s\"',()\\]+", " ", text).rstrip()

@@ -190,7 +190,7 @@ def unroff(text):
 
 
 def shown_in_manual(page, text):
-    """Of a manual page, or its template."""
+    """What a manual page shows, or its template."""
     lines = text.splitlines()
     shown = []
     within = False

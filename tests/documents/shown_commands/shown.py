@@ -58,7 +58,7 @@ def shown_by_help():
 
 
 def what_is_missing(text):
-    """Of a command that is only named, or of a part of one: '' if the program has this subcommand and these options."""
+    """What a command that is only named, or a part of one, lacks: '' if the program has this subcommand and these options."""
     name, *words = text.removeprefix("sudo ").split()
     program = str(SOURCE / "tools/flash" / name if name == "bushd-flash" else BUILD / "bin" / name)
     names = list(itertools.takewhile(re.compile("[a-z][a-z-]*").fullmatch, words))

@@ -54,7 +54,7 @@ class Stuck(Exception):
 
 
 def world_file(page):
-    """Of docs/camac.md it is worlds/camac.toml, of README.md worlds/README.toml, of docs/README.md worlds/docs.toml."""
+    """For docs/camac.md worlds/camac.toml, for README.md worlds/README.toml, for docs/README.md worlds/docs.toml."""
     path = pathlib.Path(page)
     name = "docs" if page == "docs/README.md" else path.name.split(".")[0]
     return HERE / "worlds" / f"{name}.toml"

@@ -314,6 +314,12 @@ TEST(Bushctl, ACommandThatIsNoneIsNamedWithTheNearest) {
   EXPECT_THAT(far.err, HasSubstr("there is no command \"dance\" ('bushctl --help'"));
 }
 
+TEST(Bushctl, HelpOfACommandWithoutAWordOfItsOwnTellsTheExitCodes) {
+  const Ran ran = bushctl({"enable", "--help"});
+  EXPECT_EQ(ran.code, 0);
+  EXPECT_THAT(ran.out, HasSubstr("Exit codes: 0 done, 1 refused"));
+}
+
 TEST(Bushctl, NotANumberIsNoTime) {
   const Ran ran = bushctl({"status", "--timeout-s", "nan"});
   EXPECT_EQ(ran.code, 2);

@@ -26,7 +26,7 @@ def delays_of(table, steps):
 
 
 def sha256_of(table):
-    """Of what moves a motor, by the rule in docs/tables.md."""
+    """The checksum of what moves a motor, by the rule in docs/tables.md."""
     accel = table["accel"]
     decel = table.get("decel", accel[::-1])
     numbers = [table["time_unit_ns"], table.get("cruise", accel[-1]), len(accel)] + accel + decel

@@ -19,7 +19,7 @@ def run(script, *arguments, path):
 
 
 class Setup(unittest.TestCase):
-    """Of a system without apt, where only these programs are found."""
+    """A system without apt, where only these programs are found."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
