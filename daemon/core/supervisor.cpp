@@ -119,7 +119,10 @@ void Supervisor::goes_offline(std::int64_t now_us, Mcu& mcu) {
   const std::int64_t heard_utime_us =
       outputs_.wall_clock_us() - (now_us - heard_[mcu.id].report_us);
   // Before the services end their motion.
-  for (const MotorId motor : mcu.motors()) installation_[motor].goes_offline(heard_utime_us);
+  for (const MotorId motor : mcu.motors()) {
+    installation_[motor].goes_offline(heard_utime_us,
+                                      installation_.drives()[motor].moved_by_people());
+  }
   for (Service* service : services_) service->goes_offline(mcu, cause);
   installation_.changed = true;
 }
@@ -144,7 +147,7 @@ void Supervisor::reports(std::int64_t now_us, Mcu& mcu) {
 
 void Supervisor::misses_start(const Mcu& mcu, Output output) {
   const auto id = mcu.motor_at(output);
-  if (id && installation_[*id].has_missed_start(mcu.report())) moves_.misses_start(*id);
+  if (id && installation_[*id].start_of_run().is_missed(mcu.report())) moves_.misses_start(*id);
 }
 
 void Supervisor::is_uncertain(const Mcu& mcu, Output output) {

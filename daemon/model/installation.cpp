@@ -128,7 +128,6 @@ void Installation::add_motors() {
             .mcu = mcu.id,
             .output = config.output,
             .has_home = config.home.has_value(),
-            .local = config.drive.moved_by_people(),
             .restored_refused = config.restored_refused,
             .limit_immediate = config.limit_action == BUSHD_STOP_IMMEDIATE,
             .emergency_stop_immediate = bus.emergency_stop != BUSHD_STOP_RAMP,
@@ -340,13 +339,13 @@ void Installation::put(MotorId id, const config::Drive& drive) {
   for (const MotorId other : motors_.ids()) {
     if (config_[other].mcu == config_[id].mcu) drives_[other].phase_sequence = drive.phase_sequence;
   }
-  if (other_table) motors_[id].set_axis(new_axis(id));
+  if (other_table) motors_[id].axis() = new_axis(id);
 }
 
 void Installation::put_in_service(GroupId group, tables::TablePtr table) {
   tables_[group] = std::move(table);
   for (const MotorId id : motors_.ids()) {
-    if (config_[id].group == group) motors_[id].set_axis(new_axis(id));
+    if (config_[id].group == group) motors_[id].axis() = new_axis(id);
   }
 }
 

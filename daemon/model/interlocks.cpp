@@ -31,7 +31,7 @@ Result<void> Interlocks::may_home(MotorId motor) const {
   if (auto may = may_move_by(mcu); !may) return may;
   for (const MotorId other : mcu.motors()) {
     if (!mcu.offers.one_at_a_time || other == motor || !installation_[other].has_plan()) continue;
-    return fail(installation_[other].busy_text() + ", and the board " + mcu.name() +
+    return fail(motion::busy_text(installation_[other]) + ", and the board " + mcu.name() +
                 " moves one motor at a time; wait for its end, or stop it");
   }
   for (const ForMotor& check : for_motor_) {

@@ -156,7 +156,7 @@ void CamacMotors::move(std::int64_t now_us, Bushd2& module, const tables::TableP
   const motion::Motor& motor = installation_[id];
   if (motion_->to_stop || motor.has_plan()) {
     warn(id, motion_->to_stop ? motor.name() + ": stopped before it began"
-                              : motor.busy_text() + ", by another's request");
+                              : motion::busy_text(motor) + ", by another's request");
     motion_.reset();
     return module.ends({});
   }

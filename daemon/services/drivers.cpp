@@ -131,7 +131,7 @@ Result<void> Drivers::may(std::uint8_t action, const std::vector<McuId>& mcus) c
     for (const MotorId motor : installation_[id].motors()) {
       if (installation_[motor].is<motion::Resting>()) continue;
       const bool armed = installation_[motor].is<motion::Armed>();
-      return fail(installation_[motor].busy_text() + "; run " +
+      return fail(motion::busy_text(installation_[motor]) + "; run " +
                   words::remedy(armed ? "disarm" : "stop", installation_[motor].name()) + " first");
     }
   }

@@ -92,7 +92,7 @@ void HomingQueue::request(const api::Asker& asker, const api::Home& request) {
     if (!request.all) {
       add(std::move(task));
     } else {
-      installation_[motor].home();
+      installation_[motor].give_to_mcu(motion::Homing{});
       sequence_->later.push_back(std::move(task));
     }
   }
@@ -105,7 +105,7 @@ bool HomingQueue::empty() const {
 
 void HomingQueue::add(Task task) {
   Mcu& mcu = installation_.mcu_of(task.motor);
-  installation_[task.motor].home();
+  installation_[task.motor].give_to_mcu(motion::Homing{});
   queues_[mcu.id].push_back(std::move(task));
   if (queues_[mcu.id].size() == 1) begin(mcu);
   installation_.changed = true;
@@ -195,16 +195,12 @@ void HomingQueue::found(Mcu& mcu) {
 // Nobody else has a motor that is being homed, up to the moment at which it moves.
 void HomingQueue::move_on(std::int64_t now_us, Mcu& mcu) {
   Task& task = queues_[mcu.id].front();
-  motion::Motor& motor = installation_[task.motor];
   const auto ready = kept_.make_ready(now_us, task.motor);
   if (ready && !*ready) return;
   kept_.not_wanted(task.motor);
   constexpr const char* kStays = "homed, but it does not move on: ";
-  if (!ready) {
-    motor.end_homing(true);
-    return end(mcu, Outcome::kFault, kStays + ready.error().text());
-  }
-  motor.end_homing(true);
+  release(task.motor, true);
+  if (!ready) return end(mcu, Outcome::kFault, kStays + ready.error().text());
   task.phase = Phase::kMovingOn;
   const double then = *installation_.config()[task.motor].home->then;
   const auto target = moves_.go_on(now_us, task.motor, api::UserUnits{then});
@@ -236,9 +232,15 @@ void HomingQueue::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   begin(mcu);
 }
 
+void HomingQueue::release(MotorId id, bool found) {
+  motion::Motor& motor = installation_[id];
+  if (found && motor.is<motion::Homing>()) motor.trust().is_known();
+  motor.take_from_mcu(motion::Homing{});
+}
+
 void HomingQueue::ended(MotorId id, Outcome outcome, const std::string& reason) {
   kept_.not_wanted(id);
-  installation_[id].end_homing(outcome == Outcome::kReached);
+  release(id, outcome == Outcome::kReached);
   open_.end(id, outcome, reason);
   follow_sequence(id, outcome == Outcome::kReached, reason);
 }
@@ -309,7 +311,7 @@ bool HomingQueue::end_if_waiting(MotorId id, const std::string& because) {
   }
   if (task == queue.end()) return false;
   if (task->phase == Phase::kFound) {
-    installation_[id].end_homing(true);
+    release(id, true);
     end(installation_.mcu_of(id), Outcome::kStopped,
         "homed; " + (because == kNotItsTurn ? "stopped before it moved on" : because));
     return true;

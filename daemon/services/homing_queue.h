@@ -84,6 +84,8 @@ class HomingQueue final : public Service {
   void give_up(Task& task, const std::string& because);
   // The first of the queue.
   void end(Mcu& mcu, api::Outcome outcome, const std::string& reason);
+  // Its MCU has it no more.
+  void release(MotorId motor, bool found);
   // It is in no queue any more.
   void ended(MotorId motor, api::Outcome outcome, const std::string& reason);
   void follow_sequence(MotorId motor, bool good, const std::string& reason);

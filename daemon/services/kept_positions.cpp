@@ -85,7 +85,7 @@ Result<void> KeptPositions::may_be_confirmed(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   if (auto online = installation_.mcu_of(id).must_be_online(); !online) return online;
   if (!motor.is<motion::Resting>()) {
-    return fail(motor.busy_text() + "; its position can be confirmed at rest only");
+    return fail(motion::busy_text(motor) + "; its position can be confirmed at rest only");
   }
   if (!being_restored(id) && !positions_.counter_being_set(id)) return {};
   return fail(motor.name() + ": its position is being set; wait for that result");
@@ -361,7 +361,8 @@ void KeptPositions::keep_heard(const Mcu& mcu) {
     const motion::Motor& motor = installation_[id];
     state::Record record = *kept;
     record.steps = motor.position_steps();
-    record.utime_us = motor.position_trust({}).heard_utime_us.value_or(outputs_.wall_clock_us());
+    record.utime_us =
+        motion::position_trust(motor, {}).heard_utime_us.value_or(outputs_.wall_clock_us());
     const bool is_its_own = state::same_counter(record, {.unique_id = heard->unique_id,
                                                          .output = motor.output().value}) &&
                             record.boot_number == heard->boot_number;

@@ -37,7 +37,7 @@ void Lines::request(std::int64_t now_us, const api::Asker& asker, const api::Mov
       *motors, [this](MotorId motor) { return installation_[motor].has_plan(); });
   for (const MotorId motor : *motors) {
     if (!installation_[motor].is<motion::Armed>()) continue;
-    return asker.answer(api::Refused{installation_[motor].busy_text() + "; run " +
+    return asker.answer(api::Refused{motion::busy_text(installation_[motor]) + "; run " +
                                      words::remedy("disarm", installation_[motor].name()) +
                                      " first, or wait for it"});
   }
@@ -198,8 +198,8 @@ void Lines::begin_run(std::int64_t now_us, std::uint64_t number, Line& line,
     share.line = number;
     share.in_mcus = by_mcus;
     const BusId bus = installation_.mcu_of(line.motors[i]).config.bus;
-    motor.start_line(on_line, std::move(share), start.at(bus),
-                     straight == nullptr ? 0 : straight->way.shortest_delay());
+    motor.line().start(on_line, std::move(share), start.at(bus),
+                       straight == nullptr ? 0 : straight->way.shortest_delay());
   }
   moves_.begin_on_line(motors, pace);
 }
@@ -252,7 +252,7 @@ std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us, const Line& 
 
 std::uint32_t Lines::place_of(MotorId motor, bool anew) const {
   const motion::Axis& axis = installation_[motor].axis();
-  const bool not_begun = anew && (installation_[motor].is_late() || only_waits(motor));
+  const bool not_begun = anew && (motion::is_late(installation_[motor]) || only_waits(motor));
   return not_begun ? axis.line()->from : axis.line_planned_end();
 }
 
@@ -301,13 +301,14 @@ bool Lines::follow(std::int64_t now_us, std::uint64_t number, Line& line) {
 // It makes no step of the run, and is not told of it.
 bool Lines::only_waits(MotorId motor) const {
   const motion::Axis& axis = installation_[motor].axis();
-  const bool would_begin = installation_[motor].is_late() || installation_[motor].is_withdrawn();
+  const bool would_begin =
+      motion::is_late(installation_[motor]) || motion::is_withdrawn(installation_[motor]);
   return !would_begin && axis.end_tick() <= axis.start_tick();
 }
 
 bool Lines::begins_anew(std::uint64_t number, const Line& line) const {
   return std::ranges::any_of(line.motors, [&](MotorId id) {
-    return on_line(id, number) != nullptr && installation_[id].is_late();
+    return on_line(id, number) != nullptr && motion::is_late(installation_[id]);
   });
 }
 
@@ -317,7 +318,7 @@ void Lines::end_split_start(std::uint64_t number, const Line& line) {
   for (const MotorId id : line.motors) {
     const motion::Motor& motor = installation_[id];
     if (on_line(id, number) == nullptr) continue;
-    if (motor.is_late()) {
+    if (motion::is_late(motor)) {
       late.push_back(id);
     } else {
       begun = begun || moves_.has_begun(id);
@@ -326,7 +327,7 @@ void Lines::end_split_start(std::uint64_t number, const Line& line) {
   if (!begun && line.tries < CommonStarts::kMostTries) return;
   for (const MotorId id : late) {
     motion::Motor& motor = installation_[id];
-    moves_.end(id, *motor.end(api::Outcome::kLink, motor.did_not_start()));
+    moves_.end(id, *motor.end(api::Outcome::kLink, motor.start_of_run().missed_text()));
   }
 }
 

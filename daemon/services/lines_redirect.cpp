@@ -140,7 +140,7 @@ void Lines::redirect(std::int64_t now_us, const api::Asker& asker,
     motion::OnLine now = *installation_[line.motors[i]].as<motion::OnLine>();
     now.target_steps = to.steps[i];
     now.last_run = true;
-    installation_[line.motors[i]].aim_on_line(now, *step, way.shortest_delay());
+    installation_[line.motors[i]].line().aim(now, *step, way.shortest_delay());
   }
   open(asker, *number, line);
   moves_.redirect_on_line(now_us, line.motors);

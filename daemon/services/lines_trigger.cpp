@@ -38,7 +38,7 @@ Result<Line> Lines::line_to_arm(const api::ArmLine& request) const {
   for (const MotorId id : *motors) {
     const motion::Motor& motor = installation_[id];
     if (!motor.has_plan()) continue;
-    return fail(motor.busy_text() + "; run " +
+    return fail(motion::busy_text(motor) + "; run " +
                 words::remedy(motor.moves() ? "stop" : "disarm", motor.name()) + " first");
   }
   if (const auto delay = check_trigger_delay(request.delay_us); !delay) return fail(delay.error());
@@ -139,8 +139,8 @@ void Lines::arm(const api::ArmLine& request, std::uint64_t number, Line& line) {
     on_line.target_steps = line.end_of(i);
     on_line.last_run = line.legs() == 1;
     const McuId mcu = installation_.config()[line.motors[i]].mcu;
-    installation_[line.motors[i]].arm_line(numbers[mcu], on_line, std::move(shares[i]),
-                                           shortest_delay);
+    installation_[line.motors[i]].line().arm(numbers[mcu], on_line, std::move(shares[i]),
+                                             shortest_delay);
   }
   installation_.changed = true;
 }

@@ -132,7 +132,7 @@ std::vector<MotorId> MotorSettings::changed_by(MotorId id, SettingKey key) const
 Result<void> MotorSettings::may_be_changed(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   constexpr const char* kAtRest = "; what bushd.toml says of it can be changed at rest only";
-  if (!motor.is<motion::Resting>()) return fail(motor.busy_text() + kAtRest);
+  if (!motor.is<motion::Resting>()) return fail(motion::busy_text(motor) + kAtRest);
   if (about_to_move_(id)) return fail(motor.name() + " is about to move" + kAtRest);
   if (!positions_.being_set(id)) return {};
   return fail(motor.name() + ": its position is being set; wait for that result");
@@ -250,7 +250,6 @@ void MotorSettings::put(MotorId id, const config::Settings& settings) {
   installation_[id].scale().set_max_speed(settings.max_speed);
   if (settings.drive != installation_.drives()[id]) {
     installation_.put(id, settings.drive);
-    installation_[id].set_local(settings.drive.moved_by_people());
     Mcu& mcu = installation_.mcu_of(id);
     mcu.bus().reconfigure(mcu.on_bus(), installation_.setup_of(mcu.id));
   }

@@ -103,7 +103,7 @@ Result<units::Steps> Moves::target_of(MotorId id, const api::Amount& amount, api
 // A motor that moves is given to another move: what it was moving or stopping for has ended.
 void Moves::take_over(const std::vector<MotorId>& motors, const api::Asker& by) {
   for (const MotorId motor : motors) {
-    installation_[motor].jogs(false);
+    installation_[motor].set_jogs(false);
     open_.not_stopped(motor);
     open_.end(motor, api::Outcome::kStopped,
               "was given a new target by " + text_of(by) + "; it moves on");
@@ -116,7 +116,7 @@ void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::i
   motion::Motor& motor = installation_[id];
   if (motor.has_plan()) take_over({id}, asker);
   open_.open(asker, {id}, OpenMoves::Purpose::kJog);
-  motor.jogs(true);
+  motor.set_jogs(true);
   motor.go_on({});
   if (!motor.stands()) return redirect(now_us, id, target, shortest_delay);
   open_.planned(id, 1, motor.axis().most_steps_per_s(shortest_delay));
@@ -125,7 +125,7 @@ void Moves::jog(std::int64_t now_us, const api::Asker& asker, MotorId id, std::i
 
 void Moves::redirect(std::int64_t now_us, MotorId id, std::int64_t target,
                      bushd_delay shortest_delay) {
-  if (installation_[id].is_withdrawn()) starts_.begin({id});
+  if (motion::is_withdrawn(installation_[id])) starts_.begin({id});
   installation_[id].aim(target, shortest_delay);
   open_.planned(id, 1, installation_[id].axis().most_steps_per_s(shortest_delay));
   retarget(now_us, {id});
@@ -175,12 +175,12 @@ void Moves::pause(std::int64_t now_us, const std::vector<MotorId>& motors) {
   while (begins()) begin_next();
   std::vector<MotorId> changed;
   for (const MotorId id : motors) {
-    if (installation_[id].is_late()) {
+    if (motion::is_late(installation_[id])) {
       pause_late(id);
       continue;
     }
     installation_[id].pause();
-    if (installation_[id].needs_change()) changed.push_back(id);
+    if (installation_[id].axis().needs_change()) changed.push_back(id);
   }
   replan(now_us, changed);
 }
@@ -206,14 +206,14 @@ void Moves::stop(std::int64_t now_us, const std::vector<MotorId>& motors) {
   std::vector<MotorId> changed;
   std::vector<MotorId> armed;
   for (const MotorId id : installation_.with_lines(motors)) {
-    if (unbegun_.contains(id) || installation_[id].is_late()) {
+    if (unbegun_.contains(id) || motion::is_late(installation_[id])) {
       cancel(id, "stopped before it began");
       continue;
     }
     motion::Motor& motor = installation_[id];
     motor.stop();
     if (motor.is<motion::Armed>()) armed.push_back(id);
-    if (motor.needs_change()) changed.push_back(id);
+    if (motor.axis().needs_change()) changed.push_back(id);
   }
   disarm(armed);
   replan(now_us, changed);
@@ -252,7 +252,7 @@ void Moves::step(std::int64_t now_us) {
   start_anew(now_us);
   std::vector<MotorId> now;
   std::erase_if(to_retarget_, [&](MotorId id) {
-    const bool needed = installation_[id].needs_change();
+    const bool needed = installation_[id].axis().needs_change();
     if (needed && !has_time_to_retarget(now_us, id)) return false;
     if (needed) now.push_back(id);
     return true;

@@ -36,7 +36,7 @@ void Moves::start(std::int64_t now_us, const api::Asker& asker, const std::vecto
   for (const Part& part : parts) {
     motion::Motor& motor = installation_[part.motor];
     if (!motor.stands()) {
-      if (motor.is_withdrawn()) starts_.begin({part.motor});
+      if (motion::is_withdrawn(motor)) starts_.begin({part.motor});
       motor.aim(part.legs.front().target, part.legs.front().shortest_delay);
     } else {
       plan_start({part.motor, part.legs.front()},
@@ -111,16 +111,16 @@ bool Moves::by_table(MotorId id, std::int64_t steps, bushd_delay shortest_delay)
 void Moves::misses_start(MotorId id) {
   motion::Motor& motor = installation_[id];
   Mcu& mcu = installation_.mcu_of(id);
-  if (motor.is_late()) return;
+  if (motion::is_late(motor)) return;
   // More time does not help against a frame that is lost now and then.
   const bool lost_once =
       starts_.is_first(id) && mcu.bus().start_was_lost(mcu.on_bus(), motor.output().value);
-  if (!motor.is_withdrawn() && !lost_once) mcu.bus().start_missed();
+  if (!motion::is_withdrawn(motor) && !lost_once) mcu.bus().start_missed();
   const bool on_line = motor.is<motion::OnLine>();
   // Buses without streams miss a start for another reason than time.
   const bool may = mcu.offers.streams && (on_line || starts_.waits(id));
-  if (!may || !motor.awaits_new_start()) {
-    return end(id, *motor.end(api::Outcome::kLink, motor.did_not_start()));
+  if (!may || !motor.start_of_run().awaits_new()) {
+    return end(id, *motor.end(api::Outcome::kLink, motor.start_of_run().missed_text()));
   }
   mcu.bus().drop(mcu.on_bus(), motor.output().value);
   journal_.ended(id, "late");
@@ -137,7 +137,7 @@ void Moves::withdraw_start(std::int64_t now_us, const Bus& bus, motion::Tick at)
     for (const MotorId id : installation_[mcu].motors()) {
       motion::Motor& motor = installation_[id];
       const bool begins = motor.moves() && motor.axis().start_tick() == at;
-      if (begins && motor.withdraw()) withdrawn.push_back(id);
+      if (begins && motor.start_of_run().withdraw()) withdrawn.push_back(id);
     }
   }
   plan(now_us, withdrawn);
@@ -168,7 +168,7 @@ void Moves::follow_start(MotorId id) {
   if (installation_.mcu_of(id).view().tick <= axis.start_tick()) return;
   if (has_moved(id)) return starts_.begins(id);
   const bool cancelled = axis.end_tick() <= axis.start_tick();
-  if (cancelled && !installation_[id].is_withdrawn()) starts_.leaves(id);
+  if (cancelled && !motion::is_withdrawn(installation_[id])) starts_.leaves(id);
 }
 
 void Moves::start_anew(std::int64_t now_us) {
@@ -176,7 +176,7 @@ void Moves::start_anew(std::int64_t now_us) {
   if (decision.end.empty() && decision.again.empty()) return;
   for (const MotorId id : decision.end) {
     motion::Motor& motor = installation_[id];
-    end(id, *motor.end(api::Outcome::kLink, motor.did_not_start()));
+    end(id, *motor.end(api::Outcome::kLink, motor.start_of_run().missed_text()));
   }
   std::vector<FirstLeg> legs;
   for (const MotorId id : decision.again) legs.push_back({id, installation_[id].take_leg()});
@@ -184,9 +184,9 @@ void Moves::start_anew(std::int64_t now_us) {
   const bool at_once = !begins() && legs.size() <= kBeginsPerSlice;
   const std::map<BusId, link::CommonStart> start = starts_of(now_us, legs, at_once);
   for (const FirstLeg& leg : legs) {
-    const motion::Motor& motor = installation_[leg.motor];
+    motion::Motor& motor = installation_[leg.motor];
     outputs_.log(LogLevel::kInfo, leg.motor,
-                 motor.name() + ": " + motor.did_not_start() + ", and begins anew");
+                 motor.name() + ": " + motor.start_of_run().missed_text() + ", and begins anew");
     plan_start(leg, start.at(installation_.mcu_of(leg.motor).config.bus));
     to_begin_.push_back(leg.motor);
   }
@@ -206,7 +206,7 @@ void Moves::begin_next() {
 
 void Moves::end_overtaken(std::int64_t) {
   for (const MotorId id : std::set<MotorId>(unbegun_)) {
-    if (installation_[id].is_late()) continue;  // its request has been carried out once
+    if (motion::is_late(installation_[id])) continue;  // its request has been carried out once
     const auto by = open_.precedence().overtaken(open_.asker_of(id)->after_stops, {id});
     if (!by) continue;
     open_.stopped_by({id}, by->by);
@@ -217,7 +217,7 @@ void Moves::end_overtaken(std::int64_t) {
 // Nobody has been told of it, nor does the log of moves know of it.
 void Moves::cancel(MotorId id, const std::string& reason) {
   motion::Motor& motor = installation_[id];
-  const bool late = motor.is_late();
+  const bool late = motion::is_late(motor);
   unbegun_.insert(id);
   motion::event::Ended ended = *motor.end(api::Outcome::kStopped, reason);
   ended.by_plan = late;  // as one that is stopped in motion

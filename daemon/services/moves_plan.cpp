@@ -72,7 +72,7 @@ std::map<McuId, motion::Tick> Moves::ticks_to_change_at(std::int64_t now_us,
     const Mcu& mcu = installation_.mcu_of(id);
     const motion::Axis& axis = installation_[id].axis();
     const std::vector<link::ToReplace>& of_bus = together.at(mcu.config.bus);
-    const bool begins_not = installation_[id].is_withdrawn() &&
+    const bool begins_not = motion::is_withdrawn(installation_[id]) &&
                             !link::too_late(axis.start_tick(), mcu.bus().tick_at(now_us));
     const motion::Tick first = begins_not ? axis.start_tick()
                                : axis.stopping()
@@ -153,7 +153,7 @@ void Moves::plan(std::int64_t now_us, const std::vector<MotorId>& motors) {
     const McuId mcu = installation_.config()[id].mcu;
     const auto bit = static_cast<std::uint16_t>(1u << motor.output().value);
     masks[mcu] &= static_cast<std::uint16_t>(~bit);
-    if (motor.change(at.at(mcu), least_end)) masks[mcu] |= bit;
+    if (motor.has_plan() && motor.axis().change(at.at(mcu), least_end)) masks[mcu] |= bit;
   };
   std::set<MotorId> changed;
   for (const MotorId id : motors) {

@@ -22,7 +22,7 @@ std::string Pauses::left_alone(MotorId id) const {
   if (motor.is<motion::Armed>()) return "waiting for the trigger";
   if (motor.is<motion::Travelling>()) return "travelling by its MCU";
   if (motor.is<motion::Local>()) return "moved by local inputs";
-  if (motor.follows()) return "following a trajectory";
+  if (motion::follows_trajectory(motor)) return "following a trajectory";
   return {};
 }
 
@@ -39,7 +39,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   auto [named, unknown] = installation_.find_known(request.motors, true);
   if (named.empty()) return asker.answer(api::Refused{unknown});
   named = installation_.with_lines(std::move(named));
-  const auto follows = [this](MotorId id) { return installation_[id].follows(); };
+  const auto follows = [this](MotorId id) { return motion::follows_trajectory(installation_[id]); };
   const auto moves = [this](MotorId id) { return installation_[id].moves(); };
   const auto trajectory = std::ranges::find_if(named, follows);
   if (trajectory != named.end() &&
@@ -65,7 +65,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   for (const MotorId motor : named) {
     if (const std::string does = left_alone(motor); !does.empty()) {
       pausing.left[does].push_back(motor);
-      if (installation_[motor].follows()) pausing.outcome = api::Outcome::kFault;
+      if (motion::follows_trajectory(installation_[motor])) pausing.outcome = api::Outcome::kFault;
       continue;
     }
     if (installation_[motor].is<motion::InProgram>()) {

@@ -70,7 +70,7 @@ Result<Positions::Plan> Positions::plan_of(const api::SetPosition& request) cons
 Result<void> Positions::may_be_set(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   if (!motor.is<motion::Resting>()) {
-    return fail(motor.busy_text() + "; its position can be set at rest only");
+    return fail(motion::busy_text(motor) + "; its position can be set at rest only");
   }
   if (being_set(id)) {
     return fail(motor.name() + ": its position is being set; wait for that result");

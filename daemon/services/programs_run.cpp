@@ -96,7 +96,7 @@ void Programs::request(const api::Asker& asker, const api::RunPrograms& request)
   }
   asker.answer(api::Accepted{});
   open_.open(asker, all, OpenMoves::Purpose::kProgram);
-  for (const MotorId motor : all) installation_[motor].enter_program();
+  for (const MotorId motor : all) installation_[motor].give_to_mcu(motion::InProgram{});
   starts_.push_back({.asker = asker, .mcus = std::move(*mcus)});
   installation_.changed = true;
 }
@@ -257,7 +257,7 @@ void Programs::adopt(McuId id) {
   for (const MotorId motor : mcu.motors()) {
     if ((state.motors >> installation_[motor].output().value & 1) == 0) continue;
     if (installation_[motor].has_plan()) continue;
-    installation_[motor].enter_program();
+    installation_[motor].give_to_mcu(motion::InProgram{});
     run.motors.push_back(motor);
   }
   const bool at_power_on = (state.flags & BUSHD_PROGRAM_AT_POWER_ON) != 0;
@@ -340,7 +340,7 @@ void Programs::end(McuId id, Outcome outcome, const std::string& reason) {
   }
   for (const MotorId motor : run.motors) {
     kept_.not_wanted(motor);
-    installation_[motor].leave_program();
+    installation_[motor].take_from_mcu(motion::InProgram{});
     if (run.known) open_.end(motor, outcome, reason);
   }
   installation_.changed = true;

@@ -79,6 +79,10 @@ api::Activity activity_of(const motion::Motor& motor) {
   return motor.is<motion::Local>() ? api::Activity::kLocal : api::Activity::kResting;
 }
 
+double velocity_of(const motion::Motor& motor) {
+  return motor.moves() && !motion::is_late(motor) ? motor.axis().velocity_steps_per_s() : 0.0;
+}
+
 api::MotorState::Line line_of(const Mcu& mcu, const motion::Axis& axis) {
   const double made = axis.line_step();
   const motion::Tick left = std::max<motion::Tick>(axis.over_tick() - mcu.view().tick, 0);
@@ -222,7 +226,7 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
   state.dial = motor.scale().coordinates().dial_of(motor.position_steps());
   state.target_steps = motor.target_steps();
   state.user_target = motor.scale().coordinates().user_of(motor.target_steps());
-  state.velocity_steps_per_s = motor.velocity_steps_per_s();
+  state.velocity_steps_per_s = velocity_of(motor);
   state.activity = activity_of(motor);
   if (motor.is<motion::OnLine>()) state.line = line_of(mcu, motor.axis());
   // Motors follow reports only once their MCU is online; and one that another master moves may not
@@ -239,7 +243,7 @@ api::MotorState StatePublisher::state_of(const Mcu& mcu, const motion::Motor& mo
                      .negative = reports(view.report.forbidden_negative)};
   std::optional<std::uint16_t> boot_number;
   if (view.identified) boot_number = view.identity.boot_number;
-  motion::PositionTrust trust = motor.position_trust(boot_number);
+  motion::PositionTrust trust = motion::position_trust(motor, boot_number);
   const bool good = trust.trust == api::Trust::kKnown || trust.trust == api::Trust::kRestored;
   if (good && view.outdated_us > 0) {
     trust = {api::Trust::kStale,

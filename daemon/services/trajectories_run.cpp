@@ -70,7 +70,7 @@ void Trajectories::run(std::int64_t now_us, const api::Asker& asker, const api::
 
 bool Trajectories::follows(const Loaded& loaded, MotorId motor) const {
   const motion::Motor& of = installation_[motor];
-  return of.follows() && of.axis().trajectory()->trajectory == loaded.followed;
+  return motion::follows_trajectory(of) && of.axis().trajectory()->trajectory == loaded.followed;
 }
 
 void Trajectories::step(std::int64_t now_us) {

@@ -100,7 +100,7 @@ void Travels::request(const api::Asker& asker, MotorId id, const bushd_travel& m
   Task task{.motor = id, .message = message};
   task.message.motor = installation_[id].output().value;
   tasks_[installation_.mcu_of(id).id] = std::move(task);
-  installation_[id].travel();
+  installation_[id].give_to_mcu(motion::Travelling{});
   installation_.changed = true;
 }
 
@@ -195,7 +195,7 @@ void Travels::end(Mcu& mcu, Outcome outcome, const std::string& reason) {
   const Task task = *std::exchange(tasks_[mcu.id], std::nullopt);
   kept_.not_wanted(task.motor);
   motion::Motor& motor = installation_[task.motor];
-  motor.end_travel();
+  motor.take_from_mcu(motion::Travelling{});
   const bool cut = installation_.config()[task.motor].limit_action == BUSHD_STOP_IMMEDIATE;
   if (task.number && cut && mcu.report().homing == BUSHD_TRAVEL_EARLY && mcu.online()) {
     motor.trust().is_uncertain(

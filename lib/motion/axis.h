@@ -138,7 +138,7 @@ class Axis {
   // The plan does not yet do what is wanted, and can be changed: of two changes the first must have
   // been executed (or known to have failed) before the second is planned, for the MCU may have
   // taken it.
-  bool needs_change() const { return stale_ && !change_; }
+  bool needs_change() const { return busy_ && stale_ && !change_; }
 
   // The plan does what is wanted, as far as the table can.
   bool is_planned() const { return !stale_; }

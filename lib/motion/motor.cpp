@@ -9,14 +9,9 @@
 #include "words/remedy.h"
 
 namespace bushd::motion {
-namespace {
 
-constexpr Tick kNever = INT64_MAX / 2;
-
-}  // namespace
-
-std::string Motor::busy_text() const {
-  return name() + (is<Armed>() ? " waits for the trigger" : " moves");
+std::string busy_text(const Motor& motor) {
+  return motor.name() + (motor.is<Armed>() ? " waits for the trigger" : " moves");
 }
 
 void Motor::start(std::int64_t target, Tick start, bushd_delay shortest_delay) {
@@ -30,31 +25,10 @@ void Motor::arm(std::uint8_t number, std::int64_t steps, bushd_delay shortest_de
   axis_.start(position_, steps, kNever, 0, shortest_delay);
 }
 
-void Motor::arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
-                     bushd_delay shortest_delay) {
-  axis_.start_line(position_, std::move(share), kNever, shortest_delay);
-  const std::int64_t steps = axis_.target_steps() - position_;
-  activity_ = Armed{.number = number, .steps = steps, .on_line = on_line};
-}
-
 void Motor::aim(std::int64_t target, bushd_delay shortest_delay) {
   pause_ = Pause::kNo;
   if (moves()) moving_now().withdrawn = false;
   axis_.aim(target, shortest_delay);
-}
-
-void Motor::start_line(const OnLine& on_line, LineShare share, Tick start,
-                       bushd_delay shortest_delay) {
-  activity_ = on_line;
-  pause_ = Pause::kNo;
-  further_.clear();
-  axis_.start_line(position_, std::move(share), start, shortest_delay);
-}
-
-void Motor::aim_on_line(const OnLine& on_line, std::uint32_t line_step,
-                        bushd_delay shortest_delay) {
-  activity_ = on_line;
-  axis_.aim_on_line(line_step, shortest_delay);
 }
 
 void Motor::follow(TrajectoryShare share, Tick start) {
@@ -74,10 +48,18 @@ Leg Motor::take_leg() {
   return next;
 }
 
+bool Motor::stands() const {
+  return !has_plan() || rests_in_pause() || is_late(*this);
+}
+
+bool Motor::stops() const {
+  return axis_.stopping() && !is_withdrawn(*this);
+}
+
 void Motor::pause() {
   if (auto* on_line = std::get_if<OnLine>(&activity_)) on_line->resumes = false;
   if (!moves()) return;
-  if (is_late()) {
+  if (is_late(*this)) {
     pause_ = Pause::kStands;
     return;
   }
@@ -119,33 +101,13 @@ void Motor::stop(std::optional<std::string> ended_by) {
   }
 }
 
-void Motor::home() {
-  activity_ = Homing{};
+void Motor::give_to_mcu(Activity how) {
+  activity_ = std::move(how);
   asked_for_.reset();
 }
 
-void Motor::end_homing(bool found) {
-  if (!is<Homing>()) return;
-  if (found) trust_.is_known();
-  rest();
-}
-
-void Motor::travel() {
-  activity_ = Travelling{};
-  asked_for_.reset();
-}
-
-void Motor::end_travel() {
-  if (is<Travelling>()) rest();
-}
-
-void Motor::enter_program() {
-  activity_ = InProgram{};
-  asked_for_.reset();
-}
-
-void Motor::leave_program() {
-  if (is<InProgram>()) rest();
+void Motor::take_from_mcu(const Activity& how) {
+  if (activity_.index() == how.index()) rest();
 }
 
 void Motor::rest() {
@@ -187,9 +149,9 @@ void Motor::goes_online(const bushd_report& report, bool first, bool restarted) 
   follow_autonomous(report, false);
 }
 
-void Motor::goes_offline(std::int64_t heard_utime_us) {
+void Motor::goes_offline(std::int64_t heard_utime_us, bool moved_by_people) {
   // What waits for a trigger may have had it, and people may use the inputs.
-  const bool in_motion = !is<Resting>() || setup_.local;
+  const bool in_motion = !is<Resting>() || moved_by_people;
   trust_.goes_offline(heard_utime_us, in_motion);
   if (is<Local>()) activity_ = Resting{};
 }

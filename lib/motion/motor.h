@@ -3,7 +3,8 @@
 // comes out. It has no I/O and knows no other motor.
 //
 // Its parts have a purpose each: scale() what its numbers mean, trust() what its position is worth,
-// hold() whether motions may begin, reach() where it may go.
+// hold() whether motions may begin, reach() where it may go, line() its runs on a line with others,
+// start_of_run() what becomes of a start that comes too late.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +19,10 @@
 #include "engine/message.h"
 #include "motion/axis.h"
 #include "motion/motor_hold.h"
+#include "motion/motor_line.h"
 #include "motion/motor_reach.h"
 #include "motion/motor_scale.h"
+#include "motion/motor_start.h"
 #include "motion/motor_trust.h"
 #include "words/amount.h"
 #include "words/words.h"
@@ -33,7 +36,6 @@ struct MotorSetup {
   std::string mcu;  // for texts, as the name
   Output output;
   bool has_home = false;
-  bool local = false;             // people may move it by the inputs at its MCU
   bool restored_refused = false;  // it may not move while its position is only restored
   // Without a ramp, so that it may overrun; with drivers disabled or not.
   bool limit_immediate = false;
@@ -142,7 +144,6 @@ class Motor {
   MotorHold& hold() { return hold_; }
   const MotorHold& hold() const { return hold_; }
 
-  const Activity& activity() const { return activity_; }
   template <class A>
   const A* as() const {
     return std::get_if<A>(&activity_);
@@ -159,29 +160,25 @@ class Motor {
   bool moves() const { return moving() != nullptr; }
   // Its axis has a plan: it moves, or will when the trigger comes.
   bool has_plan() const { return moves() || is<Armed>(); }
-  std::string busy_text() const;  // "theta moves"
 
   // As reported last.
   std::int64_t position_steps() const { return position_; }
-  // `boot_number`: of the MCU now.
-  PositionTrust position_trust(std::optional<std::uint16_t> boot_number) const {
-    return trust_.judged(boot_number, position_, scale().coordinates());
-  }
   // Where it will stand when all is done, and it has been resumed if it is paused. Where it is, as
   // long as nobody has said where it is to stand.
   std::int64_t target_steps() const;
   // Where it was told to go last, while it is there or bound for it.
   const std::optional<units::Steps>& asked_for() const { return asked_for_; }
-  double velocity_steps_per_s() const {
-    return moves() && !is_late() ? axis_.velocity_steps_per_s() : 0.0;
-  }
 
-  // The plan; only while has_plan().
+  // The plan; only while has_plan(). Another table without a plan only.
   Axis& axis() { return axis_; }
   const Axis& axis() const { return axis_; }
 
   // What it may do now.
   MotorReach reach() const { return MotorReach(*this); }
+  // Its runs on a line with others.
+  MotorLine line() { return MotorLine(*this); }
+  // Whether the run that it was given begins at its start.
+  MotorStart start_of_run() { return MotorStart(*this); }
 
   // Requests. Preconditions: it may. Shortest delays are those of Axis.
   // From rest, or from the turning point of a motion.
@@ -189,13 +186,8 @@ class Motor {
   void aim(std::int64_t target, bushd_delay shortest_delay = 0);
   // Where all requests so far lead; nothing: nobody has said that in numbers.
   void ask_for(std::optional<units::Steps> target) { asked_for_ = target; }
-  // As start() and aim(), for a run of a line.
-  void start_line(const OnLine& on_line, LineShare share, Tick start, bushd_delay shortest_delay);
-  void aim_on_line(const OnLine& on_line, std::uint32_t line_step, bushd_delay shortest_delay);
   // From rest, along a trajectory whose first row is where it stands.
   void follow(TrajectoryShare share, Tick start);
-  // Whether it moves along a trajectory.
-  bool follows() const { return moves() && axis_.trajectory().has_value(); }
   // Replaces what comes after the present run.
   void go_on(std::vector<Leg> legs) { further_ = std::move(legs); }
   // Removes and returns the leg that is to be made from where it stands: the rest of the one that
@@ -208,16 +200,14 @@ class Motor {
   bool is_paused() const { return pause_ == Pause::kRamps || stands_paused(); }
   bool stands_paused() const { return pause_ == Pause::kStands; }
   // start() is for it, not aim().
-  bool stands() const { return !has_plan() || rests_in_pause() || is_late(); }
+  bool stands() const;
   // Its motion goes on until somebody ends it: where its runs lead nobody has asked for.
-  void jogs(bool now) {
+  bool jogs() const { return jogs_; }
+  void set_jogs(bool now) {
     jogs_ = now;
     if (now) asked_for_.reset();
   }
-  bool jogs() const { return jogs_; }
   void arm(std::uint8_t number, std::int64_t steps, bushd_delay shortest_delay = 0);
-  void arm_line(std::uint8_t number, const OnLine& on_line, LineShare share,
-                bushd_delay shortest_delay);
   // Moving: ramps down. Armed: as soon as it starts, if the trigger comes before it is disarmed;
   // `ended_by`: why, if nobody has asked for it.
   void stop(std::optional<std::string> ended_by = {});
@@ -227,51 +217,32 @@ class Motor {
     if (moves()) moving_now().by_others = true;
   }
   // Somebody has stopped it, or paused it.
-  bool stops() const { return axis_.stopping() && !is_withdrawn(); }
-  // The plan is not yet what was requested, and can be changed.
-  bool needs_change() const { return moves() && axis_.needs_change(); }
-  // Whether the plan is another one now from this tick on.
-  bool change(Tick at, std::uint32_t least_end = 0) {
-    return has_plan() && axis_.change(at, least_end);
-  }
-  void home();
-  void end_homing(bool found);
-  void travel();
-  void end_travel();
-  void enter_program();
-  void leave_program();
-  void set_local(bool local) { setup_.local = local; }
-  // Another table. Precondition: !has_plan().
-  void set_axis(Axis axis) { axis_ = axis; }
+  bool stops() const;
+  // Its MCU moves it by itself from now on, or is about to: Homing, Travelling or InProgram.
+  void give_to_mcu(Activity how);
+  // It no longer does that. Nothing if it does something else.
+  void take_from_mcu(const Activity& how);
 
   // Its MCU is configured and in step: for the first time, or again; `restarted` if positions do
   // not go on from before.
   void goes_online(const bushd_report& report, bool first, bool restarted);
-  // `heard_utime_us`: when its MCU reported last. To be told while its motion has not been ended.
-  void goes_offline(std::int64_t heard_utime_us);
+  // `heard_utime_us`: when its MCU reported last. `moved_by_people`: they may move it by the inputs
+  // at its MCU. To be told while its motion has not been ended.
+  void goes_offline(std::int64_t heard_utime_us, bool moved_by_people);
   std::vector<Event> report(const Report& report);
-  // Its MCU did not get the first ticks in time. Whether it has missed its start by that: else the
-  // next report says what has become of it.
-  bool has_missed_start(const bushd_report& report) const;
-  // It has missed its start. Whether it may have a new one: then it is late from now on, until it
-  // is started, also while it is paused. On a line it stands where its run was to begin.
-  bool awaits_new_start();
-  bool is_late() const { return moves() && moving()->late; }
-  // It should not begin at its start, and miss it: whether it can. If it begins all the same, it
-  // goes on to its target; on a line it is stopped.
-  bool withdraw();
-  bool is_withdrawn() const { return moves() && moving()->withdrawn; }
-  std::string did_not_start() const;
   // Its motion is over, if there is one.
   std::optional<event::Ended> end(Outcome outcome, std::string reason);
 
  private:
+  friend class MotorLine;
   friend class MotorReach;
+  friend class MotorStart;
+
+  static constexpr Tick kNever = INT64_MAX / 2;  // the start of what waits for the trigger
 
   bool rests_in_pause() const { return pause_ == Pause::kStands || pause_ == Pause::kOver; }
   bool forbidden(int direction) const { return direction > 0 ? forbidden_up_ : forbidden_down_; }
   Moving& moving_now() { return const_cast<Moving&>(*moving()); }
-  bool may_begin_anew() const;
   void follow_withdrawn();
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
   void follow_end_of_line(const Report& report, std::vector<Event>& events);
@@ -310,5 +281,24 @@ class Motor {
   bool forbidden_up_ = false;
   bool forbidden_down_ = false;
 };
+
+std::string busy_text(const Motor& motor);  // "theta moves"
+
+inline bool is_late(const Motor& motor) {
+  return motor.moves() && motor.moving()->late;
+}
+inline bool is_withdrawn(const Motor& motor) {
+  return motor.moves() && motor.moving()->withdrawn;
+}
+
+// It moves along a trajectory.
+inline bool follows_trajectory(const Motor& motor) {
+  return motor.moves() && motor.axis().trajectory().has_value();
+}
+
+// `boot_number`: of its MCU now.
+inline PositionTrust position_trust(const Motor& motor, std::optional<std::uint16_t> boot_number) {
+  return motor.trust().judged(boot_number, motor.position_steps(), motor.scale().coordinates());
+}
 
 }  // namespace bushd::motion

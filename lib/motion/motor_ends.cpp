@@ -85,50 +85,9 @@ event::Ended Motor::end_by_fault(const bushd_report& report) {
   return ended(Outcome::kLink, mcu + " ran it down by itself because " + stop_cause(report));
 }
 
-bool Motor::has_missed_start(const bushd_report& report) const {
-  const bool ran_down = report.faults != 0;
-  // No tick is missed of a move that was cancelled before its start.
-  const bool cancelled = axis_.end_tick() <= axis_.start_tick();
-  const bool limited =
-      has_bit(report.forbidden_positive | report.forbidden_negative, output().value);
-  // Another master may have ended it since.
-  const bool moved = report.motor[output().value].position_steps != axis_.from_steps();
-  return has_plan() && !ran_down && !cancelled && !limited && !moved;
-}
-
-bool Motor::may_begin_anew() const {
-  const bool streamed_line = axis_.line() && !axis_.line()->in_mcus;
-  return moves() && !follows() && !streamed_line;
-}
-
-bool Motor::awaits_new_start() {
-  if (!may_begin_anew()) return false;
-  auto* on_line = std::get_if<OnLine>(&activity_);
-  if (on_line != nullptr) on_line->stands = true;
-  if (is_withdrawn()) {
-    // Nobody has stopped it.
-    const Tick start = axis_.start_tick();
-    if (on_line != nullptr) {
-      axis_.start_line(position_, *axis_.line(), start, axis_.shortest_delay());
-    } else {
-      axis_.start(position_, axis_.target_steps() - position_, start, 0, axis_.shortest_delay());
-    }
-  }
-  moving_now().late = true;
-  moving_now().withdrawn = false;
-  return true;
-}
-
-bool Motor::withdraw() {
-  if (!may_begin_anew() || is_late() || stops() || axis_.open_change()) return false;
-  moving_now().withdrawn = true;
-  axis_.stop();
-  return true;
-}
-
 // Its MCU was told too late.
 void Motor::follow_withdrawn() {
-  if (!is_withdrawn() || position_ == axis_.from_steps()) return;
+  if (!is_withdrawn(*this) || position_ == axis_.from_steps()) return;
   moving_now().withdrawn = false;
   if (is<OnLine>()) {
     moving_now().by_others = true;
@@ -179,10 +138,6 @@ event::Ended Motor::stopped() {
             by_others ? "ramped down with the others of its line" : "stopped on request");
   event.by_plan = true;
   return event;
-}
-
-std::string Motor::did_not_start() const {
-  return "its first ticks did not reach MCU " + setup_.mcu + " in time; it did not move";
 }
 
 }  // namespace bushd::motion

@@ -49,7 +49,7 @@ Result<void> MotorReach::may_move_to(std::int64_t target, bushd_delay shortest_d
     return fail("it moves on a line, or by a CAMAC program; run " +
                 words::remedy("stop", motor_.name()) + " first, then move it by itself");
   }
-  if (motor_.follows()) {
+  if (follows_trajectory(motor_)) {
     return fail("it follows a trajectory; run " + words::remedy("stop", motor_.name()) +
                 " first, then move it by itself");
   }
@@ -122,7 +122,7 @@ Result<std::int64_t> MotorReach::rounded_distance_from() const {
   }
   if (motor_.jogs_)
     return fail(fmt::format("it jogs, and nobody has said where it is to stand; {}", kRemedy));
-  if (motor_.follows())
+  if (follows_trajectory(motor_))
     return fail(fmt::format("it follows a trajectory, which may get more rows; {}", kRemedy));
   return motor_.target_steps();
 }

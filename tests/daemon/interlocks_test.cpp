@@ -29,7 +29,7 @@ TEST(Interlocks, TheFirstReasonIsTold) {
   }
   bench.installation.shutting_down = false;
   EXPECT_THAT(interlocks.may_begin({1}).error().text(), HasSubstr("MCU hall:1 is offline"));
-  bench.installation[MotorId{1}].home();
+  bench.installation[MotorId{1}].give_to_mcu(motion::Homing{});
   EXPECT_THAT(interlocks.may_move({1}).error().text(), HasSubstr("being homed"));
 }
 

@@ -89,9 +89,9 @@ TEST_F(MotorTest, AStopIsPlannedAtOnceAndToldWhenExecuted) {
   motor.start(kSteps, kStart);
   report(kStart + 20);
   motor.stop();
-  EXPECT_TRUE(motor.needs_change());
-  EXPECT_TRUE(motor.change(kStart + 30));
-  EXPECT_FALSE(motor.needs_change());
+  EXPECT_TRUE(motor.axis().needs_change());
+  EXPECT_TRUE(motor.axis().change(kStart + 30));
+  EXPECT_FALSE(motor.axis().needs_change());
   const auto events = report(motor.axis().end_tick());
   ASSERT_NE(find<event::Executed>(events), nullptr);
   EXPECT_EQ(find<event::Executed>(events)->change.at, kStart + 30);
@@ -138,7 +138,7 @@ TEST_F(MotorTest, ATargetBehindTakesASecondRun) {
   motor.start(kSteps, kStart);
   report(kStart + 40);
   motor.aim(-5);
-  EXPECT_TRUE(motor.change(kStart + 50));
+  EXPECT_TRUE(motor.axis().change(kStart + 50));
   EXPECT_EQ(motor.target_steps(), -5);
   const auto events = report(motor.axis().end_tick());
   EXPECT_NE(find<event::Turn>(events), nullptr);
@@ -170,7 +170,7 @@ TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
       {.of_mcu = mcu, .tick = kStart + 30, .requests_open = false, .emergency_stop_open = false});
   EXPECT_NE(find<event::MissedStart>(events), nullptr);
   EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
-  EXPECT_TRUE(motor.awaits_new_start());
+  EXPECT_TRUE(motor.start_of_run().awaits_new());
   EXPECT_TRUE(motor.stands());
   EXPECT_EQ(motor.target_steps(), kSteps);
   EXPECT_TRUE(motor
@@ -182,15 +182,15 @@ TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
   const Leg leg = motor.take_leg();
   EXPECT_EQ(leg.target, kSteps);
   motor.start(leg.target, kStart + 100);
-  EXPECT_FALSE(motor.is_late());
+  EXPECT_FALSE(is_late(motor));
 }
 
 TEST_F(MotorTest, OneThatHasMovedHasNotMissedItsStart) {
   motor.start(kSteps, kStart);
   mcu.motor[3].position_steps = 0;
-  EXPECT_TRUE(motor.has_missed_start(mcu));
+  EXPECT_TRUE(motor.start_of_run().is_missed(mcu));
   mcu.motor[3].position_steps = 46;
-  EXPECT_FALSE(motor.has_missed_start(mcu)) << "says the next report";
+  EXPECT_FALSE(motor.start_of_run().is_missed(mcu)) << "says the next report";
 }
 
 TEST_F(MotorTest, WaitsForTheTriggerAndStopsIfThatCameFirst) {
@@ -305,7 +305,7 @@ TEST_F(MotorTest, OneThatIsStoppedTwiceInAPauseStood) {
   motor.start(kSteps, kStart);
   report(kStart + 20);
   motor.pause();
-  motor.change(kStart + 30);
+  motor.axis().change(kStart + 30);
   const Tick end = motor.axis().end_tick();
   EXPECT_NE(find<event::Paused>(report(end)), nullptr);
   motor.stop();
@@ -320,7 +320,7 @@ TEST_F(MotorTest, AnEmergencyStopLeavesAPausedMotorKnown) {
   motor.start(kSteps, kStart);
   report(kStart + 20);
   motor.pause();
-  motor.change(kStart + 30);
+  motor.axis().change(kStart + 30);
   EXPECT_NE(find<event::Paused>(report(motor.axis().end_tick())), nullptr);
   mcu.faults = BUSHD_FAULT_EMERGENCY;
   const auto events = report(motor.axis().end_tick() + 10);
@@ -333,7 +333,7 @@ TEST_F(MotorTest, ALimitSwitchThatEndsAPauseIsNoStopOnRequest) {
   motor.start(kSteps, kStart);
   report(kStart + 20);
   motor.pause();
-  motor.change(kStart + 30);
+  motor.axis().change(kStart + 30);
   set(mcu.forbidden_positive, true);
   set(mcu.moving, true);
   // By a ramp of its MCU's own, which is a step longer and ends in the same place.
@@ -353,9 +353,10 @@ TEST_F(MotorTest, ALimitSwitchThatEndsAPauseIsNoStopOnRequest) {
 TEST_F(MotorTest, HomingKeepsOthersAwayAndMakesThePositionKnown) {
   motor.goes_online(mcu, false, true);
   EXPECT_THAT(refusal(1), HasSubstr("MCU hall:1 restarted"));
-  motor.home();
+  motor.give_to_mcu(Homing{});
   EXPECT_THAT(refusal(1), HasSubstr("being homed"));
-  motor.end_homing(true);
+  motor.trust().is_known();
+  motor.take_from_mcu(Homing{});
   EXPECT_TRUE(motor.is<Resting>());
   EXPECT_EQ(refusal(1), "");
 }
@@ -374,7 +375,7 @@ TEST_F(MotorTest, LocalInputsHaveItAsLongAsTheyMoveIt) {
 
 // Told in the tick in which it was cut, when the program still has it.
 TEST_F(MotorTest, AnEmergencyStopInAProgramIsDoubtedAtOnce) {
-  motor.enter_program();
+  motor.give_to_mcu(InProgram{});
   set(mcu.autonomous, true);
   report(kStart, 5);
   mcu.faults = BUSHD_FAULT_EMERGENCY;
@@ -383,7 +384,7 @@ TEST_F(MotorTest, AnEmergencyStopInAProgramIsDoubtedAtOnce) {
 }
 
 TEST_F(MotorTest, AProgramThatIsCutBeforeItsMotorWasSeenToMoveIsDoubted) {
-  motor.enter_program();
+  motor.give_to_mcu(InProgram{});
   mcu.faults = BUSHD_FAULT_EMERGENCY;
   report(kStart, 0);
   EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt) << "it has not begun";
@@ -398,21 +399,21 @@ TEST_F(MotorTest, LocalInputsThatCameFirstEndAMove) {
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
   EXPECT_TRUE(motor.is<Local>());
-  motor.goes_offline(0);
+  motor.goes_offline(0, false);
   EXPECT_TRUE(motor.is<Resting>()) << "nobody knows of it any more";
 }
 
 TEST_F(MotorTest, HasNoPositionBeforeItsMcuHasReported) {
   const Motor unheard(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
-  EXPECT_EQ(unheard.position_trust({}).trust, words::Trust::kUnknown);
-  EXPECT_THAT(unheard.position_trust({}).reason, HasSubstr("MCU hall:1 has not reported"));
-  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kKnown);
-  EXPECT_EQ(motor.position_trust(0).reason, "");
+  EXPECT_EQ(position_trust(unheard, {}).trust, words::Trust::kUnknown);
+  EXPECT_THAT(position_trust(unheard, {}).reason, HasSubstr("MCU hall:1 has not reported"));
+  EXPECT_EQ(position_trust(motor, 0).trust, words::Trust::kKnown);
+  EXPECT_EQ(position_trust(motor, 0).reason, "");
   report(kStart, 42);
-  EXPECT_EQ(motor.position_trust(1).trust, words::Trust::kUnknown) << "its MCU is in another boot";
-  EXPECT_THAT(motor.position_trust(1).reason, HasSubstr("heard at 42"));
+  EXPECT_EQ(position_trust(motor, 1).trust, words::Trust::kUnknown) << "its MCU is in another boot";
+  EXPECT_THAT(position_trust(motor, 1).reason, HasSubstr("heard at 42"));
   motor.scale().set_coordinates(units::Coordinates::make({"mm", {4, 1}, false, 0.5, 2}).value());
-  EXPECT_THAT(motor.position_trust(1).reason, HasSubstr("heard at 42 (11.00 mm)"));
+  EXPECT_THAT(position_trust(motor, 1).reason, HasSubstr("heard at 42 (11.00 mm)"));
 }
 
 TEST_F(MotorTest, SaysHowItStandsToItsSoftLimits) {
@@ -430,39 +431,38 @@ TEST_F(MotorTest, SaysHowItStandsToItsSoftLimits) {
 TEST_F(MotorTest, IsUncertainUntilSomebodySaysWhereItStandsButMayMove) {
   Motor found(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
   found.goes_online(mcu, true, false);
-  EXPECT_EQ(found.position_trust(0).trust, words::Trust::kUncertain);
-  EXPECT_THAT(found.position_trust(0).reason, HasSubstr("neither set nor homed"));
+  EXPECT_EQ(position_trust(found, 0).trust, words::Trust::kUncertain);
+  EXPECT_THAT(position_trust(found, 0).reason, HasSubstr("neither set nor homed"));
   EXPECT_TRUE(found.reach().may_move_to(5));
-  found.home();
-  found.end_homing(true);
-  EXPECT_EQ(found.position_trust(0).trust, words::Trust::kKnown);
+  found.give_to_mcu(Homing{});
+  found.trust().is_known();
+  found.take_from_mcu(Homing{});
+  EXPECT_EQ(position_trust(found, 0).trust, words::Trust::kKnown);
 }
 
 TEST_F(MotorTest, IsStaleWhileItsMcuIsOffline) {
-  motor.goes_offline(4711);
-  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kStale);
-  EXPECT_EQ(motor.position_trust(0).heard_utime_us, 4711);
-  EXPECT_THAT(motor.position_trust(0).reason, HasSubstr("it rested"));
+  motor.goes_offline(4711, false);
+  EXPECT_EQ(position_trust(motor, 0).trust, words::Trust::kStale);
+  EXPECT_EQ(position_trust(motor, 0).heard_utime_us, 4711);
+  EXPECT_THAT(position_trust(motor, 0).reason, HasSubstr("it rested"));
   motor.goes_online(mcu, false, false);
   motor.start(kSteps, kStart);
   report(kStart + 20);
-  motor.goes_offline(4712);
+  motor.goes_offline(4712, false);
   motor.end(Outcome::kLink, "lost");
-  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kStale);
-  EXPECT_EQ(motor.position_trust(0).heard_utime_us, 4712);
-  EXPECT_THAT(motor.position_trust(0).reason, HasSubstr("may have run on"));
+  EXPECT_EQ(position_trust(motor, 0).trust, words::Trust::kStale);
+  EXPECT_EQ(position_trust(motor, 0).heard_utime_us, 4712);
+  EXPECT_THAT(position_trust(motor, 0).reason, HasSubstr("may have run on"));
   motor.goes_online(mcu, false, false);
-  EXPECT_EQ(motor.position_trust(0).trust, words::Trust::kKnown);
+  EXPECT_EQ(position_trust(motor, 0).trust, words::Trust::kKnown);
 }
 
 TEST_F(MotorTest, WhatPeopleMayMoveUnheardMayHaveRunOnFromRest) {
-  MotorSetup local = setup();
-  local.local = true;
-  Motor other(local, Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
+  Motor other(setup(), Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE));
   other.goes_online(mcu, true, false);
   other.trust().is_known();
-  other.goes_offline(4711);
-  EXPECT_THAT(other.position_trust(0).reason, HasSubstr("may have run on"));
+  other.goes_offline(4711, true);
+  EXPECT_THAT(position_trust(other, 0).reason, HasSubstr("may have run on"));
 }
 
 }  // namespace

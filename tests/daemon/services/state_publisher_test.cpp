@@ -53,7 +53,7 @@ TEST(StatePublisher, TellsOfVeryManyThatMoveInTurns) {
   ASSERT_EQ(bench.states.size(), 3u);
   const std::vector<MotorId> all = *bench.installation.find_or_all({});
   for (const MotorId motor : all) {
-    bench.installation[motor].enter_program();
+    bench.installation[motor].give_to_mcu(motion::InProgram{});
   }
   std::map<std::string, int> told;
   for (int turn = 1; turn <= 30; ++turn) {
