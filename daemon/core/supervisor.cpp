@@ -4,6 +4,7 @@
 #include <utility>
 #include <variant>
 
+#include "base/output_bits.h"
 #include "base/overloaded.h"
 #include "daemon/model/mcu_setup.h"
 #include "motion/report_words.h"
@@ -66,7 +67,7 @@ void Supervisor::handle_events(std::int64_t now_us, Bus& bus) {
 void Supervisor::replans(std::int64_t now_us, const Mcu& mcu, std::uint16_t outputs) {
   std::vector<MotorId> again;
   for (const MotorId motor : mcu.motors()) {
-    if ((outputs >> installation_[motor].output().value & 1) != 0) again.push_back(motor);
+    if (has_bit(outputs, installation_[motor].output())) again.push_back(motor);
   }
   moves_.plan_again(now_us, again);
 }

@@ -7,6 +7,7 @@
 
 #include "api/no_such_motor.h"
 #include "base/nearest_name.h"
+#include "base/output_bits.h"
 #include "base/shortened.h"
 
 namespace bushd::daemon {
@@ -157,7 +158,7 @@ std::vector<MotorId> Installation::to_be_homed(const Mcu& mcu) const {
   std::vector<MotorId> motors;
   if (!mcu.config.ready_after_homing || !mcu.online()) return motors;
   for (const MotorId motor : mcu.motors()) {
-    const bool homed = (mcu.report().homed >> motors_[motor].output().value & 1) != 0;
+    const bool homed = has_bit(mcu.report().homed, motors_[motor].output());
     if (config_[motor].home && !homed) motors.push_back(motor);
   }
   return motors;

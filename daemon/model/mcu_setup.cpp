@@ -2,14 +2,12 @@
 
 #include <algorithm>
 
+#include "base/output_bits.h"
+
 namespace bushd::daemon {
 namespace {
 
 constexpr std::int32_t kVelocityUnits = 64;  // of VELOCITY, in a step/s
-
-std::uint16_t bit_of(Output output) {
-  return static_cast<std::uint16_t>(1u << output.value);
-}
 
 bushd_set_inputs inputs_of(const config::Mcu& mcu) {
   bushd_set_inputs inputs{};

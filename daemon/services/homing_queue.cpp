@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -171,8 +172,8 @@ void HomingQueue::reports(std::int64_t, Mcu& mcu) {
   const Queue& queue = queues_[mcu.id];
   if (queue.empty() || queue.front().phase != Phase::kHoming || mcu.busy()) return;
   const Task& task = queue.front();
-  const unsigned output = installation_[task.motor].output().value;
-  if (((mcu.report().autonomous | mcu.report().moving) >> output & 1) != 0) return;
+  const unsigned moved = mcu.report().autonomous | mcu.report().moving;
+  if (has_bit(moved, installation_[task.motor].output())) return;
   HomingEnd ending = end_of_homing(mcu.report(), mcu.name());
   if (ending.outcome == Outcome::kReached) return found(mcu);
   if (ending.outcome == Outcome::kStopped && !task.ended_by.empty()) ending.reason = task.ended_by;
@@ -385,7 +386,7 @@ void HomingQueue::goes_online(Mcu& mcu) {
   for (const MotorId id : mcu.motors()) {
     const auto& home = installation_.config()[id].home;
     const motion::Motor& motor = installation_[id];
-    const bool homed = (mcu.report().homed >> motor.output().value & 1) != 0;
+    const bool homed = has_bit(mcu.report().homed, motor.output());
     const bool at_start = home && (home->at_start || mcu.config.ready_after_homing);
     if (!at_start || (homed && !motor.trust().uncertain_reason())) continue;
     const auto shortest_delay = shortest_delay_of(id, {});

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "base/output_bits.h"
 #include "motion/report_words.h"
 
 namespace bushd::daemon {
@@ -264,12 +265,11 @@ void Journal::before_report(MotorId id, bool being_set) {
   if (autonomous_[id]) return;
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
-  const unsigned output = motor.output().value;
-  const bool autonomous = (mcu.report().autonomous >> output & 1) != 0;
+  const bool autonomous = has_bit(mcu.report().autonomous, motor.output());
   // Somebody has tapped a button between two reports.
-  const bool tapped = installation_.drives()[id].moved_by_people() && !motor.has_plan() &&
-                      !being_set &&
-                      mcu.report().motor[output].position_steps != motor.position_steps();
+  const bool tapped =
+      installation_.drives()[id].moved_by_people() && !motor.has_plan() && !being_set &&
+      mcu.report().motor[motor.output().value].position_steps != motor.position_steps();
   if (!autonomous && !tapped) return;
   autonomous_[id] = Autonomous{
       .since = told_[mcu.id], .from_steps = motor.position_steps(), .what = what_moves(motor)};
@@ -277,8 +277,8 @@ void Journal::before_report(MotorId id, bool being_set) {
 
 void Journal::after_report(const Mcu& mcu) {
   for (const MotorId motor : mcu.motors()) {
-    const unsigned output = installation_[motor].output().value;
-    if ((mcu.report().autonomous >> output & 1) == 0) end_autonomous(motor, mcu);
+    const bool now = has_bit(mcu.report().autonomous, installation_[motor].output());
+    if (!now) end_autonomous(motor, mcu);
   }
   told_[mcu.id] = mcu.view().tick;
 }

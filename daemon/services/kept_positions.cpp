@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/output_bits.h"
 #include "base/units/ratio.h"
 #include "bus/rs485/unique_id.h"
 #include "daemon/services/allowed.h"
@@ -20,10 +21,6 @@ std::string scale_text(const motion::Motor& motor) {
   const units::Coordinates& coordinates = motor.scale().coordinates();
   return coordinates.has_unit() ? units::to_text(coordinates.scale().steps_per_unit)
                                 : std::string();
-}
-
-bool has(std::uint16_t mask, const motion::Motor& motor) {
-  return (mask >> motor.output().value & 1) != 0;
 }
 
 state::Trust trust_of(const motion::Motor& motor) {
@@ -260,7 +257,7 @@ state::Seen KeptPositions::seen(const Mcu& mcu, MotorId id) const {
   const motion::Motor& motor = installation_[id];
   const Heard& heard = *mcus_[mcu.id].heard;
   const bool at_limit =
-      has(mcu.report().forbidden_positive, motor) || has(mcu.report().forbidden_negative, motor);
+      has_bit(mcu.report().forbidden_positive | mcu.report().forbidden_negative, motor.output());
   auto before = keeper_->other_at(id, heard.unique_id, motor.output().value);
   const std::optional<state::Record>& kept = keeper_->kept(id).record;
   const state::Record* told = before ? &before->record : kept ? &*kept : nullptr;
@@ -430,8 +427,8 @@ void KeptPositions::keep(std::int64_t now_us, const Mcu& mcu, MotorId id) {
   Motor& own = motors_[id];
   if (own.wanted || positions_.counter_being_set(id)) return;
   const bushd_report& report = mcu.report();
-  const bool in_motion = has(report.moving, motor) || has(report.autonomous, motor) ||
-                         has(report.armed, motor) || !motor.is<motion::Resting>();
+  const unsigned may_move = report.moving | report.autonomous | report.armed;
+  const bool in_motion = has_bit(may_move, motor.output()) || !motor.is<motion::Resting>();
   if (!in_motion) return keep_at_rest(mcu, id);
   own.unmoved.reset();
   if (now_us - own.seen_us < kSeenPeriodUs) return;

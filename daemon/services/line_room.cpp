@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "base/overloaded.h"
 
 namespace bushd::daemon {
@@ -61,8 +62,7 @@ Result<bool> LineRoom::has_room(const api::Request& request,
     const auto messages = messages_of(request, id, by_mcus);
     if (!messages) continue;
     const Mcu& mcu = installation_.mcu_of(id);
-    of_buses[mcu.config.bus][{mcu.id, *messages}] |=
-        static_cast<std::uint16_t>(1u << installation_[id].output().value);
+    of_buses[mcu.config.bus][{mcu.id, *messages}] |= bit_of(installation_[id].output());
   }
   bool room = true;
   for (const auto& [id, masks] : of_buses) {

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "base/overloaded.h"
 #include "daemon/services/line_motors.h"
 #include "words/remedy.h"
@@ -232,7 +233,7 @@ std::map<BusId, motion::Tick> Lines::starts_of(std::int64_t now_us, const Line& 
   for (const MotorId id : motors) {
     const Mcu& mcu = installation_.mcu_of(id);
     const Output output = installation_[id].output();
-    masks[mcu.config.bus][mcu.id] |= static_cast<std::uint16_t>(1u << output.value);
+    masks[mcu.config.bus][mcu.id] |= bit_of(output);
     motion::Tick& start = starts.try_emplace(mcu.config.bus, INT64_MIN).first->second;
     start = std::max(start, mcu.earliest_start(now_us, output));
   }

@@ -1,13 +1,8 @@
 #include "daemon/services/local_inputs.h"
 
+#include "base/output_bits.h"
+
 namespace bushd::daemon {
-namespace {
-
-std::uint16_t bit_of(const motion::Motor& motor) {
-  return static_cast<std::uint16_t>(1u << motor.output().value);
-}
-
-}  // namespace
 
 LocalInputs::LocalInputs(Installation& installation) : installation_(installation) {
   for ([[maybe_unused]] const McuId mcu : installation.mcus()) tasks_.add();
@@ -20,24 +15,24 @@ bool LocalInputs::may_move(MotorId id) const {
 bool LocalInputs::move(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   return may_move(id) && motor.is<motion::Local>() &&
-         (installation_.mcu_of(id).report().autonomous & bit_of(motor)) != 0;
+         has_bit(installation_.mcu_of(id).report().autonomous, motor.output());
 }
 
 void LocalInputs::stop(MotorId id) {
   Mcu& mcu = installation_.mcu_of(id);
-  tasks_[mcu.id].stopping |= bit_of(installation_[id]);
+  tasks_[mcu.id].stopping |= bit_of(installation_[id].output());
   tasks_[mcu.id].refused.reset();
   follow(mcu);
 }
 
 bool LocalInputs::is_stopping(MotorId id) const {
-  return (tasks_[installation_.mcu_of(id).id].stopping & bit_of(installation_[id])) != 0;
+  return has_bit(tasks_[installation_.mcu_of(id).id].stopping, installation_[id].output());
 }
 
 bool LocalInputs::has_told(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
-  const bool told = (tasks_[mcu.id].inhibited & bit_of(motor)) != 0;
+  const bool told = has_bit(tasks_[mcu.id].inhibited, motor.output());
   if (!installation_.drives()[id].moved_by_people() || !mcu.online()) return true;
   return !motor.hold().is_set() || refusal(id) || (told && !mcu.busy());
 }
@@ -56,7 +51,7 @@ std::uint16_t LocalInputs::held(const Mcu& mcu) const {
   unsigned held = 0;
   for (const MotorId id : mcu.motors()) {
     const bool theirs = installation_.drives()[id].moved_by_people();
-    if (theirs && installation_[id].hold().is_set()) held |= bit_of(installation_[id]);
+    if (theirs && installation_[id].hold().is_set()) held |= bit_of(installation_[id].output());
   }
   return static_cast<std::uint16_t>(held);
 }

@@ -3,6 +3,7 @@
 #include <map>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "daemon/services/moves.h"
 #include "motion/report_words.h"
 
@@ -83,7 +84,7 @@ link::CommonStart Moves::start_of(std::int64_t now_us, BusId bus, const std::vec
         by_table(id, steps, leg.shortest_delay)   ? link::StartMessages::kTableRun
         : bushd_delay_is_code(leg.shortest_delay) ? link::StartMessages::kStates
                                                   : link::StartMessages::kTicks;
-    masks[{mcu.id, messages}] |= static_cast<std::uint16_t>(1u << motor.output().value);
+    masks[{mcu.id, messages}] |= bit_of(motor.output());
     later.at = std::max(later.at, mcu.earliest_start(now_us, motor.output()));
   }
   if (!at_once) return later;
@@ -158,7 +159,7 @@ bool Moves::has_begun(MotorId id) const {
 bool Moves::has_moved(MotorId id) const {
   const motion::Motor& motor = installation_[id];
   const Mcu& mcu = installation_.mcu_of(id);
-  const bool moves = motion::has_bit(mcu.report().moving, motor.output().value);
+  const bool moves = has_bit(mcu.report().moving, motor.output());
   return moves || motor.position_steps() != motor.axis().from_steps();
 }
 

@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "bus/rs485/tick.h"
 #include "daemon/services/moves.h"
 
@@ -51,8 +52,7 @@ std::map<BusId, std::vector<link::ToReplace>> Moves::replacements_of(
     const std::vector<MotorId>& motors) const {
   std::map<McuId, std::uint16_t> masks;
   for (const MotorId id : motors) {
-    masks[installation_.config()[id].mcu] |=
-        static_cast<std::uint16_t>(1u << installation_[id].output().value);
+    masks[installation_.config()[id].mcu] |= bit_of(installation_[id].output());
   }
   std::map<BusId, std::vector<link::ToReplace>> of_buses;
   for (const auto& [id, mask] : masks) {
@@ -151,14 +151,14 @@ void Moves::plan(std::int64_t now_us, const std::vector<MotorId>& motors) {
   const auto change = [&](MotorId id, std::uint32_t least_end) {
     motion::Motor& motor = installation_[id];
     const McuId mcu = installation_.config()[id].mcu;
-    const auto bit = static_cast<std::uint16_t>(1u << motor.output().value);
+    const auto bit = bit_of(motor.output());
     masks[mcu] &= static_cast<std::uint16_t>(~bit);
     if (motor.has_plan() && motor.axis().change(at.at(mcu), least_end)) masks[mcu] |= bit;
   };
   std::set<MotorId> changed;
   for (const MotorId id : motors) {
     change(id, 0);
-    const auto bit = static_cast<std::uint16_t>(1u << installation_[id].output().value);
+    const auto bit = bit_of(installation_[id].output());
     if ((masks[installation_.config()[id].mcu] & bit) != 0) changed.insert(id);
   }
   // One that stops already may have made its last step: its MCU would take no more.

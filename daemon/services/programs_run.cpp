@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "daemon/services/program_words.h"
 #include "daemon/services/programs.h"
 #include "engine/program.h"
@@ -255,7 +256,7 @@ void Programs::adopt(McuId id) {
           .without_host = without_host,
           .taken = true};
   for (const MotorId motor : mcu.motors()) {
-    if ((state.motors >> installation_[motor].output().value & 1) == 0) continue;
+    if (!has_bit(state.motors, installation_[motor].output())) continue;
     if (installation_[motor].has_plan()) continue;
     installation_[motor].give_to_mcu(motion::InProgram{});
     run.motors.push_back(motor);
@@ -322,7 +323,7 @@ void Programs::follow_end(McuId id) {
   const unsigned positive = now.positive & ~before.positive;
   const unsigned negative = now.negative & ~before.negative;
   for (const MotorId motor : run.motors) {
-    const bool met = (positive | negative) >> installation_[motor].output().value & 1;
+    const bool met = has_bit(positive | negative, installation_[motor].output());
     if (!met || installation_.config()[motor].limit_action != BUSHD_STOP_IMMEDIATE) continue;
     installation_[motor].trust().is_uncertain(
         "it was stopped immediately at its limit switch and may have overrun");

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "base/output_bits.h"
 #include "motion/report_words.h"
 #include "words/remedy.h"
 
@@ -43,10 +44,6 @@ TravelEnd end_of_travel(const bushd_report& report, const std::string& mcu) {
 
 bool is_under_way(const bushd_report& report) {
   return report.homing >= BUSHD_TRAVEL_STEPS && report.homing <= BUSHD_TRAVEL_RETURN;
-}
-
-bool has_bit(unsigned mask, Output output) {
-  return (mask >> output.value & 1) != 0;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "base/overloaded.h"
 #include "motion/report_words.h"
 
@@ -84,7 +85,7 @@ bool WaitingRequests::is_refused_anyway(const api::Request& request,
 bool WaitingRequests::has_ticks(MotorId id) const {
   const Mcu& mcu = installation_.mcu_of(id);
   return mcu.online() && installation_[id].is<motion::Resting>() &&
-         motion::has_bit(mcu.report().moving, installation_[id].output().value);
+         has_bit(mcu.report().moving, installation_[id].output());
 }
 
 Result<bool> WaitingRequests::make_ready(std::int64_t now_us, Held& held) {

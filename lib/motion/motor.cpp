@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "motion/report_words.h"
 #include "words/remedy.h"
 
@@ -133,8 +134,8 @@ void Motor::uncertain_if_stopped_immediately(const bushd_report& report) {
 }
 
 void Motor::take_limits(const bushd_report& report) {
-  forbidden_up_ = has_bit(report.forbidden_positive, output().value);
-  forbidden_down_ = has_bit(report.forbidden_negative, output().value);
+  forbidden_up_ = has_bit(report.forbidden_positive, output());
+  forbidden_down_ = has_bit(report.forbidden_negative, output());
 }
 
 // Positions are counts since the MCU's boot: a boot whose positions nobody has seen has lost them.
@@ -163,7 +164,7 @@ std::vector<Event> Motor::report(const Report& report) {
       std::exchange(position_, report.of_mcu.motor[output().value].position_steps);
   take_limits(report.of_mcu);
   if (has_plan()) follow(report, events);
-  const bool by_itself = autonomous_ || has_bit(report.of_mcu.autonomous, output().value);
+  const bool by_itself = autonomous_ || has_bit(report.of_mcu.autonomous, output());
   // Whoever has asked for homing knows what the position of the motor is.
   if (by_itself) follow_count(before);
   if (is<InProgram>()) autonomous_ |= position_ != before;  // it may have begun and been cut since
@@ -180,20 +181,20 @@ void Motor::follow_asked_for() {
 
 // No move has led to where it stands.
 void Motor::follow_autonomous(const bushd_report& report, bool moved_without_plan) {
-  const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output().value));
+  const bool before = std::exchange(autonomous_, has_bit(report.autonomous, output()));
   // The MCU may still say so in the tick in which it was cut.
   if (before) uncertain_if_stopped_immediately(report);
   const bool free = is<Resting>() || is<Local>();
   // The bit alone may be that of a plan of this daemon's that has just ended.
   moved_by_other_ =
-      free && has_bit(report.moving, output().value) && (moved_by_other_ || moved_without_plan);
+      free && has_bit(report.moving, output()) && (moved_by_other_ || moved_without_plan);
   if (free) rest();
 }
 
 void Motor::follow(const Report& report, std::vector<Event>& events) {
-  const bool moving = has_bit(report.of_mcu.moving, output().value);
+  const bool moving = has_bit(report.of_mcu.moving, output());
   if (is<Armed>() && !follow_armed(report, events)) return;
-  if (has_bit(report.of_mcu.autonomous, output().value)) {
+  if (has_bit(report.of_mcu.autonomous, output())) {
     // So it had no ticks of the move, and takes none.
     events.emplace_back(
         ended(Outcome::kStopped, "the local inputs of MCU " + setup_.mcu +

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "base/output_bits.h"
 #include "motion/motor.h"
 #include "motion/report_words.h"
 #include "words/remedy.h"
@@ -20,7 +21,7 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
     if (axis_.goes(-direction) && forbidden(-direction)) direction = -direction;
     if (!forbidden(direction) || !axis_.goes(direction)) return;
   }
-  const bool moving = has_bit(report.of_mcu.moving, output().value);
+  const bool moving = has_bit(report.of_mcu.moving, output());
   const bool given_up =
       !moving && report.tick >= axis_.start_tick() && axis_.velocity_steps_per_s() != 0;
   // Its own ramp may be a step longer than what was planned.

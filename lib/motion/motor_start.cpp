@@ -1,5 +1,6 @@
 #include "motion/motor_start.h"
 
+#include "base/output_bits.h"
 #include "motion/motor.h"
 #include "motion/report_words.h"
 
@@ -7,13 +8,13 @@ namespace bushd::motion {
 
 bool MotorStart::is_missed(const bushd_report& report) const {
   const Axis& axis = motor_.axis_;
-  const unsigned output = motor_.output().value;
+  const Output output = motor_.output();
   const bool ran_down = report.faults != 0;
   // No tick is missed of a move that was cancelled before its start.
   const bool cancelled = axis.end_tick() <= axis.start_tick();
   const bool limited = has_bit(report.forbidden_positive | report.forbidden_negative, output);
   // Another master may have ended it since.
-  const bool moved = report.motor[output].position_steps != axis.from_steps();
+  const bool moved = report.motor[output.value].position_steps != axis.from_steps();
   return motor_.has_plan() && !ran_down && !cancelled && !limited && !moved;
 }
 

@@ -26,9 +26,4 @@ std::string stopped_immediately(const bushd_report& report, const std::string& m
 bool has_disabled_drivers(const bushd_report& report);
 std::string unpowered(const bushd_report& report, const std::string& mcu);
 
-// Whether the bit of this output is set.
-constexpr bool has_bit(unsigned mask, unsigned output) {
-  return (mask >> output & 1) != 0;
-}
-
 }  // namespace bushd::motion
