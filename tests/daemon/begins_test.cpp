@@ -12,13 +12,6 @@
 namespace bushd::test {
 namespace {
 
-using testing::HasSubstr;
-
-std::string motor_with(std::string toml, const std::string& motor, const std::string& keys) {
-  const std::string name = "name = \"" + motor + "\"\n";
-  return toml.insert(toml.find(name) + name.size(), keys + "\n");
-}
-
 constexpr const char* kHomeOfBegins = "home = { direction = \"negative\", most_steps = 6000";
 
 // m01 at a bus of its own, "far" at another one.
@@ -37,7 +30,7 @@ TEST(Begins, NoHomingAtTheStartOfAnMcuThatComesWhileTheDaemonEnds) {
     return lab.has_state(mcu) && lab.state_of(mcu).state == api::McuState::kReady;
   };
   ASSERT_TRUE(lab.run_until([&] { return ready("hall:1"); }));
-  EXPECT_EQ(lab.wait(lab.send(api::Confirm{{"m01"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Confirm{{"m01"}}).result, "done");
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1.5);
   lab.core().shut_down(lab.now_us());
@@ -52,9 +45,8 @@ TEST(Begins, NoHomingAtTheStartOfAnMcuThatComesWhileTheDaemonEnds) {
 
 // One that waits for its turn when the daemon is told to end does not begin either.
 TEST(Begins, NoHomingThatWaitsWhenTheDaemonEnds) {
-  std::string toml = motor_with(hall(1, 2), "m01", std::string(kHomeOfBegins) + " }");
-  Lab lab(motor_with(toml, "m02", std::string(kHomeOfBegins) + " }"));
-  lab.connect();
+  std::string toml = with_keys(hall(1, 2), "m01", std::string(kHomeOfBegins) + " }\n");
+  ReadyLab lab(with_keys(toml, "m02", std::string(kHomeOfBegins) + " }\n"));
   const auto home = lab.send(Ask::kHome, {"m01", "m02"});
   lab.run_for(0.5);
   lab.core().shut_down(lab.now_us());
@@ -81,14 +73,13 @@ void talk_as_another(Lab& lab) {
 
 // The last approach is a run of its own, and begins when the first leg is over.
 TEST(Begins, NoLegOfAMoveOnALineThatAnotherMasterHas) {
-  Lab lab(motor_with(hall(1, 2), "m01", "unit = \"mm\"\nsteps_per_unit = 400\nbacklash = 0.1"));
-  lab.connect();
+  ReadyLab lab(
+      with_keys(hall(1, 2), "m01", "unit = \"mm\"\nsteps_per_unit = 400\nbacklash = 0.1\n"));
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-3000});
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -300; }));
   talk_as_another(lab);
   const Answer ended = lab.wait(move);
-  EXPECT_EQ(ended.result, "stopped") << ended.reason;
-  EXPECT_THAT(ended.reason, HasSubstr("another master talks on bus hall"));
+  EXPECT_THAT(ended, Ends("stopped", "another master talks on bus hall"));
   EXPECT_EQ(lab.shaft_steps("m01"), -3040) << "where its first leg has led";
   EXPECT_EQ(ended.position_steps[0], -3040);
 }

@@ -29,7 +29,7 @@ inline void expect_header_and_codes(BoardLab& lab, std::int64_t steps,
 inline void expect_stop_by_ramp(BoardLab& lab, const std::vector<std::int64_t>& codes) {
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
   lab.moves(1000);
-  lab.wait(lab.send(Ask::kStop, {"m0"}));
+  lab.ask(Ask::kStop, {"m0"});
   const Answer answer = lab.wait(move);
   EXPECT_EQ(answer.result, "stopped");
   const std::int64_t made = lab.shaft_steps("m0");
@@ -50,7 +50,7 @@ inline void expect_emergency_stop(BoardLab& lab, bool immediate) {
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
   lab.moves(1000);
   const std::int64_t at = lab.shaft_steps("m0");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kEmergencyStop, {}).result, "done");
   const Answer answer = lab.wait(move);
   EXPECT_NE(answer.result, "reached");
   const std::int64_t made = lab.shaft_steps("m0") - at;
@@ -58,9 +58,9 @@ inline void expect_emergency_stop(BoardLab& lab, bool immediate) {
   EXPECT_LE(made, immediate ? 2 : 241);
   EXPECT_EQ(answer.position_steps, std::vector<std::int64_t>{lab.shaft_steps("m0")});
   EXPECT_EQ(lab.move("m0", 10).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   EXPECT_EQ(lab.trusted("m0"), !immediate);
-  lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {0}));
+  lab.ask(Ask::kSetPosition, {"m0"}, {0});
   EXPECT_EQ(lab.move("m0", 10).result, "reached");
 }
 
@@ -76,8 +76,7 @@ inline void expect_least_step_us(BoardLab& lab, int least_us, const std::string&
   const Answer swift = lab.wait(lab.use("axes", "swift"));
   EXPECT_NE(swift.result, "done");
   EXPECT_THAT(swift.reason, testing::HasSubstr(why));
-  const Answer just = lab.wait(lab.use("axes", "just"));
-  EXPECT_EQ(just.result, "done") << just.reason;
+  EXPECT_THAT(lab.wait(lab.use("axes", "just")), Ends("done"));
 }
 
 }  // namespace bushd::test

@@ -77,7 +77,7 @@ inline void expect_counts_right_or_uncertain(ImageLab& lab, unsigned seed,
     if (lab.trusted("m0")) {
       ASSERT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0")) << i;
     } else {
-      lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")}));
+      lab.ask(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")});
     }
   }
 }

@@ -40,8 +40,7 @@ struct Carried {
 };
 
 Carried carried_for(const ByteWay& way) {
-  Lab lab(hall(1, 1, way.manner));
-  lab.connect();
+  ReadyLab lab(hall(1, 1, way.manner));
   Carried carried;
   lab.on_send = [&carried](std::size_t, const std::vector<std::uint8_t>& bytes) {
     carried.motion.add(bytes);
@@ -49,7 +48,7 @@ Carried carried_for(const ByteWay& way) {
     return true;
   };
   lab.on_receive = [&carried](std::size_t, std::uint8_t&) { ++carried.all_bytes; };
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {way.steps})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {way.steps}).result, "reached");
   return carried;
 }
 

@@ -145,7 +145,7 @@ TEST(CamacAlone, F24AndStopsEndIt) {
   lab.naf(kStation, 0, 10);
   lab.permit(kEnabled);
   ASSERT_TRUE(lab.run_until([&] { return lab.steps(0).size() > made + 10; }));
-  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  lab.ask(Ask::kStop, {"m01"});
   ASSERT_TRUE(lab.run_until([&] { return lab.lam(); })) << "by somebody else it is a fault";
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
 }
@@ -263,9 +263,8 @@ TEST(CamacAnyLaw, TheAnswerToF26SaysWhatAStopGoesBy) {
   AloneLab lab(lab_with());
   lab.load(0, 100, any_codes(1));
   lab.naf(kStation, 2, 16, kEnabled);
-  const Answer answer = lab.block({.cycles = {{kStation, 0, 26, 0}}});
-  EXPECT_EQ(answer.result, "done");
-  EXPECT_THAT(answer.reason, HasSubstr("m01: its codes rise and fall"));
+  EXPECT_THAT(lab.block({.cycles = {{kStation, 0, 26, 0}}}),
+              Ends("done", "m01: its codes rise and fall"));
 }
 
 TEST(CamacAnyLaw, WithoutTheComputerToo) {
@@ -289,7 +288,7 @@ TEST(CamacAnyLaw, AStopRampsDownByTheMotorsOwnTable) {
     lab.permit(kEnabled);
     ASSERT_TRUE(lab.run_until([&] { return lab.steps(0).size() > 2000; }));
     const std::size_t before = lab.steps(0).size();
-    lab.wait(lab.send(estop ? Ask::kEmergencyStop : Ask::kStop, {"m01"}));
+    lab.ask(estop ? Ask::kEmergencyStop : Ask::kStop, {"m01"});
     ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m01").moving; }));
     // bushd2-constant needs 238 steps from its greatest speed.
     const std::size_t more = lab.steps(0).size() - before;

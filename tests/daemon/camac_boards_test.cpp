@@ -104,7 +104,7 @@ TEST(CamacBoards, ProgramOfABushd2MovesAMotorBehindABoard) {
   lab.board(0).supply = true;
   lab.board(0).motor(5).connected = false;
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
-  lab.wait(lab.send(Ask::kSetPosition, {"m5"}, {lab.shaft_steps("m5")}));
+  lab.ask(Ask::kSetPosition, {"m5"}, {lab.shaft_steps("m5")});
   lab.naf(5, 0, 10);
   lab.permit(1 | 1 << 5 | 1 << 6);
   ASSERT_TRUE(lab.wait_for_lam());

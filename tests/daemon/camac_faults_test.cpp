@@ -143,8 +143,8 @@ class Chaos {
              !lab_.motor("m01").moving;
     };
     EXPECT_TRUE(lab_.run_until(online, 60));
-    lab_.wait(lab_.send(Ask::kClearFaults, {}));
-    lab_.wait(lab_.send(Ask::kEnable, {}));
+    lab_.ask(Ask::kClearFaults, {});
+    lab_.ask(Ask::kEnable, {});
     EXPECT_TRUE(lab_.run_until([&] { return lab_.all_ready(); }, 60));
   }
   // An MCU that was reset counts anew.
@@ -154,8 +154,7 @@ class Chaos {
       EXPECT_EQ(motor.position_steps, lab_.shaft_steps("m01"));
       return;
     }
-    lab_.wait(lab_.send(Ask::kSetPosition, {"m01", "m03"},
-                        {lab_.shaft_steps("m01"), lab_.shaft_steps("m03")}));
+    lab_.ask(Ask::kSetPosition, {"m01", "m03"}, {lab_.shaft_steps("m01"), lab_.shaft_steps("m03")});
   }
 
   std::mt19937 random_;
@@ -218,12 +217,12 @@ void follow_reactor(std::uint32_t seed) {
     lab.run_for(1);
     EXPECT_EQ(lab.shutter().steps.size(), stands) << "nothing moves by itself";
     // Back to its left limit.
-    lab.wait(lab.send(Ask::kClearFaults, {}));
-    lab.wait(lab.send(Ask::kEnable, {}));
+    lab.ask(Ask::kClearFaults, {});
+    lab.ask(Ask::kEnable, {});
     ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
-    lab.wait(lab.send(Ask::kSetPosition, {"m03"}, {lab.shutter().position}));
-    lab.wait(lab.send(Ask::kMoveTo, {"m03"}, {3}));  // off the limit that it has met
-    lab.wait(lab.send(Ask::kMoveTo, {"m03"}, {0}));
+    lab.ask(Ask::kSetPosition, {"m03"}, {lab.shutter().position});
+    lab.ask(Ask::kMoveTo, {"m03"}, {3});  // off the limit that it has met
+    lab.ask(Ask::kMoveTo, {"m03"}, {0});
     ASSERT_EQ(lab.shutter().position, 0);
     if (testing::Test::HasFailure()) return;
   }

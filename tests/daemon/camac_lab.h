@@ -22,9 +22,7 @@ inline std::string lab_with(const std::string& manner = "fine", const std::strin
   std::string toml = hall(1, 3, manner);
   const std::string last = "output = 2\ngroup = \"axes\"\n";
   toml.replace(toml.find(last), last.size(), "output = 2\ngroup = \"shutters\"\n" + shutter_keys);
-  const std::string first = "output = 0\n";
-  toml.insert(toml.find(first) + first.size(), motor_keys);
-  return toml +
+  return with_keys(toml, "m01", motor_keys) +
          "[[group]]\nname = \"shutters\"\ntable = \"bushd2-constant\"\n"
          "[[crate]]\nnumber = 1\n"
          "[[crate.module]]\nstation = 5\ntype = \"bushd-2\"\nf_start_hz = 100\n"
@@ -40,7 +38,7 @@ class CamacLab : public Lab {
     connect();
   }
   Answer block(camac::Block block, int crate = 1) {
-    return wait(send(api::Camac{.crate = crate, .block = std::move(block)}));
+    return ask(api::Camac{.crate = crate, .block = std::move(block)});
   }
   camac::Response naf(int n, int a, int f, std::uint32_t data = 0) {
     const Answer answer = block({.cycles = {{n, a, f, data}}});

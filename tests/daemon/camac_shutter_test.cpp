@@ -79,7 +79,7 @@ TEST(CamacShutter, TravelsToTheLimitAndBack) {
   EXPECT_THAT(lab.description("m03").table.name, HasSubstr("camac-1-7-"));
   EXPECT_TRUE(lab.warnings().empty());
   EXPECT_TRUE(lab.errors().empty());
-  const Answer moved = lab.wait(lab.send(Ask::kMoveBy, {"m03"}, {3}));
+  const Answer moved = lab.ask(Ask::kMoveBy, {"m03"}, {3});
   EXPECT_EQ(moved.result, "reached") << "it is anybody's again";
 }
 
@@ -252,7 +252,7 @@ TEST(CamacShutter, AStopOfSomebodyElseIsAFault) {
   lab.load_codes(kCodes, 6000);
   lab.permit(kAutomatic | kAllEnabled);
   lab.run_until([&] { return lab.shutter().position == 2; });
-  lab.wait(lab.send(Ask::kStop, {}));
+  lab.ask(Ask::kStop, {});
   EXPECT_EQ(lab.cleared_requests() & 0x3F, kTravelFailed);
   const int stands = lab.shutter().position;
   lab.run_for(1);
@@ -277,7 +277,7 @@ TEST(CamacShutter, AStopAroundTheLastStepLeavesItFreeForTheNextTravel) {
       ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }, 5));
       lab.run_for(0.1);
       lab.cleared_requests();
-      if (lab.shutter().position != 0) lab.wait(lab.send(Ask::kMoveTo, {"m03"}, {0}));
+      if (lab.shutter().position != 0) lab.ask(Ask::kMoveTo, {"m03"}, {0});
       ASSERT_EQ(lab.shutter().position, 0);
     }
     lab.permit(kAutomatic | kAllEnabled);
@@ -301,7 +301,7 @@ TEST(CamacShutter, FaultsInBetweenEndIt) {
   ASSERT_TRUE(lab.run_until([&] { return lab.has_state("hall:1") && !lab.motor("m03").moving; }));
   lab.run_for(1);
   EXPECT_EQ(lab.shutter().position, 0) << "a shutter without its daemon stays closed";
-  lab.wait(lab.send(Ask::kClearFaults, {}));
+  lab.ask(Ask::kClearFaults, {});
   lab.permit(kAutomatic | kSecondMode | kAllEnabled);
   lab.run_for(0.5);
   lab.restart_daemon();

@@ -127,10 +127,10 @@ TEST_P(CamacStream, StopsAndPausesAreThoseOfTheProgram) {
   lab.load(0, 3000, codes);
   lab.permit(kEnabled);
   lab.run_until([&] { return lab.shaft_steps("m01") > 500; });
-  lab.wait(lab.send(api::Pause{{"m01"}}));
+  lab.ask(api::Pause{{"m01"}});
   EXPECT_FALSE(lab.lam());
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).result, "refused");
-  lab.wait(lab.send(api::Resume{{"m01"}}));
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {5}).result, "refused");
+  lab.ask(api::Resume{{"m01"}});
   ASSERT_TRUE(lab.wait_for_lam());
   EXPECT_EQ(lab.shaft_steps("m01"), 3000);
   lab.naf(kStation, 0, 10);
@@ -230,7 +230,7 @@ TEST(CamacStreaming, AStopByOthersEndsWhatWaitsForItsTable) {
   lab.load(0, 500, fast_codes());
   lab.permit(kEnabled);
   lab.run_for(0.3);
-  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  lab.ask(Ask::kStop, {"m01"});
   ASSERT_TRUE(lab.wait_for_lam());
   EXPECT_TRUE(lab.has_result(other));
   lab.run_for(3);

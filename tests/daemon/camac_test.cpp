@@ -173,11 +173,11 @@ TEST(CamacMotion, WhatTheMotorCannotDoIsInItsStatus) {
   lab.permit(kEnabled | 7);
   EXPECT_EQ(lab.requests(), 0x108U) << "there is no motor 7";
   lab.naf(kStation, 0, 10);
-  lab.wait(lab.send(Ask::kDisable, {"m01"}));
+  lab.ask(Ask::kDisable, {"m01"});
   lab.permit(kEnabled);
   EXPECT_EQ(lab.requests(), 0x104U) << "supply missing";
   EXPECT_THAT(lab.warnings().back(), HasSubstr("drivers of MCU hall:1 are disabled"));
-  lab.wait(lab.send(Ask::kEnable, {"m01"}));
+  lab.ask(Ask::kEnable, {"m01"});
   lab.naf(kStation, 0, 10);
   lab.permit(kEnabled);
   ASSERT_TRUE(lab.wait_for_lam());

@@ -92,8 +92,7 @@ TEST(ConverterBoards, DriftInMotionChangesTimesAndNotCounts) {
     lab.moves(5500);
     const std::int64_t after_ns = steps.back().time_ns - steps[steps.size() - 2].time_ns;
     EXPECT_EQ(drift > 0, after_ns < before_ns) << before_ns << ' ' << after_ns;
-    const Answer answer = lab.wait(move, 60);
-    EXPECT_EQ(answer.result, "reached") << answer.reason;
+    EXPECT_THAT(lab.wait(move, 60), Ends("reached"));
     EXPECT_EQ(lab.shaft_steps("m0"), 6000);
     EXPECT_TRUE(lab.trusted("m0"));
   }
@@ -109,15 +108,14 @@ TEST(ConverterBoards, AConverterWithoutPulsesEndsTheMotionAfterASecond) {
   const double taken_s = static_cast<double>(lab.now_us()) * 1e-6 - cut_s;
   EXPECT_GE(taken_s, 1.0 - 0.001);
   EXPECT_LE(taken_s, 1.1);
-  EXPECT_EQ(answer.result, "link") << answer.reason;
-  EXPECT_THAT(answer.reason, HasSubstr("the board's converter gave no pulse within 1 s"));
+  EXPECT_THAT(answer, Ends("link", "the board's converter gave no pulse within 1 s"));
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
   // No step is in doubt, but it stopped from speed.
   EXPECT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0"));
   EXPECT_EQ(lab.motor("m0").trust, api::Trust::kUncertain);
   EXPECT_THAT(lab.motor("m0").uncertain_reason, HasSubstr("stopped without its ramp"));
   lab.has({.hz_per_code = kHzPerCode});
-  lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")}));
+  lab.ask(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")});
   EXPECT_EQ(lab.move("m0", 100).result, "reached");
   EXPECT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0"));
 }
@@ -197,12 +195,12 @@ TEST(ConverterBoards, WhateverHappensCountsAreRightOrSaidToBeUncertain) {
       if (kind == 0) lab.plug(0);
       ASSERT_TRUE(lab.run_until([&] { return lab.has_result(move); }, 60));
       lab.run_for(2.5);
-      if (kind == 5) lab.wait(lab.send(Ask::kClearFaults, {}));
+      if (kind == 5) lab.ask(Ask::kClearFaults, {});
       if (lab.trusted("m0")) {
         ASSERT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0")) << trouble;
       } else {
         ASSERT_LE(std::abs(lab.motor("m0").position_steps - lab.shaft_steps("m0")), 1) << trouble;
-        lab.wait(lab.send(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")}));
+        lab.ask(Ask::kSetPosition, {"m0"}, {lab.shaft_steps("m0")});
       }
     }
   }

@@ -15,17 +15,12 @@ using testing::HasSubstr;
 
 constexpr std::int64_t kMost = INT32_MAX;
 
-std::string m01_with(const std::string& keys) {
-  std::string toml = hall(1, 2);
-  const std::string name = "name = \"m01\"\n";
-  return toml.insert(toml.find(name) + name.size(), keys + "\n");
-}
-
-class CountsLab : public Lab {
+class CountsLab : public ReadyLab {
  public:
-  explicit CountsLab(const std::string& keys) : Lab(m01_with(keys)) {}
+  explicit CountsLab(const std::string& keys)
+      : ReadyLab(with_keys(hall(1, 2), "m01", keys + "\n")) {}
   void stand_at(std::int64_t steps) {
-    ASSERT_EQ(wait(send(Ask::kSetPosition, {"m01"}, {steps})).result, "done");
+    ASSERT_EQ(ask(Ask::kSetPosition, {"m01"}, {steps}).result, "done");
   }
   void hold(std::uint8_t buttons) { bus(0).mcu(0).set_inputs({0, buttons}); }
   std::int64_t position() const { return motor("m01").position_steps; }
@@ -35,16 +30,14 @@ TEST(Counts, HomingThatCouldLeaveThemIsRefused) {
   for (const std::int64_t sign : {-1, 1}) {
     SCOPED_TRACE(sign);
     CountsLab lab("home = { direction = \"negative\", most_steps = 5000, slow_most_steps = 200 }");
-    lab.connect();
     lab.stand_at(sign * (kMost - 1000));
-    const Answer refused = lab.wait(lab.send(Ask::kHome, {"m01"}));
-    EXPECT_EQ(refused.result, "refused");
-    EXPECT_THAT(refused.reason, HasSubstr("m01: "));
+    const Answer refused = lab.ask(Ask::kHome, {"m01"});
+    EXPECT_THAT(refused, Ends("refused", "m01: "));
     EXPECT_THAT(refused.reason, HasSubstr("'bushctl set"));
     EXPECT_EQ(lab.shaft_steps("m01"), 0);
     // As far as there is room for all that it may make.
     lab.stand_at(sign * (kMost - 5300));
-    EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "fault") << "there is no switch";
+    EXPECT_EQ(lab.ask(Ask::kHome, {"m01"}).result, "fault") << "there is no switch";
     EXPECT_EQ(lab.position(), sign * (kMost - 5300) - 5000);
     EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   }
@@ -54,7 +47,6 @@ TEST(Counts, LocalInputsMoveNoFurtherThanTheyReach) {
   for (const std::int64_t sign : {-1, 1}) {
     SCOPED_TRACE(sign);
     CountsLab lab("local = true");
-    lab.connect();
     lab.stand_at(sign * (kMost - 1000));
     lab.hold(sign > 0 ? BUSHD_INPUT_FORWARD : BUSHD_INPUT_REVERSE);
     lab.run_for(4);
@@ -76,7 +68,6 @@ constexpr const char* kByVelocity =
 
 TEST(Counts, WhoPassesTheirEndIsUncertain) {
   CountsLab lab(kByVelocity);
-  lab.connect();
   lab.stand_at(kMost - 500);
   lab.hold(BUSHD_INPUT_FORWARD);
   lab.run_for(2);
@@ -116,7 +107,6 @@ TEST(Counts, WhoPassesTheirEndUnseenIsUncertain) {
 // A position that is set, or found by homing, is no motion.
 TEST(Counts, ToBeSetFromOneEndToTheOtherIsNoMotion) {
   CountsLab lab("local = true");
-  lab.connect();
   for (const std::int64_t steps : {kMost, -kMost, kMost}) {
     lab.stand_at(steps);
     EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);

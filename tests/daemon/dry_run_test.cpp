@@ -16,8 +16,7 @@ TEST(DryRun, TellsWhatTheMoveThenTakesAndSends) {
   for (const char* manner :
        {"fine", "coarse", "fine_table", "coarse_table", "fine_ticks", "coarse_ticks"}) {
     SCOPED_TRACE(manner);
-    Lab lab(hall(2, 4, manner));
-    lab.connect();
+    ReadyLab lab(hall(2, 4, manner));
     const std::vector<std::string> motors = {"m01", "m02", "m04", "m07"};
     const std::vector<std::int64_t> steps = {3000, -41, 0, -1700};
     MotionFrames sent;
@@ -25,7 +24,7 @@ TEST(DryRun, TellsWhatTheMoveThenTakesAndSends) {
       sent.add(bytes);
       return true;
     };
-    const Answer planned = lab.wait(lab.send(dry(motors, steps)));
+    const Answer planned = lab.ask(dry(motors, steps));
     lab.run_for(0.5);
     ASSERT_EQ(planned.result, "done") << planned.reason;
     EXPECT_EQ(sent.frames, 0) << "nothing moves";
@@ -33,7 +32,7 @@ TEST(DryRun, TellsWhatTheMoveThenTakesAndSends) {
     const api::MovePlan& plan = *planned.plan;
     ASSERT_TRUE(plan.traffic);
 
-    ASSERT_EQ(lab.wait(lab.send(Ask::kMoveBy, motors, steps)).result, "reached");
+    ASSERT_EQ(lab.ask(Ask::kMoveBy, motors, steps).result, "reached");
     if (std::string(manner).find('_') == std::string::npos) {
       // States of runs hold for any time: a frame is due when less than 300 ms are queued, and
       // fills the queue up to 600 ms. So to each of two MCUs go T / 600 ms to T / 300 ms, and one
@@ -58,9 +57,8 @@ TEST(DryRun, TellsWhatTheMoveThenTakesAndSends) {
 }
 
 TEST(DryRun, TakesAsLongAsTheMove) {
-  Lab lab(hall(1, 1));
-  lab.connect();
-  const Answer planned = lab.wait(lab.send(dry({"m01"}, {1234})));
+  ReadyLab lab(hall(1, 1));
+  const Answer planned = lab.ask(dry({"m01"}, {1234}));
   const std::int64_t duration_us = planned.plan.value().duration_us;
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {1234});
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 0; }));
@@ -73,12 +71,11 @@ TEST(DryRun, TakesAsLongAsTheMove) {
 }
 
 TEST(DryRun, IsRefusedWhereTheMoveWouldBeAndForMotorsThatMove) {
-  Lab lab(hall(1, 2));
-  lab.connect();
-  EXPECT_THAT(lab.wait(lab.send(dry({"nobody"}, {5}))).reason, testing::HasSubstr("no motor"));
+  ReadyLab lab(hall(1, 2));
+  EXPECT_THAT(lab.ask(dry({"nobody"}, {5})).reason, testing::HasSubstr("no motor"));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {2000});
   lab.run_for(0.3);
-  const Answer refused = lab.wait(lab.send(dry({"m01"}, {5})));
+  const Answer refused = lab.ask(dry({"m01"}, {5}));
   EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_THAT(refused.reason, testing::HasSubstr("m01 moves"));
   EXPECT_EQ(lab.wait(move).result, "reached") << "the move goes on";
@@ -86,9 +83,8 @@ TEST(DryRun, IsRefusedWhereTheMoveWouldBeAndForMotorsThatMove) {
 
 // Days of frames are not made to be counted.
 TEST(DryRun, OfAVeryLongMoveTellsAllButTheFrames) {
-  Lab lab(hall(1, 1, "fine_ticks"));
-  lab.connect();
-  const Answer planned = lab.wait(lab.send(dry({"m01"}, {1'000'000'000})));
+  ReadyLab lab(hall(1, 1, "fine_ticks"));
+  const Answer planned = lab.ask(dry({"m01"}, {1'000'000'000}));
   ASSERT_EQ(planned.result, "done");
   EXPECT_FALSE(planned.plan.value().traffic);
   EXPECT_NEAR(static_cast<double>(planned.plan.value().duration_us), 4e11, 1e9);

@@ -23,8 +23,7 @@ INSTANTIATE_TEST_SUITE_P(Manners, ElementaryLine, testing::Values("fine", "coars
                          [](const auto& manner) { return std::string(manner.param); });
 
 TEST_P(ElementaryLine, IsMadeByItsMcuExactToASlot) {
-  Lab lab(hall(2, 4, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 4, GetParam()), {}, vcd_.get());
   MotionFrames sent;
   lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
     sent.add(bytes);
@@ -32,9 +31,8 @@ TEST_P(ElementaryLine, IsMadeByItsMcuExactToASlot) {
   };
   const auto reaches = [&](const std::vector<std::string>& motors,
                            const std::vector<std::int64_t>& steps) {
-    const Answer result = lab.wait(lab.send(elementary_to(motors, steps)));
-    EXPECT_EQ(result.result, "reached") << result.reason;
-    EXPECT_THAT(result.reason, HasSubstr("the line was limited by m0"));
+    EXPECT_THAT(lab.ask(elementary_to(motors, steps)),
+                Ends("reached", "the line was limited by m0"));
     for (std::size_t i = 0; i < motors.size(); ++i) EXPECT_EQ(lab.shaft_steps(motors[i]), steps[i]);
   };
   // Named in another order than that of the outputs, which is that of the law.
@@ -59,12 +57,11 @@ TEST_P(ElementaryLine, IsMadeByItsMcuExactToASlot) {
 }
 
 TEST_P(ElementaryLine, StaysOnTheLineWhereItIsStoppedPausedAndChanged) {
-  Lab lab(hall(1, 3, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(1, 3, GetParam()), {}, vcd_.get());
   const std::vector<std::int64_t> steps{3000, -1201, 170};
   const auto move = lab.send(elementary_to(kThree, steps));
   lab.run_for(0.4);
-  lab.wait(lab.send(api::Pause{{"m02"}}));
+  lab.ask(api::Pause{{"m02"}});
   lab.run_for(1);
   EXPECT_LE(off_line(lab, kThree, steps), 1.0);
   EXPECT_GT(lab.shaft_steps("m01"), 0);
@@ -76,11 +73,11 @@ TEST_P(ElementaryLine, StaysOnTheLineWhereItIsStoppedPausedAndChanged) {
   const auto second = lab.send(slower);
   lab.run_for(0.4);
   EXPECT_EQ(lab.wait(move).result, "stopped");
-  lab.wait(lab.send(Ask::kStop, {"m03"}));
+  lab.ask(Ask::kStop, {"m03"});
   EXPECT_EQ(lab.wait(second).result, "stopped");
   EXPECT_THAT(lab.last_reply(second).reason, testing::Not(HasSubstr("off it")));
   EXPECT_LE(off_line(lab, kThree, steps), 1.0);
-  EXPECT_EQ(lab.wait(lab.send(elementary_to(kThree, steps))).result, "reached");
+  EXPECT_EQ(lab.ask(elementary_to(kThree, steps)).result, "reached");
   lab.run_for(0.1);
   expect_clean(lab, {"hall:1"});
   ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
@@ -88,53 +85,47 @@ TEST_P(ElementaryLine, StaysOnTheLineWhereItIsStoppedPausedAndChanged) {
 }
 
 TEST(ElementaryLines, ANearerEndIsOneThroughWhichTheLineLeads) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   const auto move = lab.send(elementary_to({"m01", "m02"}, {6000, 3000}));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "m02"}, {3000, 1400}))).reason,
+  EXPECT_THAT(lab.ask(line_to({"m01", "m02"}, {3000, 1400})).reason,
               HasSubstr("is not on the line that is under way, which leads through"));
-  EXPECT_EQ(lab.wait(lab.send(line_to({"m01", "m02"}, {3000, 1500}))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to({"m01", "m02"}, {3000, 1500})).result, "reached");
   EXPECT_EQ(lab.wait(move).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), 3000);
   EXPECT_EQ(lab.shaft_steps("m02"), 1500);
 }
 
 TEST(ElementaryLines, AreOfOneMcuThatMakesThem) {
-  Lab lab(hall(2, 2));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(elementary_to({"m01", "m04"}, {5, 5}))).reason,
+  ReadyLab lab(hall(2, 2));
+  EXPECT_EQ(lab.ask(elementary_to({"m01", "m04"}, {5, 5})).reason,
             "m01 is connected to MCU hall:1 and m04 to hall:2: by the elementary law one MCU makes "
             "each step of the line; name motors of one MCU, or ask for the leading law");
-  EXPECT_THAT(
-      lab.wait(lab.send(elementary_to({"m01", "m02"}, {1'500'000'000, 1'500'000'000}))).reason,
-      HasSubstr("by the elementary law a line has at most 2147483647"));
+  EXPECT_THAT(lab.ask(elementary_to({"m01", "m02"}, {1'500'000'000, 1'500'000'000})).reason,
+              HasSubstr("by the elementary law a line has at most 2147483647"));
   const auto leading = lab.send(line_to({"m01", "m02"}, {2000, 2000}));
   lab.run_for(0.3);
   EXPECT_THAT(
-      lab.wait(lab.send(elementary_to({"m01", "m02"}, {1000, 1000}))).reason,
+      lab.ask(elementary_to({"m01", "m02"}, {1000, 1000})).reason,
       HasSubstr("the line under way is not by the elementary law, and a line keeps its law"));
   EXPECT_EQ(lab.wait(leading).result, "reached");
   const std::string denied =
       "makes no lines by the elementary law by itself: its firmware does not, or the bus has "
       "frames = \"ticks\"; ask for the leading law";
   for (const char* manner : {"fine", "fine_ticks"}) {
-    Lab other(hall(1, 2, manner), {}, nullptr,
-              std::string(manner) == "fine" ? BUSHD_CAN_ELEMENTARY : 0);
-    other.connect();
-    EXPECT_EQ(other.wait(other.send(elementary_to({"m01", "m02"}, {5, 5}))).reason,
-              "MCU hall:1 " + denied);
+    ReadyLab other(hall(1, 2, manner), {}, nullptr,
+                   std::string(manner) == "fine" ? BUSHD_CAN_ELEMENTARY : 0);
+    EXPECT_EQ(other.ask(elementary_to({"m01", "m02"}, {5, 5})).reason, "MCU hall:1 " + denied);
   }
 }
 
 // v = h f, by either law where that is the same: of one motor.
 TEST(ElementaryLines, AFeedIsThatOfElementarySteps) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   auto line = elementary_to({"m01", "m02"}, {3000, 2000});
   line.dry_run = true;
   line.feed = api::Speed{.per_s = 100, .in_steps = true};
-  const auto plan = lab.wait(lab.send(line)).plan;
+  const auto plan = lab.ask(line).plan;
   ASSERT_TRUE(plan);
   EXPECT_NEAR(static_cast<double>(plan->duration_us), 50e6, 0.1e6);
   EXPECT_NEAR(plan->motors[0].peak_steps_per_s, 60, 0.01);
@@ -143,19 +134,19 @@ TEST(ElementaryLines, AFeedIsThatOfElementarySteps) {
   line = line_to({"m01", "m02"}, {3000, -4000});
   line.dry_run = true;
   line.feed = api::Speed{.per_s = 100, .in_steps = true};
-  const auto leading = lab.wait(lab.send(line)).plan;
+  const auto leading = lab.ask(line).plan;
   ASSERT_TRUE(leading);
   EXPECT_NEAR(static_cast<double>(leading->duration_us), 50e6, 0.1e6);
   EXPECT_NEAR(leading->motors[0].peak_steps_per_s, 60, 0.1);
   EXPECT_NEAR(leading->motors[1].peak_steps_per_s, 80, 0.15);
   line.feed = api::Speed{.per_s = 1e9, .in_steps = true};
-  const auto fast = lab.wait(lab.send(line)).plan;
+  const auto fast = lab.ask(line).plan;
   line.feed.reset();
-  EXPECT_EQ(fast->duration_us, lab.wait(lab.send(line)).plan->duration_us);
+  EXPECT_EQ(fast->duration_us, lab.ask(line).plan->duration_us);
   line.feed = api::Speed{.per_s = 1e-4, .in_steps = true};
-  EXPECT_THAT(lab.wait(lab.send(line)).reason, HasSubstr("allowed: up to an hour a step"));
+  EXPECT_THAT(lab.ask(line).reason, HasSubstr("allowed: up to an hour a step"));
   line.feed = api::Speed{.per_s = -1};
-  EXPECT_THAT(lab.wait(lab.send(line)).reason, HasSubstr("a feed of -1; allowed: any above 0"));
+  EXPECT_THAT(lab.ask(line).reason, HasSubstr("a feed of -1; allowed: any above 0"));
 }
 
 TEST(ElementaryLines, AFeedIsOfMotorsWithOneUnit) {
@@ -163,31 +154,28 @@ TEST(ElementaryLines, AFeedIsOfMotorsWithOneUnit) {
     return with_keys(with_keys(hall(1, 2), "m01", first), "m02", second);
   };
   const std::string mm = "unit = \"mm\"\nsteps_per_unit = 100\n";
-  Lab lab(scaled(mm, "unit = \"mm\"\nsteps_per_unit = 200\n"));
-  lab.connect();
+  ReadyLab lab(scaled(mm, "unit = \"mm\"\nsteps_per_unit = 200\n"));
   auto line = line_to({"m01", "m02"}, {3000, 8000});  // 30 mm, 40 mm
   line.dry_run = true;
   line.feed = api::Speed{.per_s = 5};
-  const auto plan = lab.wait(lab.send(line)).plan;
+  const auto plan = lab.ask(line).plan;
   ASSERT_TRUE(plan);
   // A step of 1.25 ms takes 32 units of 40 us, the next one that is no faster.
   EXPECT_NEAR(plan->motors[0].peak_steps_per_s, 300 * 31.25 / 32, 0.01);
   line.law = api::MoveLine::Law::kElementary;
   EXPECT_EQ(
-      lab.wait(lab.send(line)).reason,
+      lab.ask(line).reason,
       "m01 has 100 steps per mm and m02 has 200: by the elementary law a feed is h f, with one "
       "step h for all; give a feed in steps, or ask for the leading law");
-  Lab mixed(scaled(mm, "unit = \"deg\"\nsteps_per_unit = 100\n"));
-  mixed.connect();
+  ReadyLab mixed(scaled(mm, "unit = \"deg\"\nsteps_per_unit = 100\n"));
   line.law = api::MoveLine::Law::kLeading;
   EXPECT_EQ(
-      mixed.wait(mixed.send(line)).reason,
+      mixed.ask(line).reason,
       "m01 is in mm and m02 in deg: a feed is along the way, so of motors with one unit; give a "
       "speed, which is of each motor in its own, or a feed in steps");
-  Lab equal(scaled(mm, mm));
-  equal.connect();
+  ReadyLab equal(scaled(mm, mm));
   line.law = api::MoveLine::Law::kElementary;
-  const auto same = equal.wait(equal.send(line)).plan;
+  const auto same = equal.ask(line).plan;
   ASSERT_TRUE(same);
   EXPECT_NEAR(same->motors[0].peak_steps_per_s + same->motors[1].peak_steps_per_s, 500, 0.5);
 }
@@ -195,21 +183,19 @@ TEST(ElementaryLines, AFeedIsOfMotorsWithOneUnit) {
 // Along each segment, whatever its direction.
 TEST(ElementaryLines, AFeedIsOfPathsToo) {
   const std::string mm = "unit = \"mm\"\nsteps_per_unit = 100\n";
-  Lab lab(with_keys(with_keys(hall(1, 2), "m01", mm), "m02", mm));
-  lab.connect();
+  ReadyLab lab(with_keys(with_keys(hall(1, 2), "m01", mm), "m02", mm));
   api::MovePath path{.motors = {"m01", "m02"},
                      .rows = 3,
                      .positions = {30, 40, 80, 40, 80, -10},
                      .corners = api::MovePath::Corners::kExact,
                      .dry_run = true,
                      .feed = api::Speed{.per_s = 5}};
-  const auto plan = lab.wait(lab.send(path)).plan;
+  const auto plan = lab.ask(path).plan;
   ASSERT_TRUE(plan);
   EXPECT_NEAR(static_cast<double>(plan->duration_us), 30e6, 1e6);
   EXPECT_NEAR(plan->motors[0].peak_steps_per_s, 500, 1);
   path.feed = api::Speed{.per_s = 1e-6};
-  EXPECT_THAT(lab.wait(lab.send(path)).reason,
-              HasSubstr("point 1, a feed of 1e-06 mm/s would take"));
+  EXPECT_THAT(lab.ask(path).reason, HasSubstr("point 1, a feed of 1e-06 mm/s would take"));
 }
 
 }  // namespace

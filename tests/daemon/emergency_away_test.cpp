@@ -17,10 +17,8 @@ constexpr std::int64_t kOffNs = 3'000'000'000;
 
 // m01 and m02 on the first MCU, m03 and m04 on the second; m03 is homed whenever that comes.
 std::string hall_with_homing() {
-  std::string toml = hall(2, 2);
-  const std::string name = "name = \"m03\"\n";
-  return toml.insert(toml.find(name) + name.size(),
-                     "home = { direction = \"negative\", most_steps = 6000, at_start = true }\n");
+  return with_keys(hall(2, 2), "m03",
+                   "home = { direction = \"negative\", most_steps = 6000, at_start = true }\n");
 }
 
 class EmergencyAway : public testing::Test {
@@ -48,13 +46,12 @@ class EmergencyAway : public testing::Test {
     lab.run_for(3);
     EXPECT_EQ(lab.shaft_steps("m03"), before) << "it is not homed";
     const Answer refused = lab.last_reply(lab.send(Ask::kMoveBy, {"m04"}, {5}));
-    EXPECT_EQ(refused.result, "refused");
-    EXPECT_THAT(refused.reason, HasSubstr("bushctl clear"));
+    EXPECT_THAT(refused, Ends("refused", "bushctl clear"));
   }
   void expect_free() {
     ASSERT_TRUE(lab.run_until([&] { return state() == api::McuState::kReady; }, 10));
-    EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m04"}, {0})).result, "done");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m04"}, {5})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m04"}, {0}).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m04"}, {5}).result, "reached");
   }
 
   Lab lab;
@@ -64,10 +61,10 @@ class EmergencyAway : public testing::Test {
 TEST_F(EmergencyAway, BindsAnMcuWithoutPower) {
   connect();
   cut_power();
-  EXPECT_THAT(lab.wait(lab.send(Ask::kEmergencyStop, {})).reason, HasSubstr("hall:2"));
+  EXPECT_THAT(lab.ask(Ask::kEmergencyStop, {}).reason, HasSubstr("hall:2"));
   EXPECT_THAT(lab.state_of("hall:2").detail, HasSubstr("emergency stop"));
   expect_bound();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   expect_free();
   // It is over: one that comes now is free.
   cut_power();
@@ -78,18 +75,17 @@ TEST_F(EmergencyAway, BindsAnMcuWithoutPower) {
 TEST_F(EmergencyAway, IsNotClearedWhereNobodyHasHeardTheClear) {
   connect();
   cut_power();
-  lab.wait(lab.send(Ask::kEmergencyStop, {}));
-  EXPECT_THAT(lab.wait(lab.send(Ask::kClearFaults, {})).reason,
-              HasSubstr("not done there: hall:2"));
+  lab.ask(Ask::kEmergencyStop, {});
+  EXPECT_THAT(lab.ask(Ask::kClearFaults, {}).reason, HasSubstr("not done there: hall:2"));
   EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady);
   expect_bound();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {"m04"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {"m04"}).result, "done");
   expect_free();
 }
 
 TEST_F(EmergencyAway, ARebootClearsNothing) {
   connect();
-  ASSERT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  ASSERT_EQ(lab.ask(Ask::kEmergencyStop, {}).result, "done");
   cut_power();
   expect_bound();
 }
@@ -98,7 +94,7 @@ TEST_F(EmergencyAway, ARebootClearsNothing) {
 TEST_F(EmergencyAway, OutlivesTheDaemonWithoutAStore) {
   connect();
   cut_power();
-  lab.wait(lab.send(Ask::kEmergencyStop, {}));
+  lab.ask(Ask::kEmergencyStop, {});
   lab.restart_daemon();
   expect_bound();
 }
@@ -108,12 +104,12 @@ TEST_F(EmergencyAway, OutlivesTheDaemonInTheStore) {
   lab.keep_positions();
   connect();
   cut_power();
-  lab.wait(lab.send(Ask::kEmergencyStop, {}));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {"m01"})).result, "done");
+  lab.ask(Ask::kEmergencyStop, {});
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {"m01"}).result, "done");
   lab.run_for(0.1);
   lab.cut_pc_power();
   expect_bound();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   lab.run_for(0.1);
   lab.restart_daemon();
   expect_free();
@@ -121,8 +117,7 @@ TEST_F(EmergencyAway, OutlivesTheDaemonInTheStore) {
 
 // An MCU whose table run nobody has ended: the daemon ends it by a stop that is nobody's.
 TEST(EmergencyAwayRuns, TheEndOfAnEarlierRunBindsNobody) {
-  Lab lab(hall(2, 1, "fine_table"));
-  lab.connect();
+  ReadyLab lab(hall(2, 1, "fine_table"));
   lab.bus(0).reboot(1, kOffNs);
   lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(0.5);
@@ -138,7 +133,7 @@ TEST(EmergencyAwayPorts, APortThatIsUnpluggedAndANewDaemonAreBound) {
   lab.keep_positions();
   lab.connect();
   lab.unplug(1);
-  lab.wait(lab.send(Ask::kEmergencyStop, {}));
+  lab.ask(Ask::kEmergencyStop, {});
   EXPECT_THAT(lab.state_of("p1").detail, HasSubstr("emergency stop"));
   lab.plug(1);
   const auto bound = [&lab](const char* mcu) {
@@ -148,7 +143,7 @@ TEST(EmergencyAwayPorts, APortThatIsUnpluggedAndANewDaemonAreBound) {
   lab.run_for(0.1);
   lab.restart_daemon();
   ASSERT_TRUE(lab.run_until([&] { return bound("p0") && bound("p1"); }, 10));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {"m1"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {"m1"}).result, "done");
   lab.run_for(0.1);
   lab.restart_daemon();
   ASSERT_TRUE(lab.run_until(
@@ -158,18 +153,17 @@ TEST(EmergencyAwayPorts, APortThatIsUnpluggedAndANewDaemonAreBound) {
 }
 
 TEST(EmergencyAwayBoards, ABoardThatIsUnpluggedIsBound) {
-  Lab lab(
+  ReadyLab lab(
       "[[bus]]\nname = \"board\"\nkind = \"commutator\"\nport = \"/dev/null\"\nbaud = 115200\n"
       "start_hz = 100\n[[group]]\nname = \"axes\"\ntable = \"bushd2-constant\"\n"
       "[[motor]]\nname = \"m0\"\nmcu = \"board\"\noutput = 0\ngroup = \"axes\"\n");
-  lab.connect();
   lab.unplug(0);
-  lab.wait(lab.send(Ask::kEmergencyStop, {}));
+  lab.ask(Ask::kEmergencyStop, {});
   lab.plug(0);
   const auto state = [&lab] { return lab.state_of("board").state; };
   ASSERT_TRUE(lab.run_until([&] { return state() == api::McuState::kFault; }, 10));
   EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m0"}, {5})).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   ASSERT_TRUE(lab.run_until([&] { return state() == api::McuState::kReady; }, 10));
 }
 

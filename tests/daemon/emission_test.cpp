@@ -34,10 +34,8 @@ class Drivers final : public sim::EdgeSink {
 };
 
 // An MCU of four motors with these keys.
-std::string with_keys(const std::string& manner, const std::string& keys) {
-  std::string toml = hall(1, 4, manner);
-  const std::string mcu = "address = 1\n";
-  return toml.replace(toml.find(mcu), mcu.size(), mcu + keys);
+std::string four_with(const std::string& manner, const std::string& keys) {
+  return with_mcu_keys(hall(1, 4, manner), keys);
 }
 
 struct Mode {
@@ -62,8 +60,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_P(EmissionModes, MovesReachTheirTargetsAndNoStepIsLost) {
   for (const char* manner : {"coarse", "fine", "fine_table"}) {
     Drivers drivers(std::string_view(GetParam().keys).find("common") != std::string_view::npos);
-    Lab lab(with_keys(manner, GetParam().keys), {}, &drivers);
-    lab.connect();
+    ReadyLab lab(four_with(manner, GetParam().keys), {}, &drivers);
     const std::map<std::string, std::int64_t> moves = {
         {"m01", 700}, {"m02", -700}, {"m03", 90}, {"m04", -1}};
     std::vector<std::string> names;
@@ -72,8 +69,7 @@ TEST_P(EmissionModes, MovesReachTheirTargetsAndNoStepIsLost) {
       names.push_back(name);
       steps.push_back(distance);
     }
-    const Answer there = lab.wait(lab.send(Ask::kMoveBy, names, steps));
-    EXPECT_EQ(there.result, "reached") << there.reason;
+    EXPECT_THAT(lab.ask(Ask::kMoveBy, names, steps), Ends("reached"));
     int most = 0;
     for (const auto& [time, count] : drivers.together) most = std::max(most, count);
     EXPECT_LE(most, GetParam().most_together) << manner;
@@ -99,26 +95,24 @@ INSTANTIATE_TEST_SUITE_P(Direction, EmissionStaggered, testing::Values("own", "c
 TEST_P(EmissionStaggered, SupplyCurrentIsMeasuredBeforeTheMcuIsReady) {
   const std::string direction = "direction = \"" + std::string(GetParam()) + "\"\n";
   Drivers drivers(std::string_view(GetParam()) == "common");
-  Lab lab(with_keys("fine", direction + "steps = \"staggered\"\nstep_us = 320\n"
-                                        "settle_us = \"measured\"\n"),
-          {}, &drivers);
-  lab.connect();
+  ReadyLab lab(four_with("fine", direction + "steps = \"staggered\"\nstep_us = 320\n"
+                                             "settle_us = \"measured\"\n"),
+               {}, &drivers);
   EXPECT_EQ(drivers.position[0], 0) << "to and fro, as drivers see it";
   EXPECT_NEAR(lab.bus(0).mcu(0).core().emission.of.settle.of.step.back_ns, 518'000, 60'000);
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
   EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 2u) << "a step and its way back";
-  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {300, -300}));
+  const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m02"}, {300, -300});
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 300);
 }
 
 TEST_P(EmissionStaggered, NothingMovesToBeMeasuredUnlessThatIsAskedFor) {
   const std::string direction = "direction = \"" + std::string(GetParam()) + "\"\n";
-  Lab lab(with_keys("fine", direction + "steps = \"staggered\"\nstep_us = 320\n"));
-  lab.connect();
+  ReadyLab lab(four_with("fine", direction + "steps = \"staggered\"\nstep_us = 320\n"));
   lab.run_for(0.5);
   for (int m = 0; m < 4; ++m) EXPECT_EQ(lab.bus(0).mcu(0).shaft(m).travel_steps, 0u) << m;
-  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {300, -300}));
+  const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m02"}, {300, -300});
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 300u);
   EXPECT_EQ(lab.bus(0).mcu(0).shaft(1).travel_steps, 300u);
@@ -152,10 +146,10 @@ TEST(EmissionPhases, MovesTurnTheWindings) {
   };
   for (const char* manner : {"coarse", "fine", "fine_table"}) {
     Windings windings;
-    Lab lab(with_keys(manner, "steps = \"phases\"\nphase_sequence = \"half\"\n"), {}, &windings);
-    lab.connect();
+    ReadyLab lab(four_with(manner, "steps = \"phases\"\nphase_sequence = \"half\"\n"), {},
+                 &windings);
     for (const std::int64_t steps : {500, -37, -600}) {
-      const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m04"}, {steps, -steps}));
+      const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m04"}, {steps, -steps});
       EXPECT_EQ(result.result, "reached") << result.reason;
     }
     EXPECT_EQ(windings.position[0], -137);
@@ -182,21 +176,20 @@ class Levels final : public sim::EdgeSink {
 
 TEST(EmissionPhases, AnotherSequenceInOperationIsThatOfTheNextMoves) {
   Levels levels;
-  Lab lab(with_keys("fine", "steps = \"phases\"\n"), {}, &levels);
-  lab.connect();
+  ReadyLab lab(four_with("fine", "steps = \"phases\"\n"), {}, &levels);
   const auto move = [&](std::int64_t steps) {
     levels.seen.clear();
-    const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {steps}));
+    const Answer result = lab.ask(Ask::kMoveBy, {"m01"}, {steps});
     EXPECT_EQ(result.result, "reached") << result.reason;
     return levels.seen;
   };
   EXPECT_THAT(move(5), testing::IsSupersetOf({3, 6, 12, 9}));
   const auto change = [&](const char* sequence) {
-    const Answer changed = lab.wait(lab.send(api::Configure{
-        .kind = api::Configure::Kind::kChange, .changes = {{"m04", "phase_sequence", sequence}}}));
-    EXPECT_EQ(changed.result, "done") << changed.reason;
+    EXPECT_THAT(lab.ask(api::Configure{.kind = api::Configure::Kind::kChange,
+                                       .changes = {{"m04", "phase_sequence", sequence}}}),
+                Ends("done"));
     EXPECT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
-    EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {0}).result, "done");
   };
   change("half");
   EXPECT_EQ(move(8), (std::vector<int>{1, 3, 2, 6, 4, 12, 8, 9, 1}));
@@ -205,7 +198,7 @@ TEST(EmissionPhases, AnotherSequenceInOperationIsThatOfTheNextMoves) {
 }
 
 TEST(EmissionSettings, WhatTheMcuCannotKeepIsNamedWithKeyAndLine) {
-  Lab lab(with_keys("fine", "dir_setup_us = 5\npulse_us = 5\n"));
+  Lab lab(four_with("fine", "dir_setup_us = 5\npulse_us = 5\n"));
   lab.run_for(3);
   EXPECT_THAT(lab.state_of("hall:1").detail,
               testing::HasSubstr("bushd.toml:14:12: mcu[0].pulse_us: is 5 us, longer than the STEP "
@@ -213,8 +206,7 @@ TEST(EmissionSettings, WhatTheMcuCannotKeepIsNamedWithKeyAndLine) {
 }
 
 TEST(EmissionSettings, ADaemonWithOtherSettingsChangesThem) {
-  Lab lab(with_keys("coarse", "steps = \"burst\"\nstep_us = 320\n"));
-  lab.connect();
+  ReadyLab lab(four_with("coarse", "steps = \"burst\"\nstep_us = 320\n"));
   EXPECT_EQ(lab.bus(0).mcu(0).core().emission.settings.mode, BUSHD_EMISSION_BURST);
   lab.restart_daemon();
   lab.connect();

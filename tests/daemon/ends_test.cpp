@@ -25,14 +25,14 @@ class LastStep final : public sim::EdgeSink {
   sim::TimeNs at_ns_ = 0;
 };
 
-struct Ends {
+struct HowItEnds {
   const char* name;
   int mcus;
   bool line;
   std::int64_t apart_steps;  // each motor goes so much farther than the one before
 };
 
-class EndsOfMoves : public testing::TestWithParam<Ends> {};
+class EndsOfMoves : public testing::TestWithParam<HowItEnds> {};
 
 // From the last edge to the result, at any phase of polls and SYNCs. The tick of the last edge
 // ends, and crystals may have drifted by 0.2 ms; a SYNC may just be on the line; one poll, whose
@@ -47,8 +47,7 @@ TEST_P(EndsOfMoves, AreHeardOfByOnePoll) {
       poll_us - hall_line_us(1 + static_cast<std::size_t>(mcus) * BUSHD_POLL_ENTRY);
   const std::int64_t most_us = kHallTickUs + 200 + hall_line_us(kSync) + others_us + answers_us;
   LastStep last;
-  Lab lab(hall(mcus, 1), {}, &last);
-  lab.connect();
+  ReadyLab lab(hall(mcus, 1), {}, &last);
   lab.run_for(3);  // the MCUs know their rates
   std::vector<std::string> names;
   for (int m = 1; m <= mcus; ++m) names.push_back("m0" + std::to_string(m));
@@ -68,13 +67,16 @@ TEST_P(EndsOfMoves, AreHeardOfByOnePoll) {
   EXPECT_LE(longest_us, most_us);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Groups, EndsOfMoves,
-    testing::Values(Ends{"one", 1, false, 0}, Ends{"two_mcus", 2, false, 0},
-                    Ends{"two_mcus_apart", 2, false, 1}, Ends{"line_of_two_mcus", 2, true, 0},
-                    Ends{"line_that_ends_apart", 2, true, 3}, Ends{"eight_mcus", 8, false, 0},
-                    Ends{"eight_mcus_apart", 8, false, 1}, Ends{"line_of_eight_mcus", 8, true, 0}),
-    [](const auto& tested) { return std::string(tested.param.name); });
+INSTANTIATE_TEST_SUITE_P(Groups, EndsOfMoves,
+                         testing::Values(HowItEnds{"one", 1, false, 0},
+                                         HowItEnds{"two_mcus", 2, false, 0},
+                                         HowItEnds{"two_mcus_apart", 2, false, 1},
+                                         HowItEnds{"line_of_two_mcus", 2, true, 0},
+                                         HowItEnds{"line_that_ends_apart", 2, true, 3},
+                                         HowItEnds{"eight_mcus", 8, false, 0},
+                                         HowItEnds{"eight_mcus_apart", 8, false, 1},
+                                         HowItEnds{"line_of_eight_mcus", 8, true, 0}),
+                         [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace
 }  // namespace bushd::test

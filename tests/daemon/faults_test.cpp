@@ -17,8 +17,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, Faults,
                          [](const auto& manner) { return std::string(manner.param); });
 
 TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
-  Lab lab(hall(2, 4, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(2, 4, GetParam()));
   std::mt19937 random(1985);
   // One write in eight is lost: queues are 300 ms deep and polls come every 50 ms.
   int lost = 0;
@@ -37,15 +36,14 @@ TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
 }
 
 TEST_P(Faults, FlippedBitsAreDroppedCountedAndRepaired) {
-  Lab lab(hall(1, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(1, 2, GetParam()));
   std::mt19937 random(1985);
   lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
     if (random() % 10 == 0)
       bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
     return true;
   };
-  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {4000, -4000}));
+  const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m02"}, {4000, -4000});
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 4000);
   EXPECT_EQ(lab.shaft_steps("m02"), -4000);
@@ -55,13 +53,12 @@ TEST_P(Faults, FlippedBitsAreDroppedCountedAndRepaired) {
 // Whatever is lost of a stop, a motor ends where its result says.
 TEST_P(Faults, LostReplacementIsPlannedAgain) {
   for (int lost = 1; lost <= 4; ++lost) {
-    Lab lab(hall(1, 2, GetParam()));
-    lab.connect();
+    ReadyLab lab(hall(1, 2, GetParam()));
     const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {9000, 3000});
     lab.run_for(1.3);
     int count = 0;
     lab.on_send = [&](std::size_t, std::vector<std::uint8_t>&) { return ++count > lost; };
-    EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
     const Answer result = lab.wait(move);
     EXPECT_EQ(result.motor_results.at(0), "stopped") << lost << " lost: " << result.reason;
     EXPECT_EQ(result.motor_results.at(1), "reached");
@@ -75,8 +72,7 @@ TEST_P(Faults, LostReplacementIsPlannedAgain) {
 // empty.
 TEST_P(Faults, DaemonPausedJustAfterAStop) {
   for (const double after_ms : {0.5, 5.0, 15.0, 40.0}) {
-    Lab lab(hall(2, 3, GetParam()));
-    lab.connect();
+    ReadyLab lab(hall(2, 3, GetParam()));
     const auto move = lab.send(Ask::kMoveBy, {"m01", "m02", "m05"}, {9000, -9000, 9000});
     lab.run_for(1.3);
     lab.send(Ask::kStop, {});
@@ -89,8 +85,7 @@ TEST_P(Faults, DaemonPausedJustAfterAStop) {
 }
 
 TEST_P(Faults, LinkLostInMotionRunsDownAndGoesOnFromThere) {
-  Lab lab(hall(2, 4, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(2, 4, GetParam()));
   const auto move = lab.send(Ask::kMoveBy, {"m01", "m06"}, {9000, -9000});
   lab.run_for(1.5);
   lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
@@ -105,7 +100,7 @@ TEST_P(Faults, LinkLostInMotionRunsDownAndGoesOnFromThere) {
   lab.connect();
   EXPECT_EQ(lab.motor("m01").position_steps, first);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01", "m06"}, {0, 0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01", "m06"}, {0, 0}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   EXPECT_EQ(lab.shaft_steps("m06"), 0);
 }
@@ -128,21 +123,19 @@ void pause_when_asked(Lab& lab, double seconds) {
 
 TEST_P(Faults, DaemonPausedForShortStillStopsAtOnce) {
   const auto steps_to_rest = [](double pause_s) {
-    Lab lab(hall(1, 2, GetParam()));
-    lab.connect();
+    ReadyLab lab(hall(1, 2, GetParam()));
     lab.send(Ask::kMoveBy, {"m01"}, {200000});
     lab.run_for(1.5);
     pause_when_asked(lab, pause_s);
     const std::int64_t at = lab.shaft_steps("m01");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kStop, {}).result, "done");
     return lab.shaft_steps("m01") - at;
   };
   EXPECT_LT(steps_to_rest(0.2), steps_to_rest(0) + 300) << "0.12 s at 2500 steps/s";
 }
 
 TEST_P(Faults, DaemonPausedLongerThanTheQueue) {
-  Lab lab(hall(1, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(1, 2, GetParam()));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {200000});  // 80 s
   lab.run_for(1.5);
   pause_when_asked(lab, 1.7);
@@ -159,8 +152,7 @@ TEST_P(Faults, DaemonPausedLongerThanTheQueue) {
 
 // Another daemon may have been there meanwhile.
 TEST_P(Faults, NothingIsKnownAfterALongPauseBeforeTheMcuHasReported) {
-  Lab lab(hall(1, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(1, 2, GetParam()));
   lab.run_for(1);
   ASSERT_EQ(lab.state_of("hall:1").motors.at(0).trust, api::Trust::kKnown);
   lab.pause_daemon(1.7);
@@ -176,8 +168,7 @@ TEST_P(Faults, NothingIsKnownAfterALongPauseBeforeTheMcuHasReported) {
 }
 
 TEST_P(Faults, PortLostAndBack) {
-  Lab lab(hall(1, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(1, 2, GetParam()));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {-9000});
   lab.run_for(1.1);
   lab.unplug(0);
@@ -190,13 +181,12 @@ TEST_P(Faults, PortLostAndBack) {
   lab.plug(0);
   lab.connect();
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {10})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {10}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 10);
 }
 
 TEST_P(Faults, NewDaemonTakesPositionsOverInMotion) {
-  Lab lab(hall(2, 4, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(2, 4, GetParam()));
   lab.send(Ask::kMoveBy, {"m01", "m08"}, {9000, -9000});
   lab.run_for(1.5);
   lab.restart_daemon();
@@ -207,14 +197,13 @@ TEST_P(Faults, NewDaemonTakesPositionsOverInMotion) {
     EXPECT_EQ(lab.motor(name).trust, api::Trust::kUncertain)
         << "this daemon has not seen all of it";
   }
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01", "m08"}, {0, 0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01", "m08"}, {0, 0}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   EXPECT_EQ(lab.shaft_steps("m08"), 0);
 }
 
 TEST_P(Faults, McuResetMakesPositionsUncertainUntilSet) {
-  Lab lab(hall(2, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()));
   const auto move = lab.send(Ask::kMoveBy, {"m01", "m03"}, {9000, 700});
   lab.run_for(1.5);
   lab.bus(0).reboot(0, 50'000'000);
@@ -226,16 +215,15 @@ TEST_P(Faults, McuResetMakesPositionsUncertainUntilSet) {
   EXPECT_EQ(lab.motor("m03").trust, api::Trust::kKnown);
   EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).reason,
               testing::HasSubstr("uncertain"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {0}).result, "done");
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   const std::int64_t before = lab.shaft_steps("m01");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {25})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {25}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), before + 25);
 }
 
 TEST_P(Faults, StopForADeadMcuDoesNotStarveTheOthers) {
-  Lab lab(hall(2, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()));
   const auto dying = lab.send(Ask::kMoveBy, {"m01"}, {9000});
   const auto healthy = lab.send(Ask::kMoveBy, {"m03"}, {5000});
   lab.run_for(1.3);
@@ -249,22 +237,19 @@ TEST_P(Faults, StopForADeadMcuDoesNotStarveTheOthers) {
 }
 
 TEST_P(Faults, DriversSwitchedOffStayOff) {
-  Lab lab(hall(1, 2, GetParam()));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {})).result, "done");
+  ReadyLab lab(hall(1, 2, GetParam()));
+  EXPECT_EQ(lab.ask(Ask::kDisable, {}).result, "done");
   const auto online = [&] {
     return lab.has_state("hall:1") && lab.state_of("hall:1").detail == "drivers disabled";
   };
-  lab.unplug(0);
-  lab.run_for(0.3);
-  lab.plug(0);
+  lab.unplug(0, 0.3);
   EXPECT_TRUE(lab.run_until(online, 10)) << "after a lost port";
   EXPECT_FALSE(lab.motor("m01").enabled);
   lab.restart_daemon();
   EXPECT_TRUE(lab.run_until(online, 10)) << "after a restart of the daemon";
   EXPECT_FALSE(lab.motor("m01").enabled);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {25})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kEnable, {}).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {25}).result, "reached");
 }
 
 // An MCU whose report was lost tells all of its 16 motors: 188 bytes, 3.8 ms at 500000 baud, as
@@ -274,8 +259,7 @@ TEST_P(Faults, DriversSwitchedOffStayOff) {
 // them.
 TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
   for (const std::int64_t period_us : {7'000, 7'300, 8'200, 10'000, 20'000}) {
-    Lab lab(hall(1, 1, GetParam()));
-    lab.connect();
+    ReadyLab lab(hall(1, 1, GetParam()));
     lab.read_period_us = 20;  // noise comes at its time, and not at the next thing that happens
     std::mt19937 random(1985);
     const auto move = lab.send(Ask::kMoveBy, {"m01"}, {3000});
@@ -294,13 +278,9 @@ TEST_P(Faults, NoiseFromTheLineDoesNoHarm) {
 TEST_P(Faults, SilentMcuCostsTheOthersNothing) {
   Lab lab(hall(2, 2, GetParam()));
   lab.bus(0).reboot(1, 3'600'000'000'000);
-  EXPECT_TRUE(lab.run_until(
-      [&] {
-        return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kReady;
-      },
-      10));
+  EXPECT_TRUE(lab.mcu_comes_to("hall:1", api::McuState::kReady, 10));
   EXPECT_EQ(lab.state_of("hall:2").state, api::McuState::kOffline);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {3000})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {3000}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 3000);
 }
 

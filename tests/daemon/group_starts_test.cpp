@@ -192,8 +192,7 @@ std::int64_t longest_lead_us(const Lead& lead) {
 TEST_P(StartLead, IsTheTimeOfFramesAndOneExchange) {
   const auto& [name, mcus, motors, line] = GetParam();
   FirstSteps first;
-  Lab lab(hall(mcus, motors), {}, &first);
-  lab.connect();
+  ReadyLab lab(hall(mcus, motors), {}, &first);
   std::vector<std::string> names;
   for (int m = 1; m <= mcus * motors; ++m) names.push_back("m0" + std::to_string(m));
   std::int64_t longest_us = 0;

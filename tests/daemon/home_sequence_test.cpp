@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "daemon/lab.h"
-#include "daemon/motor_keys.h"
 
 namespace bushd::test {
 namespace {
@@ -19,9 +18,8 @@ std::string homes(const std::vector<std::string>& keys) {
   std::string toml = hall(2, 2);
   for (std::size_t i = 0; i < keys.size(); ++i) {
     if (keys[i].empty()) continue;
-    const std::string name = "name = \"m0" + std::to_string(i + 1) + "\"\n";
-    toml.insert(toml.find(name) + name.size(),
-                "home = { direction = \"negative\", most_steps = 3000, " + keys[i] + " }\n");
+    toml = with_keys(toml, "m0" + std::to_string(i + 1),
+                     "home = { direction = \"negative\", most_steps = 3000, " + keys[i] + " }\n");
   }
   return toml;
 }
@@ -30,7 +28,7 @@ struct SequenceLab : Lab {
   // `of_m01`: more keys of that motor.
   explicit SequenceLab(const std::vector<std::string>& keys, bool kept = false,
                        const std::string& of_m01 = "")
-      : Lab(with_m01(homes(keys), of_m01)) {
+      : Lab(with_keys(homes(keys), "m01", of_m01)) {
     if (kept) keep_positions();
     for (std::size_t i = 0; i < keys.size(); ++i) {
       if (!keys[i].empty()) bus(0).mcu(i / 2).attach_switch(i % 2, {.at_steps = kSwitch});
@@ -71,8 +69,7 @@ TEST(HomeSequence, OneThatIsNotFoundEndsTheOthers) {
     lab.lose_switch("m03");
     lab.bus(0).mcu(0).attach_switch(1, {.at_steps = -2990});
     const Answer answer = lab.wait(lab.home_all());
-    EXPECT_EQ(answer.result, "fault");
-    EXPECT_THAT(answer.reason, HasSubstr("m03: its switch was not found"));
+    EXPECT_THAT(answer, Ends("fault", "m03: its switch was not found"));
     // In the order in which they are homed.
     EXPECT_EQ(answer.motor_results.front(), "reached") << "m04";
     EXPECT_EQ(answer.motor_results.back(), "stopped") << "m01";
@@ -81,7 +78,7 @@ TEST(HomeSequence, OneThatIsNotFoundEndsTheOthers) {
       EXPECT_EQ(lab.motor(motor).activity, api::Activity::kResting);
     }
     // And is over: motors can be used, and all can be homed again.
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {20})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {20}).result, "reached");
     lab.bus(0).mcu(1).attach_switch(0, {.at_steps = -3500});
     EXPECT_EQ(lab.wait(lab.home_all()).result, "reached");
   }
@@ -99,7 +96,7 @@ TEST(HomeSequence, AMotorMovesOnToThenAndThatIsPartOfTheResult) {
     EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
     EXPECT_EQ(lab.shaft_steps("m01"), kSwitch + 120);
     // By name as well.
-    EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01", "m02"})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kHome, {"m01", "m02"}).result, "reached");
     EXPECT_EQ(lab.motor("m01").position_steps, 120);
     EXPECT_THAT(lab.errors(), IsEmpty());
   }
@@ -130,14 +127,14 @@ TEST(HomeSequence, AMotorThatIsHeldBeforeItsTurnIsNotMoved) {
     SequenceLab lab({"order = 1", "order = 2", "", ""}, kept);
     const auto all = lab.home_all();
     ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -50; }));
-    EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m02"}})).result, "done");
+    EXPECT_EQ(lab.ask(api::Hold{{"m02"}}).result, "done");
     const Answer answer = lab.wait(all);
     EXPECT_THAT(answer.motor_results, ElementsAre("reached", "stopped"));
     EXPECT_THAT(answer.reason,
                 HasSubstr("m02: it was held before it was its turn to be homed, by "));
     EXPECT_FALSE(lab.has_moved("m02"));
-    EXPECT_EQ(lab.wait(lab.send(api::Release{{"m02"}})).result, "done");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m02"})).result, "reached");
+    EXPECT_EQ(lab.ask(api::Release{{"m02"}}).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kHome, {"m02"}).result, "reached");
   }
 }
 
@@ -147,7 +144,7 @@ TEST(HomeSequence, AMotorThatIsPausedBeforeItsTurnIsNotMoved) {
     SequenceLab lab({"order = 1", "order = 2", "", ""}, kept);
     const auto all = lab.home_all();
     ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -50; }));
-    EXPECT_THAT(lab.wait(lab.send(api::Pause{})).reason, HasSubstr("not paused, being homed: m01"));
+    EXPECT_THAT(lab.ask(api::Pause{}).reason, HasSubstr("not paused, being homed: m01"));
     const Answer answer = lab.wait(all);
     EXPECT_THAT(answer.motor_results, ElementsAre("reached", "stopped"));
     EXPECT_THAT(answer.reason, HasSubstr("m02: stopped before it was its turn to be homed, asked"));
@@ -157,13 +154,12 @@ TEST(HomeSequence, AMotorThatIsPausedBeforeItsTurnIsNotMoved) {
 
 TEST(HomeSequence, ThenMayBecomeImpossible) {
   SequenceLab lab({"then = 120", "order = 2", "", ""});
-  EXPECT_EQ(lab.wait(lab.send(api::Configure{.kind = api::Configure::Kind::kChange,
-                                             .changes = {{"m01", "soft_limits", "-50,50"}}}))
+  EXPECT_EQ(lab.ask(api::Configure{.kind = api::Configure::Kind::kChange,
+                                   .changes = {{"m01", "soft_limits", "-50,50"}}})
                 .result,
             "done");
-  const Answer answer = lab.wait(lab.home_all());
-  EXPECT_EQ(answer.result, "fault");
-  EXPECT_THAT(answer.reason, HasSubstr("m01: homed, but it does not move on: m01: target 120"));
+  EXPECT_THAT(lab.wait(lab.home_all()),
+              Ends("fault", "m01: homed, but it does not move on: m01: target 120"));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_FALSE(lab.has_moved("m02"));
 }
@@ -172,7 +168,7 @@ TEST(HomeSequence, SpeedIsThatOfTheFastApproachUnlessAskedOtherwise) {
   const auto duration_us = [](const std::string& keys, std::optional<api::Speed> speed) {
     SequenceLab lab({keys, "", "", ""});
     const std::int64_t begin_us = lab.now_us();
-    EXPECT_EQ(lab.wait(lab.send(api::Home{.motors = {"m01"}, .speed = speed})).result, "reached");
+    EXPECT_EQ(lab.ask(api::Home{.motors = {"m01"}, .speed = speed}).result, "reached");
     return lab.now_us() - begin_us;
   };
   const std::int64_t slow_us = duration_us("speed = 30", {});
@@ -188,7 +184,7 @@ TEST(HomeSequence, IsStoppedAtAnyTimeAndHasOneResult) {
       const auto all = lab.home_all();
       lab.run_for(0.1 * tenths + 0.003);
       const bool over = lab.has_result(all);
-      EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
+      EXPECT_EQ(lab.ask(Ask::kStop, {}).result, "done");
       EXPECT_EQ(lab.wait(all).result, over ? "reached" : "stopped") << tenths;
       EXPECT_EQ(lab.replies(all).size(), 2u);
       EXPECT_TRUE(lab.core().at_rest());
@@ -222,7 +218,7 @@ TEST(HomeSequence, EndsWithItsLinkAndInAnEmergency) {
 TEST(HomeSequence, IsRefusedAsAWhole) {
   SequenceLab lab({"order = 2", "order = 1", "", ""});
   const auto refused = [&](const api::Request& request) {
-    const Answer answer = lab.wait(lab.send(request));
+    const Answer answer = lab.ask(request);
     EXPECT_EQ(answer.result, "refused");
     return answer.reason;
   };
@@ -232,9 +228,8 @@ TEST(HomeSequence, IsRefusedAsAWhole) {
   EXPECT_THAT(refused(api::Home{.motors = {"m01"}}), HasSubstr("m01: it is being homed"));
   EXPECT_THAT(refused(api::Move{.motors = {{"m01", 5}}}), HasSubstr("it is being homed"));
   EXPECT_EQ(lab.wait(all).result, "reached");
-  Lab none(hall(1, 1));
-  none.connect();
-  EXPECT_THAT(none.wait(none.send(api::Home{.all = true})).reason,
+  ReadyLab none(hall(1, 1));
+  EXPECT_THAT(none.ask(api::Home{.all = true}).reason,
               HasSubstr("no motor has a home switch; add 'home = {...}'"));
 }
 

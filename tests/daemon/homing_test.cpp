@@ -16,9 +16,7 @@ using testing::HasSubstr;
 // hall() with something more for motor m01.
 std::string with(const std::string& keys, int mcus = 1, int motors = 2,
                  const std::string& manner = "fine") {
-  std::string toml = hall(mcus, motors, manner);
-  const std::string name = "name = \"m01\"\n";
-  return toml.insert(toml.find(name) + name.size(), keys + "\n");
+  return with_keys(hall(mcus, motors, manner), "m01", keys + "\n");
 }
 
 std::string homes(const std::string& more = {}) {
@@ -50,7 +48,7 @@ TEST_F(Homing, SetsThePositionAndEndsReached) {
     EXPECT_LE(std::abs(result.position_steps[0] + 50), 1);
     EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
     EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {100})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {100}).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), -550);
   }
 }
@@ -64,9 +62,9 @@ TEST_F(Homing, MakesAPositionKnownAgain) {
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   const Answer refused = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5}));
   EXPECT_THAT(refused.reason, HasSubstr("bushctl home"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kHome, {"m01"}).result, "reached");
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {5}).result, "reached");
 }
 
 TEST_F(Homing, MeanwhileNothingElseIsDoneWithTheMotor) {
@@ -84,7 +82,7 @@ TEST_F(Homing, MeanwhileNothingElseIsDoneWithTheMotor) {
     EXPECT_THAT(refused(Ask::kSetPosition), HasSubstr("m01 moves"));
     EXPECT_THAT(refused(Ask::kDisable), HasSubstr("m01 moves"));
   }
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {50})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {50}).result, "reached");
   EXPECT_EQ(lab.wait(home).result, "reached");
   EXPECT_THAT(lab.last_reply(lab.send(Ask::kHome, {"m02"})).reason,
               HasSubstr("no home switch configured"));
@@ -93,8 +91,7 @@ TEST_F(Homing, MeanwhileNothingElseIsDoneWithTheMotor) {
 
 TEST_F(Homing, StopAndEmergencyStopEndIt) {
   for (const Ask kind : {Ask::kStop, Ask::kEmergencyStop}) {
-    Lab lab(with(homes()));
-    lab.connect();
+    ReadyLab lab(with(homes()));
     const auto home = lab.send(Ask::kHome, {"m01"});
     lab.run_for(0.7);
     const auto stop = lab.send(kind, {});
@@ -108,25 +105,19 @@ TEST_F(Homing, StopAndEmergencyStopEndIt) {
 }
 
 TEST_F(Homing, ASwitchThatIsNotThereIsAFault) {
-  Lab lab(with(homes(", slow_most_steps = 60")));
-  lab.connect();
-  const Answer missing = lab.wait(lab.send(Ask::kHome, {"m01"}));
-  EXPECT_EQ(missing.result, "fault");
-  EXPECT_THAT(missing.reason, HasSubstr("m01: its switch was not found"));
+  ReadyLab lab(with(homes(", slow_most_steps = 60")));
+  const Answer missing = lab.ask(Ask::kHome, {"m01"});
+  EXPECT_THAT(missing, Ends("fault", "m01: its switch was not found"));
   EXPECT_EQ(missing.position_steps.at(0), -6000);
   lab.bus(0).mcu(0).set_inputs({1, 0});
-  const Answer stuck = lab.wait(lab.send(Ask::kHome, {"m01"}));
-  EXPECT_EQ(stuck.result, "fault");
-  EXPECT_THAT(stuck.reason, HasSubstr("stuck"));
+  const Answer stuck = lab.ask(Ask::kHome, {"m01"});
+  EXPECT_THAT(stuck, Ends("fault", "stuck"));
   EXPECT_EQ(stuck.position_steps.at(0), -6000 + 60);
   EXPECT_EQ(lab.shaft_steps("m01"), -6000 + 60);
 }
 
 TEST_F(Homing, MotorsOfOneMcuTakeTurns) {
-  std::string toml = with(homes());
-  const std::string name = "name = \"m02\"\n";
-  toml.insert(toml.find(name) + name.size(), homes() + "\n");
-  Lab lab(toml);
+  Lab lab(with_keys(with(homes()), "m02", homes() + "\n"));
   put_switch(lab, -300);
   lab.bus(0).mcu(0).attach_switch(1, {.at_steps = -500, .hysteresis_steps = 4});
   lab.connect();
@@ -171,10 +162,7 @@ TEST_F(Homing, AtTheStartOfItsMcu) {
 
 // From boot on the MCU is ready only when all its motors with a home have been homed.
 TEST_F(Homing, AnMcuIsReadyAfterIt) {
-  std::string toml = with(homes());
-  const std::string mcu = "[[mcu]]\n";
-  toml.insert(toml.find(mcu) + mcu.size(), "ready = \"after-homing\"\n");
-  Lab lab(toml);
+  Lab lab(with_mcu_keys(with(homes()), "ready = \"after-homing\"\n"));
   put_switch(lab, -300);
   ASSERT_TRUE(lab.run_until([&] {
     return lab.has_state("hall:1") && lab.state_of("hall:1").detail == "not homed yet: m01";
@@ -183,28 +171,27 @@ TEST_F(Homing, AnMcuIsReadyAfterIt) {
   EXPECT_EQ(lab.motor("m01").activity, api::Activity::kHoming) << "nobody has asked for it";
   EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m02"}, {5})).reason,
               HasSubstr("is not ready before m01 has been homed"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
   lab.run_for(2);
   EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kBusy) << "it was stopped";
   EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m02"}, {5})).reason,
               HasSubstr("'bushctl home m01'"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kHome, {"m01"}).result, "reached");
   EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady);
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {5}).result, "reached");
   // A new daemon finds it homed; after a reset it homes them anew.
   lab.restart_daemon();
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   lab.bus(0).reboot(0, 50'000'000);
-  ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:1").state == api::McuState::kBusy; }));
+  ASSERT_TRUE(lab.mcu_comes_to("hall:1", api::McuState::kBusy));
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 60));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01") + 250);
 }
 
 TEST_F(Homing, IsLostWithItsMcuAndCountedAllTheSame) {
-  Lab lab(with(homes()));
-  lab.connect();
+  ReadyLab lab(with(homes()));
   const auto home = lab.send(Ask::kHome, {"m01"});
   lab.run_for(0.7);
   lab.unplug(0);
@@ -234,25 +221,24 @@ TEST_F(Homing, WhereverItComesFromItIsTheSameToOneStep) {
   lab.connect();
   sim::Random random(21, 0);
   for (int i = 0; i < 100; ++i) {
-    const Answer result = lab.wait(lab.send(Ask::kHome, {"m01"}));
+    const Answer result = lab.ask(Ask::kHome, {"m01"});
     ASSERT_EQ(result.result, "reached") << result.reason;
     const std::int64_t off = result.position_steps.at(0) + 50 - (lab.shaft_steps("m01") + 400);
     ASSERT_GE(off, 0);
     ASSERT_LE(off, 1);
     const auto away = random.between(-40, 900);
-    ASSERT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {away - 50})).result, "reached");
+    ASSERT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {away - 50}).result, "reached");
   }
 }
 
 TEST_F(Homing, LocalInputsMoveAMotorAndTheDaemonFollows) {
-  Lab lab(with("local = true"));
-  lab.connect();
+  ReadyLab lab(with("local = true"));
   hold(lab, BUSHD_INPUT_FORWARD);
   ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kLocal; }, 1));
   EXPECT_EQ(lab.motor("m02").activity, api::Activity::kResting);
   EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason,
               HasSubstr("local inputs of MCU hall:1"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {50})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {50}).result, "reached");
   hold(lab, 0);
   ASSERT_TRUE(
       lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kResting; }, 5));
@@ -260,22 +246,19 @@ TEST_F(Homing, LocalInputsMoveAMotorAndTheDaemonFollows) {
   EXPECT_EQ(lab.shaft_steps("m02"), 50);
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 // It ramps down, stands although the button is held, and goes on with the next press.
 TEST_F(Homing, AStopEndsLocalMotionUntilTheInputIsReleased) {
-  Lab lab(with("local = true"));
-  lab.connect();
+  ReadyLab lab(with("local = true"));
   for (int again = 0; again < 2; ++again) {
     hold(lab, BUSHD_INPUT_FORWARD);
     ASSERT_TRUE(
         lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kLocal; }, 1));
     lab.run_for(0.3);
-    const Answer stopped = lab.wait(lab.send(Ask::kStop, {}));
-    EXPECT_EQ(stopped.result, "done");
-    EXPECT_THAT(stopped.reason, HasSubstr("m01: its local inputs must be released"));
+    EXPECT_THAT(lab.ask(Ask::kStop, {}), Ends("done", "m01: its local inputs must be released"));
     const std::int64_t at = lab.shaft_steps("m01");
     EXPECT_GT(at, 30 * (again + 1));
     lab.run_for(2);
@@ -284,28 +267,25 @@ TEST_F(Homing, AStopEndsLocalMotionUntilTheInputIsReleased) {
     lab.run_for(0.1);
   }
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).reason, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).reason, "done");
 }
 
 TEST_F(Homing, AHeldMotorIsNotMovedByLocalInputs) {
-  Lab lab(with("local = true"));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(api::Hold{.motors = {"m01"}})).reason, "held: 1 motor");
+  ReadyLab lab(with("local = true"));
+  EXPECT_EQ(lab.ask(api::Hold{.motors = {"m01"}}).reason, "held: 1 motor");
   hold(lab, BUSHD_INPUT_FORWARD);
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   // Also by an MCU that was configured meanwhile.
-  lab.unplug(0);
-  lab.run_for(0.5);
-  lab.plug(0);
+  lab.unplug(0, 0.5);
   lab.connect();
   hold(lab, 0);
   lab.run_for(0.1);
   hold(lab, BUSHD_INPUT_FORWARD);
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
-  EXPECT_EQ(lab.wait(lab.send(api::Release{.motors = {"m01"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Release{.motors = {"m01"}}).result, "done");
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), 0) << "held all the time";
   hold(lab, 0);
@@ -314,7 +294,7 @@ TEST_F(Homing, AHeldMotorIsNotMovedByLocalInputs) {
   lab.run_for(0.5);
   EXPECT_GT(lab.shaft_steps("m01"), 30);
   // While it moves: it ramps down.
-  EXPECT_EQ(lab.wait(lab.send(api::Hold{.motors = {"m01"}})).reason, "held: 1 motor");
+  EXPECT_EQ(lab.ask(api::Hold{.motors = {"m01"}}).reason, "held: 1 motor");
   lab.run_for(1);
   const std::int64_t at = lab.shaft_steps("m01");
   lab.run_for(1);
@@ -325,8 +305,7 @@ TEST_F(Homing, AHeldMotorIsNotMovedByLocalInputs) {
 TEST_F(Homing, AMoveAndAPressAtTheSameTimeNeverMix) {
   for (int ms = 0; ms < 160; ms += 8) {
     SCOPED_TRACE(ms);
-    Lab lab(with("local = true"));
-    lab.connect();
+    ReadyLab lab(with("local = true"));
     const auto move = lab.send(Ask::kMoveBy, {"m01"}, {100});
     lab.run_for(ms * 1e-3);
     hold(lab, BUSHD_INPUT_REVERSE);
@@ -343,13 +322,12 @@ TEST_F(Homing, AMoveAndAPressAtTheSameTimeNeverMix) {
     } else {
       EXPECT_LT(lab.shaft_steps("m01"), 0);
     }
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
   }
 }
 
 TEST_F(Homing, ADaemonThatComesWaitsForLocalMotionToEnd) {
-  Lab lab(with("local = true"));
-  lab.connect();
+  ReadyLab lab(with("local = true"));
   hold(lab, BUSHD_INPUT_FORWARD);
   lab.run_for(0.5);
   lab.restart_daemon();

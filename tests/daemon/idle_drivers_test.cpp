@@ -4,7 +4,6 @@
 
 #include "bus/bus_times.h"
 #include "daemon/lab.h"
-#include "daemon/motor_keys.h"
 
 namespace bushd::test {
 namespace {
@@ -39,11 +38,6 @@ class Pins final : public sim::EdgeSink {
   int steps_without = 0;
 };
 
-std::string with_mcu(std::string toml, const std::string& keys) {
-  const std::string mcu = "address = 1\n";
-  return toml.replace(toml.find(mcu), mcu.size(), mcu + keys);
-}
-
 const std::string kIdle = "idle_disable_s = 0.5\nenable_settle_ms = 250\n";
 
 // It has to be there before the lab is made.
@@ -52,7 +46,7 @@ struct WithPins {
 };
 
 struct IdleLab : WithPins, Lab {
-  explicit IdleLab(bool kept, const std::string& toml = with_mcu(hall(1, 2), kIdle))
+  explicit IdleLab(bool kept, const std::string& toml = with_mcu_keys(hall(1, 2), kIdle))
       : Lab(toml, {}, &pins) {
     if (kept) keep_positions();
     connect();
@@ -64,7 +58,7 @@ struct IdleLab : WithPins, Lab {
     EXPECT_FALSE(motor("m01").enabled);
   }
   Answer move(const std::string& motor, std::int64_t steps) {
-    return wait(send(Ask::kMoveBy, {motor}, {steps}));
+    return ask(Ask::kMoveBy, {motor}, {steps});
   }
 };
 
@@ -81,8 +75,7 @@ TEST_P(IdleDrivers, AreDisabledAfterARestAndEnabledBeforeTheNextStep) {
   EXPECT_LE(rest_ns, 500 * kMs + kAnswered);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown) << "disabling alone loses no steps";
   EXPECT_EQ(lab.state_of("hall:1").detail, "drivers disabled at rest");
-  const Answer answer = lab.move("m02", -60);
-  EXPECT_EQ(answer.result, "reached") << answer.reason;
+  EXPECT_THAT(lab.move("m02", -60), Ends("reached"));
   EXPECT_GE(lab.pins.first_step_ns - lab.pins.on_ns, 250 * kMs);
   // First frames are sent two polls' time ahead (link::Horizon), and the first step takes 10 ms.
   EXPECT_LE(lab.pins.first_step_ns - lab.pins.on_ns, 250 * kMs + kAnswered + 100 * kMs + 10 * kMs);
@@ -92,14 +85,14 @@ TEST_P(IdleDrivers, AreDisabledAfterARestAndEnabledBeforeTheNextStep) {
 }
 
 TEST_P(IdleDrivers, AreDisabledAtOnceAfterTheLastMotionIfAskedFor) {
-  IdleLab lab(GetParam(), with_mcu(hall(1, 2), "idle_disable_s = 0\nenable_settle_ms = 250\n"));
+  IdleLab lab(GetParam(),
+              with_mcu_keys(hall(1, 2), "idle_disable_s = 0\nenable_settle_ms = 250\n"));
   lab.fall_asleep();
   const auto first = lab.send(Ask::kMoveBy, {"m01"}, {400});
   const auto second = lab.send(Ask::kMoveBy, {"m02"}, {-40});
   EXPECT_EQ(lab.wait(second).result, "reached");
   EXPECT_TRUE(lab.pins.enabled) << "the other one moves";
-  const Answer answer = lab.wait(first);
-  EXPECT_EQ(answer.result, "reached") << answer.reason;
+  EXPECT_THAT(lab.wait(first), Ends("reached"));
   lab.fall_asleep();
   EXPECT_LE(lab.pins.off_ns - lab.pins.last_step_ns, kAnswered);
   EXPECT_EQ(lab.shaft_steps("m01"), 400);
@@ -115,15 +108,13 @@ TEST_P(IdleDrivers, AreDisabledAtOnceAfterTheLastMotionIfAskedFor) {
 }
 
 TEST(IdleDriversAtOnce, LetTheMcuMeasureItsSupplyCurrentFirst) {
-  Lab lab(with_mcu(hall(1, 2),
-                   "idle_disable_s = 0\nsteps = \"staggered\"\nstep_us = 320\n"
-                   "settle_us = \"measured\"\n"));
-  lab.connect();
+  ReadyLab lab(with_mcu_keys(hall(1, 2),
+                             "idle_disable_s = 0\nsteps = \"staggered\"\nstep_us = 320\n"
+                             "settle_us = \"measured\"\n"));
   lab.run_for(1);
   EXPECT_EQ(lab.bus(0).mcu(0).shaft(0).travel_steps, 2u) << "a step and its way back";
   EXPECT_FALSE(lab.motor("m01").enabled);
-  const Answer answer = lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {30}));
-  EXPECT_EQ(answer.result, "reached") << answer.reason;
+  EXPECT_THAT(lab.ask(Ask::kMoveBy, {"m01"}, {30}), Ends("reached"));
 }
 
 TEST_P(IdleDrivers, StayEnabledWhileAMotorMovesOrWaits) {
@@ -141,18 +132,17 @@ TEST_P(IdleDrivers, StayEnabledWhileAMotorMovesOrWaits) {
   const auto arm = lab.send(api::Arm{.delay_us = 100, .motors = {{"m01", 10}}});
   lab.run_for(2);
   EXPECT_TRUE(lab.pins.enabled);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kDisarm, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kDisarm, {}).result, "done");
   EXPECT_EQ(lab.wait(arm).result, "stopped");
 }
 
 TEST_P(IdleDrivers, AreEnabledForHomingAndForMovesThatWaitForTheTrigger) {
   IdleLab lab(GetParam(),
-              with_m01(with_mcu(hall(1, 2), kIdle),
-                       "home = { direction = \"negative\", most_steps = 900, then = 5 }\n"));
+              with_keys(with_mcu_keys(hall(1, 2), kIdle), "m01",
+                        "home = { direction = \"negative\", most_steps = 900, then = 5 }\n"));
   lab.bus(0).mcu(0).attach_switch(0, {.at_steps = -100});
   lab.fall_asleep();
-  const Answer homed = lab.wait(lab.send(Ask::kHome, {"m01"}));
-  EXPECT_EQ(homed.result, "reached") << homed.reason;
+  EXPECT_THAT(lab.ask(Ask::kHome, {"m01"}), Ends("reached"));
   EXPECT_GE(lab.pins.first_step_ns - lab.pins.on_ns, 250 * kMs);
   lab.fall_asleep();
   const auto arm = lab.send(api::Arm{.delay_us = 100, .motors = {{"m02", 10}}});
@@ -166,17 +156,15 @@ TEST_P(IdleDrivers, ThatPeopleDisableStayDisabled) {
   IdleLab lab(GetParam());
   for (const bool asleep : {false, true}) {
     if (asleep) lab.fall_asleep();
-    EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {"m01"})).result, "done");
-    const Answer answer = lab.move("m01", 5);
-    EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, HasSubstr("are disabled; run 'bushctl enable m0"));
-    EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {"m01"})).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kDisable, {"m01"}).result, "done");
+    EXPECT_THAT(lab.move("m01", 5), Ends("refused", "are disabled; run 'bushctl enable m0"));
+    EXPECT_EQ(lab.ask(Ask::kEnable, {"m01"}).result, "done");
     EXPECT_TRUE(lab.pins.enabled);
     EXPECT_EQ(lab.move("m01", 5).result, "reached");
     EXPECT_GE(lab.pins.first_step_ns - lab.pins.on_ns, 250 * kMs) << "they settle in any case";
   }
   lab.fall_asleep();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {"m01"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kEnable, {"m01"}).result, "done");
   lab.run_for(0.4);
   EXPECT_TRUE(lab.pins.enabled);
   lab.fall_asleep();
@@ -187,12 +175,12 @@ TEST_P(IdleDrivers, AreDisabledWhileBeingEnabledAndStoppedMeanwhile) {
   lab.fall_asleep();
   auto move = lab.send(Ask::kMoveBy, {"m01"}, {50});
   lab.run_for(0.1);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
   EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("nothing has moved"));
   lab.fall_asleep();
   move = lab.send(Ask::kMoveBy, {"m01"}, {50});
   lab.run_for(0.1);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {"m01"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kDisable, {"m01"}).result, "done");
   EXPECT_THAT(lab.wait(move).reason, HasSubstr("disabled; run 'bushctl enable m0"));
   EXPECT_EQ(lab.replies(move).size(), 1u);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
@@ -216,7 +204,7 @@ TEST_P(IdleDrivers, OfAnMcuThatRestartsAreEnabledWhenItsMotorsMove) {
   lab.fall_asleep();
   lab.bus(0).reboot(0);
   lab.run_for(3);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {0}).result, "done");
   EXPECT_EQ(lab.move("m01", 20).result, "reached");
 }
 
@@ -225,12 +213,13 @@ TEST_P(IdleDrivers, ADryRunLeavesThemAsTheyAre) {
   lab.fall_asleep();
   api::Move move{.motors = {{"m01", 100}}};
   move.dry_run = true;
-  EXPECT_EQ(lab.wait(lab.send(move)).result, "done");
+  EXPECT_EQ(lab.ask(move).result, "done");
   EXPECT_FALSE(lab.pins.enabled);
 }
 
 TEST_P(IdleDrivers, StayEnabledForAMotorThatSaysSo) {
-  IdleLab lab(GetParam(), with_m01(with_mcu(hall(1, 2), kIdle), "never_disable = true\n"));
+  IdleLab lab(GetParam(),
+              with_keys(with_mcu_keys(hall(1, 2), kIdle), "m01", "never_disable = true\n"));
   lab.run_for(3);
   EXPECT_TRUE(lab.pins.enabled);
   EXPECT_EQ(lab.pins.off_ns, 0);

@@ -19,9 +19,7 @@ constexpr const char* kInMm = "unit = \"mm\"\nsteps_per_unit = 400\nsoft_limits 
 
 // Two motors on one MCU by a table of 40 us: 100 to 2500 steps/s. `keys` are of m01.
 std::string lab_with(const std::string& keys, const char* manner = "fine") {
-  std::string toml = hall(1, 2, manner);
-  const std::string motor = "output = 0\n";
-  return toml.insert(toml.find(motor) + motor.size(), keys);
+  return with_keys(hall(1, 2, manner), "m01", keys);
 }
 
 api::Jog jog(double steps_per_s) {
@@ -48,16 +46,14 @@ double speed(const Lab& lab) {
 TEST(Jogs, MoveOnAtTheirSpeedUntilTheirClientEndsThem) {
   for (const char* manner : {"fine", "coarse", "fine_table", "coarse_ticks"}) {
     SCOPED_TRACE(manner);
-    Lab lab(lab_with("", manner));
-    lab.connect();
+    ReadyLab lab(lab_with("", manner));
     const auto first = lab.send(jog(700));
     EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") > 1500; }));
     EXPECT_DOUBLE_EQ(speed(lab), 1e9 / (36 * 40'000.0)) << "not faster than asked";
     EXPECT_FALSE(lab.has_result(first));
     const auto last = lab.send(jog(0));
     const Answer ended = lab.wait(first);
-    EXPECT_EQ(ended.result, "done") << ended.reason;
-    EXPECT_THAT(ended.reason, HasSubstr("ended by its client"));
+    EXPECT_THAT(ended, Ends("done", "ended by its client"));
     EXPECT_EQ(ended.position_steps[0], lab.shaft_steps("m01"));
     EXPECT_EQ(lab.wait(last).result, "done");
     EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
@@ -67,15 +63,13 @@ TEST(Jogs, MoveOnAtTheirSpeedUntilTheirClientEndsThem) {
 }
 
 TEST(Jogs, TakeAnotherSpeedAndDirectionThroughRest) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send(jog(500));
   const auto speed_is = [&](double steps_per_s) {
     return keep_going(lab, [&] { return speed(lab) == steps_per_s; });
   };
   EXPECT_TRUE(speed_is(500));
-  const Answer changed = lab.wait(lab.send(jog(1250)));
-  EXPECT_EQ(changed.result, "done") << changed.reason;
+  EXPECT_THAT(lab.ask(jog(1250)), Ends("done"));
   EXPECT_TRUE(speed_is(1250));
   lab.send(jog(250));
   EXPECT_TRUE(speed_is(250));
@@ -92,17 +86,14 @@ TEST(Jogs, TakeAnotherSpeedAndDirectionThroughRest) {
 TEST(Jogs, StopAtTheSoftLimitExactly) {
   for (const bool negative : {false, true}) {
     SCOPED_TRACE(negative);
-    Lab lab(lab_with(std::string(kInMm) + (negative ? "direction = \"negative\"\n" : "")));
-    lab.connect();
+    ReadyLab lab(lab_with(std::string(kInMm) + (negative ? "direction = \"negative\"\n" : "")));
     const auto up = lab.send(api::Jog{.motor = "m01", .per_s = 3});
     EXPECT_TRUE(keep_going(lab, [&] { return lab.has_result(up); }));
-    EXPECT_EQ(lab.last_reply(up).result, "limit");
-    EXPECT_THAT(lab.last_reply(up).reason, HasSubstr("stands at its soft limit"));
+    EXPECT_THAT(lab.last_reply(up), Ends("limit", "stands at its soft limit"));
     EXPECT_EQ(lab.shaft_steps("m01"), negative ? -1000 : 2000);
     lab.run_for(0.6);
-    const Answer refused = lab.wait(lab.send(api::Jog{.motor = "m01", .per_s = 3}));
-    EXPECT_EQ(refused.result, "refused");
-    EXPECT_THAT(refused.reason, HasSubstr("jog it the other way"));
+    const Answer refused = lab.ask(api::Jog{.motor = "m01", .per_s = 3});
+    EXPECT_THAT(refused, Ends("refused", "jog it the other way"));
     const auto down = lab.send(api::Jog{.motor = "m01", .per_s = -3});
     EXPECT_TRUE(keep_going(lab, [&] { return lab.has_result(down); }));
     EXPECT_EQ(lab.shaft_steps("m01"), negative ? 2000 : -1000);
@@ -110,12 +101,9 @@ TEST(Jogs, StopAtTheSoftLimitExactly) {
 }
 
 TEST(Jogs, OfAClientThatFallsSilentRampDown) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send(jog(1000));
-  const Answer ended = lab.wait(first, 5);
-  EXPECT_EQ(ended.result, "stopped");
-  EXPECT_THAT(ended.reason, HasSubstr("has not renewed it within 500 ms"));
+  EXPECT_THAT(lab.wait(first, 5), Ends("stopped", "has not renewed it within 500 ms"));
   EXPECT_LT(lab.shaft_steps("m01"), 1000);
   api::Jog patient = jog(100);
   patient.keepalive_ms = 3000;
@@ -126,8 +114,7 @@ TEST(Jogs, OfAClientThatFallsSilentRampDown) {
 }
 
 TEST(Jogs, OfAClientThatIsGoneRampDownAtOnce) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send_as("remote", jog(1000));
   lab.run_for(0.3);
   const std::int64_t there = lab.shaft_steps("m01");
@@ -138,15 +125,13 @@ TEST(Jogs, OfAClientThatIsGoneRampDownAtOnce) {
 }
 
 TEST(Jogs, WhoIsStoppedByOthersMustLetGoFirst) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send_as("remote", jog(1000));
   lab.run_for(0.3);
   const auto stop = lab.send(Ask::kStop, {"m01"});
   EXPECT_THAT(lab.wait(lab.send_as("remote", jog(1000))).reason, HasSubstr("is being stopped"));
   EXPECT_EQ(lab.wait(stop).result, "done");
-  EXPECT_EQ(lab.last_reply(first).result, "stopped");
-  EXPECT_THAT(lab.last_reply(first).reason, HasSubstr("stopped on request, asked for by command"));
+  EXPECT_THAT(lab.last_reply(first), Ends("stopped", "stopped on request, asked for by command"));
   const std::int64_t stands = lab.shaft_steps("m01");
   for (int i = 0; i < 5; ++i) {
     EXPECT_THAT(lab.wait(lab.send_as("remote", jog(1000))).reason, HasSubstr("let go first"));
@@ -166,8 +151,7 @@ TEST(Jogs, WhoIsStoppedByOthersMustLetGoFirst) {
 TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
   for (const bool silent : {false, true}) {
     SCOPED_TRACE(silent);
-    Lab lab(lab_with(""));
-    lab.connect();
+    ReadyLab lab(lab_with(""));
     const auto first = lab.send_as("remote", jog(2000));
     lab.run_for(silent ? 0.52 : 0.4);
     if (!silent) lab.send_as("remote", jog(0));
@@ -176,21 +160,18 @@ TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
     lab.run_for(0.2);
     const auto stop = lab.send(Ask::kStop, {"m01"});
     EXPECT_EQ(lab.wait(stop).result, "done");
-    EXPECT_EQ(lab.last_reply(first).result, "stopped");
-    EXPECT_THAT(lab.last_reply(first).reason,
-                HasSubstr("m01: stopped on request, asked for by command"));
+    EXPECT_THAT(lab.last_reply(first),
+                Ends("stopped", "m01: stopped on request, asked for by command"));
     EXPECT_THAT(lab.wait(lab.send_as("remote", jog(2000))).reason, HasSubstr("let go first"));
   }
 }
 
 TEST(Jogs, ThatAnotherClientEndsSoManyStepsAfterAreStopped) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send_as("remote", jog(1000));
   lab.run_for(0.3);
-  EXPECT_EQ(lab.wait(lab.send(ended_after(500))).result, "done");
-  EXPECT_EQ(lab.last_reply(first).result, "stopped");
-  EXPECT_THAT(lab.last_reply(first).reason, HasSubstr("stands 500 steps after the stop event at"));
+  EXPECT_EQ(lab.ask(ended_after(500)).result, "done");
+  EXPECT_THAT(lab.last_reply(first), Ends("stopped", "stands 500 steps after the stop event at"));
   EXPECT_THAT(lab.last_reply(first).reason, HasSubstr("ended by command"));
   lab.run_for(1);
   const auto unbegun = lab.send_as("other", jog(1000));
@@ -200,8 +181,7 @@ TEST(Jogs, ThatAnotherClientEndsSoManyStepsAfterAreStopped) {
 
 // While it ramps down nothing is to be done for it, also when it is renewed no more.
 TEST(Jogs, ThatOthersStopLetTheDaemonSleep) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send(jog(2500));
   lab.run_for(0.48);
   lab.send_as("remote", {api::Stop{{"m01"}}});
@@ -213,39 +193,33 @@ TEST(Jogs, ThatOthersStopLetTheDaemonSleep) {
 }
 
 TEST(Jogs, AwayFromTheRangeAreRefusedInMotionToo) {
-  Lab lab(lab_with(kInMm));
-  lab.connect();
-  lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {6000}));
+  ReadyLab lab(lab_with(kInMm));
+  lab.ask(Ask::kSetPosition, {"m01"}, {6000});
   const auto first = lab.send(jog(-1000));
   lab.run_for(0.4);
-  const Answer refused = lab.wait(lab.send(jog(1000)));
-  EXPECT_EQ(refused.result, "refused");
-  EXPECT_THAT(refused.reason, HasSubstr("beyond its soft limit"));
+  const Answer refused = lab.ask(jog(1000));
+  EXPECT_THAT(refused, Ends("refused", "beyond its soft limit"));
   EXPECT_EQ(lab.wait(first).result, "stopped");
   EXPECT_LT(lab.motor("m01").position_steps, 6000);
 }
 
 TEST(Jogs, OfAnotherClientTakeOver) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.5);
   const auto first = lab.send_as("remote", jog(-400));
-  EXPECT_EQ(lab.wait(move).result, "stopped");
-  EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("was given a new target by command"));
+  EXPECT_THAT(lab.wait(move), Ends("stopped", "was given a new target by command"));
   const auto second = lab.send_as("panel", jog(300));
   EXPECT_THAT(lab.wait(first).reason, HasSubstr("of panel; it moves on"));
   EXPECT_EQ(lab.wait(lab.send_as("remote", jog(-400))).result, "refused") << "it holds its key";
   lab.send_as("remote", jog(0));
   const Answer ended = lab.wait(second);
-  EXPECT_EQ(ended.result, "stopped");
-  EXPECT_THAT(ended.reason, HasSubstr("ended by command"));
+  EXPECT_THAT(ended, Ends("stopped", "ended by command"));
   EXPECT_EQ(ended.position_steps[0], lab.shaft_steps("m01"));
 }
 
 TEST(Jogs, EndSoManyStepsAfterTheStopEvent) {
-  Lab lab(lab_with(kInMm));
-  lab.connect();
+  ReadyLab lab(lab_with(kInMm));
   const auto first = lab.send(jog(250));
   EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") >= 300; }));
   const std::int64_t at_event = lab.shaft_steps("m01");
@@ -261,14 +235,12 @@ TEST(Jogs, EndSoManyStepsAfterTheStopEvent) {
 }
 
 TEST(Jogs, ThatCannotEndSoSoonSaySo) {
-  Lab lab(lab_with(kInMm));
-  lab.connect();
+  ReadyLab lab(lab_with(kInMm));
   const auto fast = lab.send(jog(2500));
   EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") >= 300; }));
   lab.send(ended_after(1));
   const Answer ended = lab.wait(fast);
-  EXPECT_EQ(ended.result, "stopped");
-  EXPECT_THAT(ended.reason, HasSubstr("its table needs"));
+  EXPECT_THAT(ended, Ends("stopped", "its table needs"));
   EXPECT_EQ(ended.position_steps[0], lab.shaft_steps("m01")) << "and does not come back";
   lab.run_for(0.6);
   const auto near = lab.send(jog(-250));
@@ -279,10 +251,9 @@ TEST(Jogs, ThatCannotEndSoSoonSaySo) {
 }
 
 TEST(Jogs, ThatCannotBeAreRefusedWithTheFigure) {
-  Lab lab(lab_with(kInMm));
-  lab.connect();
+  ReadyLab lab(lab_with(kInMm));
   const auto reason = [&lab](const api::Jog& request) {
-    const Answer answer = lab.wait(lab.send(request));
+    const Answer answer = lab.ask(request);
     EXPECT_EQ(answer.result, "refused");
     return answer.reason;
   };
@@ -293,8 +264,8 @@ TEST(Jogs, ThatCannotBeAreRefusedWithTheFigure) {
   EXPECT_THAT(reason({.motor = "m01", .per_s = 1, .steps_after = 5}), HasSubstr("of speed 0"));
   EXPECT_THAT(reason({.motor = "m17", .per_s = 1}), HasSubstr("no motor"));
   EXPECT_THAT(reason({.motor = "m01", .renew = true}), HasSubstr("no jog of this client"));
-  EXPECT_EQ(lab.wait(lab.send(jog(0))).reason, "m01 does not jog");
-  const Answer end = lab.wait(lab.send(ended_after(-5)));
+  EXPECT_EQ(lab.ask(jog(0)).reason, "m01 does not jog");
+  const Answer end = lab.ask(ended_after(-5));
   EXPECT_EQ(end.result, "fault");
   EXPECT_THAT(end.reason, testing::AllOf(HasSubstr("allowed: 0 to"), HasSubstr("does not jog")));
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
@@ -323,22 +294,20 @@ TEST(Jogs, AreMarkedBeforeTheyBegin) {
 }
 
 TEST(Jogs, EndWithTheirMcu) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send(jog(500));
   lab.run_for(0.3);
   lab.unplug(0);
   EXPECT_EQ(lab.wait(first).result, "link");
   lab.plug(0);
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 TEST(Jogs, OfALongWayGoOnAsLongAsTheyAreRenewed) {
   // At this speed a run to the end of what is counted would last longer than any run may.
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   const auto first = lab.send(jog(0.5));
   EXPECT_TRUE(keep_going(lab, [&] { return lab.shaft_steps("m01") == 2; }, 6));
   lab.send(jog(0));

@@ -24,12 +24,12 @@ struct HoldLab : Lab {
     run_for(0.1);
   }
   std::string refusal_of(const std::string& motor) {
-    const Answer answer = wait(send(Ask::kMoveBy, {motor}, {10}));
+    const Answer answer = ask(Ask::kMoveBy, {motor}, {10});
     EXPECT_EQ(answer.result, "refused");
     return answer.reason;
   }
   void expect_moves(const std::string& motor) {
-    EXPECT_EQ(wait(send(Ask::kMoveBy, {motor}, {10})).result, "reached");
+    EXPECT_EQ(ask(Ask::kMoveBy, {motor}, {10}).result, "reached");
   }
   std::vector<std::string> past(const std::string& motor) {
     const auto number = send(api::GetHistory{.motor = motor, .most = 10});
@@ -60,7 +60,7 @@ TEST(KeptHolds, OutliveTheDaemonAndThePowerOfThePc) {
     lab.expect_moves("m02");
   }
   // A release is kept as well.
-  EXPECT_EQ(lab.wait(lab.send(api::Release{})).reason, "released: 1 motor");
+  EXPECT_EQ(lab.ask(api::Release{}).reason, "released: 1 motor");
   lab.cut_pc_power();
   lab.reconnect();
   EXPECT_FALSE(lab.motor("m01").held);
@@ -74,14 +74,14 @@ TEST(KeptHolds, SomebodyElsesHoldDoesNotHideWhoWasFirst) {
   lab.wait(lab.send_as("panel", api::Hold{{"m01"}}));
   const std::string why = lab.refusal_of("m01");
   lab.run_for(5);
-  EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m01", "m02"}})).reason, "held: 2 motors");
+  EXPECT_EQ(lab.ask(api::Hold{{"m01", "m02"}}).reason, "held: 2 motors");
   EXPECT_EQ(lab.refusal_of("m01"), why);
   EXPECT_THAT(lab.refusal_of("m02"), HasSubstr("it is held by test"));
 }
 
 TEST(KeptHolds, AreNotKeptWithoutAStore) {
   HoldLab lab(hall(1, 2), false);
-  EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m01"}})).reason, "held: 1 motor");
+  EXPECT_EQ(lab.ask(api::Hold{{"m01"}}).reason, "held: 1 motor");
   lab.restart_daemon();
   lab.reconnect();
   EXPECT_FALSE(lab.motor("m01").held);
@@ -108,7 +108,7 @@ TEST(KeptHolds, AreAnsweredWhenTheDiskHasThem) {
 TEST(KeptHolds, ADiskThatDoesNotTakeThemIsTold) {
   HoldLab lab;
   lab.disk_us = 10'000'000;
-  const Answer answer = lab.wait(lab.send(api::Hold{{"m01"}}));
+  const Answer answer = lab.ask(api::Hold{{"m01"}});
   EXPECT_EQ(answer.result, "fault");
   EXPECT_THAT(answer.reason, AllOf(HasSubstr("held: 1 motor"), HasSubstr("is not on the disk")));
   EXPECT_TRUE(lab.motor("m01").held);
@@ -117,7 +117,7 @@ TEST(KeptHolds, ADiskThatDoesNotTakeThemIsTold) {
 // One that comes back later is another one, of which nobody has said that it is to be held.
 TEST(KeptHolds, OfMotorsThatAreNotConfiguredAnyMoreAreDropped) {
   HoldLab lab;
-  lab.wait(lab.send(api::Hold{}));
+  lab.ask(api::Hold{});
   lab.use_configuration(hall(1, 1));
   lab.reconnect();
   EXPECT_THAT(lab.warnings(), Contains(AllOf(HasSubstr("m02 is not configured any more"),
@@ -134,7 +134,7 @@ TEST(KeptHolds, AllMotorsAreHeldWhenTheStoreIsDamagedOrGone) {
   for (const bool damaged : {true, false}) {
     SCOPED_TRACE(damaged);
     HoldLab lab;
-    lab.wait(lab.send(api::Hold{{"m01"}}));
+    lab.ask(api::Hold{{"m01"}});
     lab.restart_daemon([&] {
       if (damaged) return lab.disk().content("/state/state.db").resize(4096);
       EXPECT_TRUE(lab.disk().remove("/state/state.db"));
@@ -145,13 +145,12 @@ TEST(KeptHolds, AllMotorsAreHeldWhenTheStoreIsDamagedOrGone) {
       lab.reconnect();
       for (const char* motor : {"m01", "m02"}) {
         EXPECT_TRUE(lab.motor(motor).held);
-        EXPECT_THAT(
-            lab.wait(lab.send(api::Jog{.motor = motor, .per_s = 100, .in_steps = true})).reason,
-            AllOf(HasSubstr("it is held by bushd since "), HasSubstr("state.db"),
-                  HasSubstr("run 'bushctl release ")));
+        EXPECT_THAT(lab.ask(api::Jog{.motor = motor, .per_s = 100, .in_steps = true}).reason,
+                    AllOf(HasSubstr("it is held by bushd since "), HasSubstr("state.db"),
+                          HasSubstr("run 'bushctl release ")));
       }
     }
-    EXPECT_EQ(lab.wait(lab.send(api::Release{})).reason, "released: 2 motors");
+    EXPECT_EQ(lab.ask(api::Release{}).reason, "released: 2 motors");
     lab.restart_daemon();
     lab.reconnect();
     EXPECT_FALSE(lab.motor("m02").held);
@@ -170,12 +169,11 @@ TEST(KeptHolds, NobodyHoldsNewMotors) {
 
 // Whenever the button is pressed: the MCU gets the motor with its configuration, or not at all.
 TEST(KeptHolds, LocalInputsDoNotMoveTheMotorWhileTheMcuIsConnected) {
-  std::string toml = hall(1, 1);
-  toml.insert(toml.find("name = \"m01\""), "local = true\n");
+  const std::string toml = with_keys(hall(1, 1), "m01", "local = true\n");
   for (int ms = 0; ms < 400; ms += 4) {
     SCOPED_TRACE(std::to_string(ms) + " ms");
     HoldLab lab(toml);
-    lab.wait(lab.send(api::Hold{{"m01"}}));
+    lab.ask(api::Hold{{"m01"}});
     // The MCU has forgotten who may move it.
     lab.bus(0).reboot(0);
     lab.restart_daemon();

@@ -3,43 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/lab.h"
+#include "daemon/kept_lab.h"
 
 namespace bushd::test {
 namespace {
 
 using testing::HasSubstr;
 
-struct KeptLab : Lab {
-  explicit KeptLab(const std::string& toml = hall(1, 2)) : Lab(toml) {
-    keep_positions();
-    connect();
-  }
-  void expect_refused(const std::string& motor, const std::string& why) {
-    const Answer answer = wait(send(Ask::kMoveBy, {motor}, {10}));
-    EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, HasSubstr(why));
-  }
-  void reach(const std::string& motor, std::int64_t steps) {
-    EXPECT_EQ(wait(send(Ask::kMoveBy, {motor}, {steps})).result, "reached");
-  }
-  void reconnect() {
-    run_for(0.1);
-    ASSERT_TRUE(run_until([this] { return all_ready(); }, 20));
-    run_for(1);
-  }
-  void expect_at_shaft(const std::string& name, api::Trust trust) {
-    EXPECT_EQ(motor(name).trust, trust) << motor(name).uncertain_reason;
-    EXPECT_EQ(motor(name).position_steps, shaft_steps(name));
-  }
-};
-
 TEST(KeptPositions, AreKnownToTheNextDaemon) {
   KeptLab lab;
   lab.reach("m01", 300);
   lab.run_for(0.2);
-  lab.restart_daemon();
-  lab.reconnect();
+  lab.go_on_with_next_daemon();
   lab.expect_at_shaft("m01", api::Trust::kKnown);
   lab.reach("m01", 50);
 }
@@ -48,8 +23,7 @@ TEST(KeptPositions, AreKnownThoughTheDaemonWasKilledInMotion) {
   KeptLab lab;
   lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.7);
-  lab.restart_daemon();
-  lab.reconnect();
+  lab.go_on_with_next_daemon();
   lab.run_for(3);
   lab.expect_at_shaft("m01", api::Trust::kKnown);
 }
@@ -59,14 +33,13 @@ TEST(KeptPositions, AreRestoredAfterAnMcuHasLostPowerAtRest) {
   lab.reach("m01", 300);
   lab.reach("m02", -70);
   lab.run_for(0.2);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   lab.expect_at_shaft("m01", api::Trust::kRestored);
   lab.expect_at_shaft("m02", api::Trust::kRestored);
   EXPECT_THAT(lab.motor("m01").uncertain_reason, HasSubstr("300 steps"));
   lab.reach("m01", 50);
   lab.expect_at_shaft("m01", api::Trust::kRestored);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {350})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {350}).result, "done");
   lab.expect_at_shaft("m01", api::Trust::kKnown);
 }
 
@@ -74,8 +47,7 @@ TEST(KeptPositions, AreStaleToADaemonThatHasStoodStillUntilTheMcuReports) {
   KeptLab lab;
   lab.reach("m01", 300);
   lab.run_for(0.2);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   lab.expect_at_shaft("m01", api::Trust::kRestored);
   // Another one may have moved it meanwhile.
   lab.pause_daemon(1.7);
@@ -90,15 +62,11 @@ TEST(KeptPositions, AreRestoredAfterEverythingHasLostPowerAtRest) {
   KeptLab lab;
   lab.reach("m01", 300);
   lab.run_for(0.2);
-  lab.bus(0).reboot(0);
-  lab.cut_pc_power();
-  lab.reconnect();
+  lab.cut_all_power();
   lab.expect_at_shaft("m01", api::Trust::kRestored);
   lab.expect_at_shaft("m02", api::Trust::kRestored);
   // And again: what is restored stays so.
-  lab.bus(0).reboot(0);
-  lab.cut_pc_power();
-  lab.reconnect();
+  lab.cut_all_power();
   lab.expect_at_shaft("m01", api::Trust::kRestored);
 }
 
@@ -108,17 +76,14 @@ TEST(KeptPositions, AreUncertainAfterAPowerCutInMotion) {
     lab.reach("m01", 300);
     lab.send(Ask::kMoveBy, {"m01"}, {5000});
     lab.run_for(0.7);
-    lab.bus(0).reboot(0);
-    if (of_pc) lab.cut_pc_power();
-    lab.reconnect();
+    of_pc ? lab.cut_all_power() : lab.cut_mcu_power();
     EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
     lab.expect_refused("m01", "restarted while it moved; last known: ");
     lab.expect_at_shaft("m02", api::Trust::kRestored);
     // It stays so until somebody says where it stands.
-    lab.restart_daemon();
-    lab.reconnect();
+    lab.go_on_with_next_daemon();
     lab.expect_refused("m01", "restarted while it moved; last known: ");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {0}).result, "done");
     lab.reach("m01", 10);
   }
 }
@@ -128,12 +93,12 @@ TEST(KeptPositions, NobodyHasToldWhereTheyAreOnTheFirstDay) {
   lab.keep_positions();
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {100}).result, "reached");
   lab.run_for(0.2);
   lab.restart_daemon();
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {100}).result, "reached");
 }
 
 TEST(KeptPositions, TheDiskKnowsOfAMotionBeforeTheLineDoes) {
@@ -177,15 +142,13 @@ TEST(KeptPositions, WhatIsRefusedWhateverTheDiskSaysLeavesNoMarkThere) {
            {api::SetPosition{.motors = far}, "positions lie within"}}) {
     const auto asked = lab.send(request);
     ASSERT_FALSE(lab.replies(asked).empty()) << why << ": it waits for no disk";
-    EXPECT_EQ(lab.last_reply(asked).result, "refused") << why;
-    EXPECT_THAT(lab.last_reply(asked).reason, HasSubstr(why));
+    EXPECT_THAT(lab.last_reply(asked), Ends("refused", why)) << why;
   }
   // An MCU that loses its power now stands where it stood.
   lab.run_for(0.2);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   lab.expect_at_shaft("m01", api::Trust::kRestored);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {100}).result, "reached");
 }
 
 TEST(KeptPositions, WhatIsStoppedBeforeItBeginsDoesNotBegin) {
@@ -195,8 +158,7 @@ TEST(KeptPositions, WhatIsStoppedBeforeItBeginsDoesNotBegin) {
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {100});
   const auto other = lab.send(Ask::kMoveBy, {"m02"}, {100});
   const auto stop = lab.send(Ask::kStop, {"m01"});
-  EXPECT_EQ(lab.wait(move).result, "stopped");
-  EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("before this was carried out"));
+  EXPECT_THAT(lab.wait(move), Ends("stopped", "before this was carried out"));
   EXPECT_EQ(lab.wait(stop).result, "done");
   EXPECT_EQ(lab.wait(other).result, "reached");
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
@@ -209,8 +171,7 @@ TEST(KeptPositions, AJogWhoseClientIsSilentMeanwhileDoesNotBegin) {
   const auto jog =
       lab.send(api::Jog{.motor = "m01", .per_s = 500, .in_steps = true, .keepalive_ms = 200});
   lab.run_for(3);
-  EXPECT_EQ(lab.last_reply(jog).result, "refused");
-  EXPECT_THAT(lab.last_reply(jog).reason, HasSubstr("silent for longer than its keepalive time"));
+  EXPECT_THAT(lab.last_reply(jog), Ends("refused", "silent for longer than its keepalive time"));
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
@@ -233,9 +194,7 @@ TEST(KeptPositions, ADiskThatDoesNotAnswerKeepsMotorsAtRest) {
   const auto number = lab.send(Ask::kMoveBy, {"m01"}, {100});
   lab.run_for(0.9);
   EXPECT_TRUE(lab.replies(number).empty());
-  const Answer answer = lab.wait(number);
-  EXPECT_EQ(answer.result, "refused");
-  EXPECT_THAT(answer.reason, HasSubstr("m01: the disk cannot be told that it moves"));
+  EXPECT_THAT(lab.wait(number), Ends("refused", "m01: the disk cannot be told that it moves"));
 }
 
 TEST(KeptPositions, ABrokenDiskKeepsMotorsAtRestButNotThoseThatMove) {
@@ -244,15 +203,13 @@ TEST(KeptPositions, ABrokenDiskKeepsMotorsAtRestButNotThoseThatMove) {
   lab.run_for(0.5);
   lab.disk().set_broken(true);
   lab.expect_refused("m01", "input/output error");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m02"}, {900})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m02"}, {900}).result, "reached");
   EXPECT_EQ(lab.last_reply(moving).result, "stopped");
   lab.disk().set_broken(false);
   lab.run_for(2.5);
   lab.reach("m01", 10);
   lab.run_for(0.2);
-  lab.bus(0).reboot(0);
-  lab.cut_pc_power();
-  lab.reconnect();
+  lab.cut_all_power();
   lab.expect_at_shaft("m01", api::Trust::kRestored);
   lab.expect_at_shaft("m02", api::Trust::kRestored);
 }
@@ -262,37 +219,28 @@ TEST(KeptPositions, NotRequiredTheyAreUncertainAfterwards) {
   lab.run_for(0.5);
   lab.disk().set_broken(true);
   lab.reach("m01", 10);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
-  lab.bus(0).reboot(0);
-  lab.cut_pc_power();
-  lab.reconnect();
+  lab.cut_all_power();
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
   EXPECT_EQ(lab.motor("m02").trust, api::Trust::kUncertain);
   lab.expect_refused("m02", "last known: 0 steps");
 }
 
 TEST(KeptPositions, RestoredMayBeTooLittle) {
-  std::string toml = hall(1, 2);
-  toml.insert(toml.find("name = \"m01\""), "restored = \"refuse\"\n");
-  KeptLab lab(toml);
+  KeptLab lab(with_keys(hall(1, 2), "m01", "restored = \"refuse\"\n"));
   lab.reach("m01", 300);
   lab.run_for(0.2);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   lab.expect_at_shaft("m01", api::Trust::kRestored);
   lab.expect_refused("m01", "its position is only restored");
   lab.reach("m02", 10);
 }
 
 TEST(KeptPositions, OfMotorsWithLocalInputsAreUncertainAfterAPowerCut) {
-  std::string toml = hall(1, 2);
-  toml.insert(toml.find("name = \"m01\""), "local = true\n");
-  KeptLab lab(toml);
+  KeptLab lab(with_keys(hall(1, 2), "m01", "local = true\n"));
   lab.run_for(0.5);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   lab.expect_refused("m01", "people may have moved it");
   lab.expect_at_shaft("m02", api::Trust::kRestored);
 }
@@ -302,22 +250,20 @@ TEST(KeptPositions, AreKnownOnceTheyAreConfirmed) {
   lab.reach("m01", 300);
   lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.7);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   lab.expect_refused("m01", "or 'bushctl confirm m01' if it stands where it is shown");
   const std::int64_t shown = lab.motor("m01").position_steps;
-  EXPECT_EQ(lab.wait(lab.send(api::Confirm{{"m01", "m02"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Confirm{{"m01", "m02"}}).result, "done");
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_EQ(lab.motor("m01").position_steps, shown);
   EXPECT_EQ(lab.motor("m02").trust, api::Trust::kKnown);
   lab.run_for(0.2);
-  lab.restart_daemon();
-  lab.reconnect();
+  lab.go_on_with_next_daemon();
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   lab.send(Ask::kMoveBy, {"m01"}, {500});
   lab.run_for(0.1);
-  EXPECT_THAT(lab.wait(lab.send(api::Confirm{{"m01"}})).reason, HasSubstr("moves"));
-  EXPECT_THAT(lab.wait(lab.send(api::Confirm{{"m09"}})).reason, HasSubstr("there is no motor"));
+  EXPECT_THAT(lab.ask(api::Confirm{{"m01"}}).reason, HasSubstr("moves"));
+  EXPECT_THAT(lab.ask(api::Confirm{{"m09"}}).reason, HasSubstr("there is no motor"));
 }
 
 // Whoever is answered finds it, also if the daemon is killed in the next moment.
@@ -325,15 +271,13 @@ TEST(KeptPositions, AreConfirmedWhenTheDiskHasIt) {
   KeptLab lab;
   lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.7);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   ASSERT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
   lab.disk_us = 200'000;
   const auto number = lab.send(api::Confirm{{"m01"}});
   ASSERT_TRUE(lab.run_until([&] { return lab.has_result(number); }, 2));
   EXPECT_EQ(lab.last_reply(number).result, "done");
-  lab.restart_daemon();
-  lab.reconnect();
+  lab.go_on_with_next_daemon();
   lab.expect_at_shaft("m02", api::Trust::kRestored);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
 }
@@ -341,18 +285,14 @@ TEST(KeptPositions, AreConfirmedWhenTheDiskHasIt) {
 TEST(KeptPositions, ConfirmedOnABrokenDiskAreNotSaidToBeDone) {
   KeptLab lab;
   lab.run_for(0.5);
-  lab.bus(0).reboot(0);
-  lab.reconnect();
+  lab.cut_mcu_power();
   ASSERT_EQ(lab.motor("m01").trust, api::Trust::kRestored);
   lab.disk().set_broken(true);
-  const Answer answer = lab.wait(lab.send(api::Confirm{{"m01"}}));
-  EXPECT_EQ(answer.result, "fault");
-  EXPECT_THAT(answer.reason, HasSubstr("it is lost if bushd ends"));
+  EXPECT_THAT(lab.ask(api::Confirm{{"m01"}}), Ends("fault", "it is lost if bushd ends"));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown) << "until then it counts";
   lab.disk().set_broken(false);
   lab.run_for(2.5);
-  lab.restart_daemon();
-  lab.reconnect();
+  lab.go_on_with_next_daemon();
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
 }
 
@@ -369,16 +309,14 @@ TEST(KeptPositions, LastKnownAreThoseHeardLast) {
   const std::int64_t heard = lab.history(asked)[0].to_steps;
   EXPECT_GT(heard, 3000);
   for (const bool restart : {false, true}) {
-    if (restart) lab.restart_daemon();
-    lab.reconnect();
+    restart ? lab.go_on_with_next_daemon() : lab.reconnect();
     EXPECT_EQ(lab.motor("m01").position_steps, heard) << "which people may confirm";
     lab.expect_refused("m01", "last known: " + std::to_string(heard) + " steps, in motion");
   }
 }
 
 TEST(KeptPositions, AreOfAnotherScaleUntilSomebodyConfirmsThem) {
-  std::string toml = hall(1, 2);
-  toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n");
+  std::string toml = with_keys(hall(1, 2), "m01", "unit = \"mm\"\nsteps_per_unit = 400\n");
   KeptLab lab(toml);
   lab.reach("m01", 300);
   lab.run_for(0.2);
@@ -386,18 +324,17 @@ TEST(KeptPositions, AreOfAnotherScaleUntilSomebodyConfirmsThem) {
   lab.use_configuration(toml);
   lab.reconnect();
   lab.expect_refused("m01", "its steps_per_unit was changed from 400 to 800");
-  EXPECT_EQ(lab.wait(lab.send(api::Confirm{{"m01"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Confirm{{"m01"}}).result, "done");
   lab.expect_at_shaft("m01", api::Trust::kKnown);
 }
 
 TEST(KeptPositions, KeepTheirOffsetUntilTheFileIsEdited) {
-  std::string toml = hall(1, 1);
-  toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\noffset = 2\n");
+  std::string toml =
+      with_keys(hall(1, 1), "m01", "unit = \"mm\"\nsteps_per_unit = 400\noffset = 2\n");
   KeptLab lab(toml);
   lab.reach("m01", 400);
   EXPECT_EQ(lab.motor("m01").user, 3);
-  EXPECT_EQ(lab.wait(lab.send(api::SetPosition{.motors = {{"m01", api::UserUnits{10}}}})).result,
-            "done");
+  EXPECT_EQ(lab.ask(api::SetPosition{.motors = {{"m01", api::UserUnits{10}}}}).result, "done");
   EXPECT_EQ(lab.motor("m01").user, 10);
   lab.run_for(0.2);
   lab.cut_pc_power();
@@ -415,7 +352,7 @@ TEST(KeptPositions, HaveAHistory) {
   lab.reach("m01", 300);
   lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.5);
-  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  lab.ask(Ask::kStop, {"m01"});
   lab.run_for(0.2);
   const auto number = lab.send(api::GetHistory{.motor = "m01", .most = 10});
   EXPECT_EQ(lab.wait(number).result, "done");
@@ -429,11 +366,10 @@ TEST(KeptPositions, HaveAHistory) {
   EXPECT_EQ(history[1].what, "move");
   EXPECT_THAT(history[1].who, HasSubstr("of test"));
   EXPECT_EQ(history[2].what, "set") << "when it was connected for the first time";
-  EXPECT_THAT(lab.wait(lab.send(api::GetHistory{.motor = "m01", .most = 0})).reason,
+  EXPECT_THAT(lab.ask(api::GetHistory{.motor = "m01", .most = 0}).reason,
               HasSubstr("allowed: 1 to 1000"));
   Lab without(hall(1, 1));
-  EXPECT_THAT(without.wait(without.send(api::GetHistory{.motor = "m01"})).reason,
-              HasSubstr("nothing is kept"));
+  EXPECT_THAT(without.ask(api::GetHistory{.motor = "m01"}).reason, HasSubstr("nothing is kept"));
 }
 
 TEST(KeptPositions, AManyMotorsStartCostsOneSync) {

@@ -18,9 +18,9 @@ namespace {
 class KeypadLab : public Lab {
  public:
   explicit KeypadLab(const std::string& keypad_keys, const std::string& motor_keys = "")
-      : Lab(with(motor_keys)),
-        config_(parsed(with(motor_keys) + "[[keypad]]\nport = \"/dev/keypad\"\nmotor = \"m01\"\n" +
-                       keypad_keys)),
+      : Lab(hall(1, 1) + motor_keys),
+        config_(parsed(hall(1, 1) + motor_keys +
+                       "[[keypad]]\nport = \"/dev/keypad\"\nmotor = \"m01\"\n" + keypad_keys)),
         keypad(config_.keypads.at(0), "m01",
                [this](const api::Asker& asker, const api::Request& request) {
                  ++asked;
@@ -60,10 +60,6 @@ class KeypadLab : public Lab {
   }
 
  private:
-  static std::string with(const std::string& motor_keys) {
-    std::string toml = hall(1, 1);
-    return toml + motor_keys;
-  }
   static config::Config parsed(const std::string& toml) {
     auto config = config::parse(toml, "keypad.toml");
     if (!config) throw std::runtime_error(config.error().text());
@@ -182,7 +178,7 @@ TEST(Keypads, LimitsAndOtherClientsEndItsJog) {
   EXPECT_EQ(lab.press(kKeyForward), "----\n");
   EXPECT_EQ(lab.press(kKeyReverse), "0300\n");
   lab.live(0.3);
-  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  lab.ask(Ask::kStop, {"m01"});
   lab.live(2);
   EXPECT_TRUE(lab.rests());
   EXPECT_GT(lab.shaft_steps("m01"), -100);

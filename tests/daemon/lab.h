@@ -3,6 +3,8 @@
 // is repeatable.
 #pragma once
 
+#include <gmock/gmock.h>
+
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -74,6 +76,16 @@ struct Answer {
   std::optional<api::CamacResult> camac{};
   std::vector<api::ProgramEntry> programs{};
 };
+inline void PrintTo(const Answer& answer, std::ostream* out) {
+  *out << answer.result << ": " << answer.reason;
+}
+
+// An answer with this result, whose reason says this.
+inline testing::Matcher<const Answer&> Ends(const std::string& result,
+                                            const std::string& reason = {}) {
+  return testing::AllOf(testing::Field("result", &Answer::result, result),
+                        testing::Field("reason", &Answer::reason, testing::HasSubstr(reason)));
+}
 
 class Lab : public daemon::Outputs, private state::Backend {
  public:
@@ -107,11 +119,21 @@ class Lab : public daemon::Outputs, private state::Backend {
   bool has_result(std::int64_t number) const;
   // Runs until the request has its result or was refused, and returns that.
   Answer wait(std::int64_t number, double limit_s = 60);
+  // Sends and waits.
+  Answer ask(Ask ask, const std::vector<std::string>& motors,
+             const std::vector<std::int64_t>& steps = {}) {
+    return wait(send(ask, motors, steps));
+  }
+  Answer ask(const api::Request& request) { return wait(send(request)); }
   bool all_ready() const;
   // Asserts that all MCUs become READY. The first time somebody says then that all motors stand
   // where their MCUs count them.
   void connect();
 
+  // Runs until the MCU is told to be in this state.
+  bool mcu_comes_to(const std::string& mcu, api::McuState state, double limit_s = 30) {
+    return run_until([&] { return has_state(mcu) && state_of(mcu).state == state; }, limit_s);
+  }
   bool has_state(const std::string& mcu) const { return states_.contains(mcu); }
   const api::StateSnapshot& state_of(const std::string& mcu) const { return states_.at(mcu); }
   api::MotorState motor(const std::string& name) const;
@@ -126,9 +148,14 @@ class Lab : public daemon::Outputs, private state::Backend {
   // Steps that the motor has really made, seen from the outside.
   std::int64_t shaft_steps(const std::string& motor) const;
 
-  // The port of a bus goes away / comes back.
+  // The port of a bus goes away / comes back; the last, after so long.
   void unplug(std::size_t bus);
   void plug(std::size_t bus);
+  void unplug(std::size_t bus, double seconds) {
+    unplug(bus);
+    run_for(seconds);
+    plug(bus);
+  }
   // The daemon does nothing for a while, as after SIGSTOP or on a very busy machine; what has
   // arrived meanwhile is the first that it reads.
   void pause_daemon(double seconds);
@@ -248,10 +275,23 @@ class Lab : public daemon::Outputs, private state::Backend {
   std::vector<std::pair<std::int64_t, std::function<void()>>> state_jobs_;  // when they are done
 };
 
+// All of its MCUs are READY.
+struct ReadyLab : Lab {
+  explicit ReadyLab(const std::string& toml, const std::string& glacier = {},
+                    sim::EdgeSink* sink = nullptr, std::uint32_t disabled_capabilities = 0)
+      : Lab(toml, glacier, sink, disabled_capabilities) {
+    connect();
+  }
+};
+
 // One bus "hall" with `mcus` MCUs of `motors` motors each, named m01.., all in group "axes" of
 // `table`. `manner` is the format, "fine" or "coarse", and with "_table" behind it moves are given
 // to the MCUs as a whole, with "_ticks" every tick is sent.
 std::string hall(int mcus, int motors, const std::string& manner = "fine",
                  const std::string& table = "bushd2-constant");
+
+// With these keys of its motor of this name; of its MCU of this address.
+std::string with_keys(std::string toml, const std::string& motor, const std::string& keys);
+std::string with_mcu_keys(std::string toml, const std::string& keys, int address = 1);
 
 }  // namespace bushd::test

@@ -6,6 +6,15 @@
 #include "daemon/lab.h"
 
 namespace bushd::test {
+namespace {
+
+std::string with_behind(std::string toml, const std::string& line, const std::string& keys) {
+  const std::size_t at = toml.find(line);
+  if (at == std::string::npos) throw std::logic_error("no line " + line);
+  return toml.insert(at + line.size(), keys);
+}
+
+}  // namespace
 
 std::string hall(int mcus, int motors, const std::string& manner, const std::string& table) {
   const std::string format = manner.substr(0, manner.find('_'));
@@ -25,6 +34,14 @@ std::string hall(int mcus, int motors, const std::string& manner, const std::str
     }
   }
   return toml;
+}
+
+std::string with_keys(std::string toml, const std::string& motor, const std::string& keys) {
+  return with_behind(std::move(toml), "name = \"" + motor + "\"\n", keys);
+}
+
+std::string with_mcu_keys(std::string toml, const std::string& keys, int address) {
+  return with_behind(std::move(toml), "\naddress = " + std::to_string(address) + "\n", keys);
 }
 
 std::vector<api::MotorAmount> motor_steps(const std::vector<std::string>& motors,

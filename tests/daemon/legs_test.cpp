@@ -15,10 +15,8 @@ using testing::HasSubstr;
 
 // 100 to 2500 steps/s; the last approach of m01 is upwards, over 40 steps.
 std::string lab_with_backlash(const std::string& keys = "", const char* manner = "fine") {
-  std::string toml = hall(1, 2, manner);
-  const std::string motor = "output = 0\n";
-  return toml.insert(toml.find(motor) + motor.size(),
-                     "unit = \"mm\"\nsteps_per_unit = 400\nbacklash = 0.1\n" + keys);
+  return with_keys(hall(1, 2, manner), "m01",
+                   "unit = \"mm\"\nsteps_per_unit = 400\nbacklash = 0.1\n" + keys);
 }
 
 struct Way {
@@ -43,8 +41,7 @@ Way way_of(Lab& lab, std::int64_t request) {
 TEST(Legs, AgainstTheBacklashAMoveComesBackFromBeyond) {
   for (const char* manner : {"fine", "coarse", "fine_table"}) {
     SCOPED_TRACE(manner);
-    Lab lab(lab_with_backlash("", manner));
-    lab.connect();
+    ReadyLab lab(lab_with_backlash("", manner));
     const auto down = lab.send(Ask::kMoveTo, {"m01"}, {-600});
     const Way way = way_of(lab, down);
     const Answer ended = lab.last_reply(down);
@@ -61,8 +58,7 @@ TEST(Legs, AgainstTheBacklashAMoveComesBackFromBeyond) {
 }
 
 TEST(Legs, TheLastApproachHasItsOwnSpeed) {
-  Lab lab(lab_with_backlash("backlash_speed = 0.5\n"));
-  lab.connect();
+  ReadyLab lab(lab_with_backlash("backlash_speed = 0.5\n"));
   // Farther than the backlash, so not as slow all the way.
   const auto up = lab.send(Ask::kMoveTo, {"m01"}, {1000});
   EXPECT_GT(way_of(lab, up).fastest_up, 500);
@@ -81,38 +77,31 @@ TEST(Legs, TheLastApproachHasItsOwnSpeed) {
 TEST(Legs, ANegativeOneIsUsedFromAbove) {
   std::string toml = lab_with_backlash();
   toml.replace(toml.find("0.1"), 3, "-0.1");
-  Lab lab(toml);
-  lab.connect();
+  ReadyLab lab(toml);
   const auto up = lab.send(Ask::kMoveTo, {"m01"}, {600});
   EXPECT_EQ(way_of(lab, up).highest, 640);
   EXPECT_EQ(lab.shaft_steps("m01"), 600);
-  Lab turned(lab_with_backlash("direction = \"negative\"\n"));
-  turned.connect();
+  ReadyLab turned(lab_with_backlash("direction = \"negative\"\n"));
   const auto there = turned.send(Ask::kMoveTo, {"m01"}, {600});
   EXPECT_EQ(way_of(turned, there).highest, 640) << "upwards on the user's scale is down here";
 }
 
 TEST(Legs, LimitsHoldForEveryLegBeforeTheFirst) {
-  Lab lab(lab_with_backlash("soft_limits = [-1.0, 5.0]\n"));
-  lab.connect();
-  const Answer refused = lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {-390}));
-  EXPECT_EQ(refused.result, "refused");
-  EXPECT_THAT(refused.reason, HasSubstr("m01: the start of its last approach, for backlash"));
+  ReadyLab lab(lab_with_backlash("soft_limits = [-1.0, 5.0]\n"));
+  const Answer refused = lab.ask(Ask::kMoveTo, {"m01"}, {-390});
+  EXPECT_THAT(refused, Ends("refused", "m01: the start of its last approach, for backlash"));
   EXPECT_THAT(refused.reason, HasSubstr("soft limit at -1.00"));
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {-360})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {-360}).result, "reached");
 }
 
 TEST(Legs, AStopEndsTheMoveInEveryLeg) {
-  Lab lab(lab_with_backlash("backlash_speed = 0.25\n"));
-  lab.connect();
+  ReadyLab lab(lab_with_backlash("backlash_speed = 0.25\n"));
   const auto first = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") <= -300; });
   lab.send(Ask::kStop, {"m01"});
   const Answer in_first = lab.wait(first);
-  EXPECT_EQ(in_first.result, "stopped");
-  EXPECT_THAT(in_first.reason,
-              HasSubstr("m01: stopped on request, asked for by command 2 of test"));
+  EXPECT_THAT(in_first, Ends("stopped", "m01: stopped on request, asked for by command 2 of test"));
   lab.run_for(1);
   EXPECT_EQ(in_first.position_steps[0], lab.shaft_steps("m01")) << "no other leg follows";
   const auto second = lab.send(Ask::kMoveTo, {"m01"}, {-1000});
@@ -126,8 +115,7 @@ TEST(Legs, AStopEndsTheMoveInEveryLeg) {
 }
 
 TEST(Legs, AStopWhereALegEndsIsNoArrival) {
-  Lab lab(lab_with_backlash());
-  lab.connect();
+  ReadyLab lab(lab_with_backlash());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") == -640; });
   lab.send(Ask::kStop, {"m01"});
@@ -136,11 +124,10 @@ TEST(Legs, AStopWhereALegEndsIsNoArrival) {
 }
 
 TEST(Legs, ANewTargetInAnyLegIsReachedFromTheRightSide) {
-  Lab lab(lab_with_backlash());
-  lab.connect();
+  ReadyLab lab(lab_with_backlash());
   for (const int at : {-200, -630}) {
     SCOPED_TRACE(at);
-    ASSERT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+    ASSERT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
     const auto first = lab.send(Ask::kMoveTo, {"m01"}, {-600});
     lab.run_until([&] { return lab.shaft_steps("m01") <= at; });
     if (at == -630) lab.run_until([&] { return lab.shaft_steps("m01") == -640; });
@@ -155,8 +142,7 @@ TEST(Legs, ANewTargetInAnyLegIsReachedFromTheRightSide) {
 }
 
 TEST(Legs, ALostLinkEndsTheMoveInTheFirstLeg) {
-  Lab lab(lab_with_backlash());
-  lab.connect();
+  ReadyLab lab(lab_with_backlash());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") <= -300; });
   lab.unplug(0);
@@ -169,8 +155,7 @@ TEST(Legs, ALostLinkEndsTheMoveInTheFirstLeg) {
 }
 
 TEST(Legs, TheResultComesWhenItHasSettled) {
-  Lab lab(lab_with_backlash("settle_ms = 800\n"));
-  lab.connect();
+  ReadyLab lab(lab_with_backlash("settle_ms = 800\n"));
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-200});
   lab.run_until([&] { return lab.shaft_steps("m01") == -240; });
   lab.run_until([&] { return lab.shaft_steps("m01") == -200; });
@@ -189,22 +174,19 @@ TEST(Legs, TheResultComesWhenItHasSettled) {
 }
 
 TEST(Legs, ANewTargetWhileItSettlesIsGoneTo) {
-  Lab lab(lab_with_backlash("settle_ms = 800\n"));
-  lab.connect();
+  ReadyLab lab(lab_with_backlash("settle_ms = 800\n"));
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {100});
   lab.run_until([&] { return lab.shaft_steps("m01") == 100; });
   lab.run_for(0.2);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {300})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {300}).result, "reached");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), 300);
 }
 
 TEST(Legs, ADryRunShowsThem) {
-  Lab lab(lab_with_backlash("backlash_speed = 0.25\n"));
-  lab.connect();
-  const Answer planned = lab.wait(lab.send(api::Move{.kind = api::Move::Kind::kAbsolute,
-                                                     .motors = {{"m01", -600}, {"m02", 50}},
-                                                     .dry_run = true}));
+  ReadyLab lab(lab_with_backlash("backlash_speed = 0.25\n"));
+  const Answer planned = lab.ask(api::Move{
+      .kind = api::Move::Kind::kAbsolute, .motors = {{"m01", -600}, {"m02", 50}}, .dry_run = true});
   ASSERT_TRUE(planned.plan) << planned.reason;
   ASSERT_EQ(planned.plan->motors.size(), 3u);
   EXPECT_EQ(planned.plan->motors[0].steps, -640);

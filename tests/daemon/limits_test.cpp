@@ -14,11 +14,7 @@ using testing::HasSubstr;
 // Two motors on one MCU; `keys` are of it, `motor_keys` of m01.
 std::string lab_with(const std::string& manner, const std::string& keys,
                      const std::string& motor_keys) {
-  std::string toml = hall(1, 2, manner);
-  const std::string motor = "output = 0\n";
-  toml.insert(toml.find(motor) + motor.size(), motor_keys);
-  const std::string mcu = "address = 1\n";
-  return toml.insert(toml.find(mcu) + mcu.size(), keys);
+  return with_mcu_keys(with_keys(hall(1, 2, manner), "m01", motor_keys), keys);
 }
 
 class Limits : public testing::TestWithParam<const char*> {
@@ -42,11 +38,9 @@ INSTANTIATE_TEST_SUITE_P(Manners, Limits,
 TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
   for (const int sign : {1, -1}) {
     const std::string end = sign > 0 ? "positive" : "negative";
-    Lab lab(lab_with(GetParam(), "", "limit = \"" + end + "\"\n"));
-    lab.connect();
+    ReadyLab lab(lab_with(GetParam(), "", "limit = \"" + end + "\"\n"));
     const Answer result = meet_switch(lab, sign * 20000);
-    EXPECT_EQ(result.result, "limit") << result.reason;
-    EXPECT_THAT(result.reason, HasSubstr("m01"));
+    EXPECT_THAT(result, Ends("limit", "m01"));
     EXPECT_THAT(result.reason, HasSubstr(end + " end"));
     EXPECT_EQ(result.motor_results, (std::vector<std::string>{"limit", "reached"}));
     const std::int64_t stands = lab.shaft_steps("m01");
@@ -61,16 +55,15 @@ TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
     EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kReady) << "no fault";
 
     const Answer refused = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {sign * 10}));
-    EXPECT_EQ(refused.result, "refused");
-    EXPECT_THAT(refused.reason, HasSubstr("m01: its limit switch at the " + end + " end"));
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {sign * -10})).result, "reached");
+    EXPECT_THAT(refused, Ends("refused", "m01: its limit switch at the " + end + " end"));
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {sign * -10}).result, "reached");
     const auto back = lab.send(Ask::kMoveBy, {"m01"}, {sign * -200});
     lab.run_for(0.3);
     press(lab, 0);
     EXPECT_EQ(lab.wait(back).result, "reached");
     lab.run_for(0.1);
     EXPECT_EQ(word(lab.motor("m01").inhibited), "");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {sign * 20})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {sign * 20}).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), stands - sign * 190);
     EXPECT_EQ(lab.motor("m01").position_steps, stands - sign * 190);
     EXPECT_TRUE(lab.errors().empty());
@@ -78,8 +71,7 @@ TEST_P(Limits, AMoveEndsAtTheSwitchAndTheWayBackIsFree) {
 }
 
 TEST_P(Limits, OneThatIsCutOffAtItsSwitchMayHaveOverrun) {
-  Lab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"immediate\"\n"));
-  lab.connect();
+  ReadyLab lab(lab_with(GetParam(), "", "limit = \"both\"\nlimit_action = \"immediate\"\n"));
   const Answer result = meet_switch(lab, -20000);
   EXPECT_EQ(result.result, "limit");
   EXPECT_LE(std::abs(lab.shaft_steps("m01")), 560) << "a few ticks at 2500 steps/s";
@@ -91,8 +83,7 @@ TEST_P(Limits, OneThatIsCutOffAtItsSwitchMayHaveOverrun) {
 
 // The switch closes while the start is on its way.
 TEST_P(Limits, AMoveThatTheSwitchForestallsEndsAtTheLimitTheSame) {
-  Lab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
-  lab.connect();
+  ReadyLab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {300});
   press(lab, 1);
   const Answer result = lab.wait(move);
@@ -101,8 +92,7 @@ TEST_P(Limits, AMoveThatTheSwitchForestallsEndsAtTheLimitTheSame) {
 }
 
 TEST_P(Limits, ANewTargetBeyondTheSwitchEndsThereToo) {
-  Lab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
-  lab.connect();
+  ReadyLab lab(lab_with(GetParam(), "", "limit = \"positive\"\n"));
   const auto away = lab.send(Ask::kMoveTo, {"m01"}, {-3000});
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -600; }));
   const auto back = lab.send(Ask::kMoveTo, {"m01"}, {5000});
@@ -110,7 +100,7 @@ TEST_P(Limits, ANewTargetBeyondTheSwitchEndsThereToo) {
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") > 300; }));
   press(lab, 1);
   EXPECT_EQ(lab.wait(back).result, "limit");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
@@ -126,22 +116,20 @@ TEST_P(Limits, ASwitchThatOpensWhenItIsMetAndANewDaemon) {
   lab.restart_daemon();
   lab.connect();
   EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {-1})).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {1})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {1}).result, "reached");
 }
 
 TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndReleased) {
   for (const bool immediate : {false, true}) {
-    Lab lab(lab_with(
+    ReadyLab lab(lab_with(
         GetParam(),
         immediate ? "emergency_input = \"immediate\"\n" : "emergency_input = \"ramp\"\n", ""));
-    lab.connect();
     const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {20000, -20000});
     lab.run_for(1.5);
     const std::int64_t at = lab.shaft_steps("m01");
     press(lab, 0, BUSHD_INPUT_EMERGENCY);
     const Answer result = lab.wait(move);
-    EXPECT_EQ(result.result, "stopped");
-    EXPECT_THAT(result.reason, HasSubstr("emergency input of MCU hall:1"));
+    EXPECT_THAT(result, Ends("stopped", "emergency input of MCU hall:1"));
     EXPECT_EQ(result.position_steps.at(1), lab.shaft_steps("m02"));
     EXPECT_EQ(lab.shaft_steps("m01") - at > 100, !immediate);
     lab.run_for(0.1);
@@ -149,33 +137,27 @@ TEST_P(Limits, TheEmergencyInputStopsAllMotorsOfItsMcuUntilItIsClearedAndRelease
     EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
     EXPECT_EQ(lab.state_of("hall:1").inputs, "emergency");
     EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("release it"));
-    const Answer still = lab.wait(lab.send(Ask::kClearFaults, {}));
-    EXPECT_EQ(still.result, "fault");
-    EXPECT_THAT(still.reason, HasSubstr("emergency input"));
+    EXPECT_THAT(lab.ask(Ask::kClearFaults, {}), Ends("fault", "emergency input"));
     press(lab, 0);
     lab.restart_daemon();
-    ASSERT_TRUE(lab.run_until([&] {
-      return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
-    })) << "not for a daemon to clear";
+    ASSERT_TRUE(lab.mcu_comes_to("hall:1", api::McuState::kFault)) << "not for a daemon to clear";
     EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).reason,
                 HasSubstr("bushctl clear"));
-    EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
     if (immediate) continue;
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {10})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {10}).result, "reached");
   }
 }
 
 TEST_P(Limits, AnEmergencyInputThatDisablesTakesThePowerAndSaysSo) {
-  Lab lab(lab_with(GetParam(), "emergency_input = \"disable\"\n", ""));
-  lab.connect();
+  ReadyLab lab(lab_with(GetParam(), "emergency_input = \"disable\"\n", ""));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1);
   press(lab, 0, BUSHD_INPUT_EMERGENCY);
   press(lab, 0);
   const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "stopped");
-  EXPECT_THAT(result.reason,
-              HasSubstr("by the emergency input of MCU hall:1, which disabled its drivers"));
+  EXPECT_THAT(result,
+              Ends("stopped", "by the emergency input of MCU hall:1, which disabled its drivers"));
   lab.run_for(0.1);
   EXPECT_EQ(lab.motor("m01").uncertain_reason,
             "its drivers were disabled by the emergency input of MCU hall:1 while it moved");
@@ -185,26 +167,22 @@ TEST_P(Limits, AnEmergencyInputThatDisablesTakesThePowerAndSaysSo) {
             "emergency input, released by now, its drivers are disabled; run 'bushctl clear', then "
             "'bushctl enable'");
   lab.restart_daemon();
-  ASSERT_TRUE(lab.run_until([&] {
-    return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
-  })) << "not for a daemon to clear";
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  ASSERT_TRUE(lab.mcu_comes_to("hall:1", api::McuState::kFault)) << "not for a daemon to clear";
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   lab.run_for(0.1);
   EXPECT_FALSE(lab.motor("m01").enabled);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m02"}, {0})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {10})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kEnable, {}).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m02"}, {0}).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {10}).result, "reached");
 }
 
 TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
-  Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
-  lab.connect();
+  ReadyLab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1);
   lab.bus(0).mcu(0).set_current(801);
   const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "fault");
-  EXPECT_THAT(result.reason, HasSubstr("supply current"));
+  EXPECT_THAT(result, Ends("fault", "supply current"));
   lab.run_for(0.1);
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("overcurrent"));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
@@ -213,27 +191,23 @@ TEST_P(Limits, OvercurrentTakesThePowerAndSaysSo) {
   EXPECT_EQ(lab.mcu_health("hall:1").current, 801);
   // Neither a lost link nor a new daemon puts it back.
   lab.bus(0).mcu(0).set_current(0);
-  lab.unplug(0);
-  lab.run_for(2);
-  lab.plug(0);
+  lab.unplug(0, 2);
   lab.run_for(3);
   EXPECT_FALSE(lab.motor("m01").enabled);
   EXPECT_EQ(lab.state_of("hall:1").state, api::McuState::kFault);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   lab.run_for(0.1);
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("drivers disabled"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {10})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kEnable, {}).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {10}).result, "reached");
 }
 
 TEST_P(Limits, OvercurrentBeforeTheFirstStepLeavesThePositionKnown) {
-  Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
-  lab.connect();
+  ReadyLab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.bus(0).mcu(0).set_current(801);
   const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "fault");
-  EXPECT_THAT(result.reason, HasSubstr("supply current"));
+  EXPECT_THAT(result, Ends("fault", "supply current"));
   EXPECT_THAT(result.reason, HasSubstr("m01: it did not move"));
   lab.run_for(0.1);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
@@ -247,9 +221,8 @@ TEST_P(Limits, NoStepIsLostHoweverSwitchesBounce) {
     std::mt19937 random(seed);
     const auto below = [&random](unsigned n) { return static_cast<int>(random() % n); };
     const char* const ends[] = {"positive", "negative", "both"};
-    Lab lab(lab_with(GetParam(), "debounce_ticks = " + std::to_string(below(4)) + "\n",
-                     "limit = \"" + std::string(ends[below(3)]) + "\"\n"));
-    lab.connect();
+    ReadyLab lab(lab_with(GetParam(), "debounce_ticks = " + std::to_string(below(4)) + "\n",
+                          "limit = \"" + std::string(ends[below(3)]) + "\"\n"));
     for (int i = 0; i < 8; ++i) {
       const auto move =
           lab.send(Ask::kMoveBy, {"m01", "m02"}, {below(3000) - 1500, below(3000) - 1500});
@@ -272,17 +245,14 @@ TEST_P(Limits, NoStepIsLostHoweverSwitchesBounce) {
 
 // The ramp of an emergency stop is one without power then, and nobody knows where the motor stands.
 TEST_P(Limits, OvercurrentOnTheRampOfAnEmergencyStopLeavesThePositionUncertain) {
-  Lab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
-  lab.connect();
+  ReadyLab lab(lab_with(GetParam(), "overcurrent = 800\n", ""));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(3);
   lab.send(Ask::kEmergencyStop, {});
   sim::VirtualMcu& mcu = lab.bus(0).mcu(0);
   ASSERT_TRUE(lab.run_until([&] { return (mcu.core().faults & BUSHD_FAULT_EMERGENCY) != 0; }));
   mcu.set_current(801);
-  const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "fault");
-  EXPECT_THAT(result.reason, HasSubstr("supply current"));
+  EXPECT_THAT(lab.wait(move), Ends("fault", "supply current"));
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
 }
 
@@ -292,8 +262,7 @@ INSTANTIATE_TEST_SUITE_P(Settings, AfterReset, testing::Values("ready", "at_once
 
 TEST_P(AfterReset, DriversAreAsConfiguredAfterTheWatchdog) {
   const std::string setting = GetParam();
-  Lab lab(lab_with("fine", "enable_after_reset = \"" + setting + "\"\n", ""));
-  lab.connect();
+  ReadyLab lab(lab_with("fine", "enable_after_reset = \"" + setting + "\"\n", ""));
   EXPECT_EQ(lab.mcu_health("hall:1").reset_cause, "power-on");
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1);
@@ -312,7 +281,7 @@ TEST_P(AfterReset, DriversAreAsConfiguredAfterTheWatchdog) {
   EXPECT_EQ(lab.state_of("hall:1").state,
             setting == "no" ? api::McuState::kBusy : api::McuState::kReady);
   if (setting != "no") return;
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kEnable, {}).result, "done");
   lab.run_for(0.1);
   EXPECT_TRUE(lab.motor("m01").enabled);
 }
@@ -320,9 +289,7 @@ TEST_P(AfterReset, DriversAreAsConfiguredAfterTheWatchdog) {
 TEST(SelfTest, WhatHasFailedIsNamedAndKeepsMotorsOff) {
   Lab lab(hall(1, 1));
   lab.bus(0).mcu(0).fail_self_tests(BUSHD_TEST_RAM | BUSHD_TEST_FLASH);
-  ASSERT_TRUE(lab.run_until([&] {
-    return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
-  }));
+  ASSERT_TRUE(lab.mcu_comes_to("hall:1", api::McuState::kFault));
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("self-test failed (RAM, the program's"));
   EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).result, "refused");
   EXPECT_FALSE(lab.motor("m01").enabled);
@@ -331,12 +298,10 @@ TEST(SelfTest, WhatHasFailedIsNamedAndKeepsMotorsOff) {
 TEST(SelfTest, AnMcuThatLostWhatItKeepsMovesOnceThatIsKnown) {
   Lab lab(hall(1, 1));
   lab.bus(0).mcu(0).fail_self_tests(BUSHD_TEST_EEPROM);
-  ASSERT_TRUE(lab.run_until([&] {
-    return lab.has_state("hall:1") && lab.state_of("hall:1").state == api::McuState::kFault;
-  }));
+  ASSERT_TRUE(lab.mcu_comes_to("hall:1", api::McuState::kFault));
   EXPECT_THAT(lab.state_of("hall:1").detail, HasSubstr("if its unique id is 0"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {20})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {20}).result, "reached");
 }
 
 }  // namespace

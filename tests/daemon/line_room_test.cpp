@@ -35,18 +35,16 @@ std::vector<std::int64_t> each(std::size_t count, std::int64_t steps) {
 }
 
 TEST(LineRoom, TableRunsOfAllMotorsTakeNone) {
-  Lab lab(crowd("fine_table", ""));
-  lab.connect();
+  ReadyLab lab(crowd("fine_table", ""));
   const auto all = motors(1, 256);
-  const Answer result = lab.wait(lab.send(Ask::kMoveBy, all, each(all.size(), 400)));
+  const Answer result = lab.ask(Ask::kMoveBy, all, each(all.size(), 400));
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_THAT(result.motor_results, Each("reached"));
 }
 
 // Each tick of a motor: two bytes in 2.56 ms, and its share of the frame.
 TEST(LineRoom, WhatDoesNotFitIsRefusedWithWhatTakesHowMuch) {
-  Lab lab(crowd("fine_ticks", "refuse"));
-  lab.connect();
+  ReadyLab lab(crowd("fine_ticks", "refuse"));
   const auto few = motors(1, 16);
   const auto first = lab.send(Ask::kMoveBy, few, each(16, 20'000));
   lab.run_for(0.3);
@@ -57,17 +55,16 @@ TEST(LineRoom, WhatDoesNotFitIsRefusedWithWhatTakesHowMuch) {
   EXPECT_THAT(refused.reason, HasSubstr("bus hall has no room for it: polls take "));
   EXPECT_THAT(refused.reason, HasSubstr("Wait until others have ended, or set streams = "));
   EXPECT_EQ(lab.shaft_steps("m17"), 0);
-  const Answer never = lab.wait(lab.send(Ask::kMoveBy, motors(33, 128), each(96, 400)));
+  const Answer never = lab.ask(Ask::kMoveBy, motors(33, 128), each(96, 400));
   EXPECT_EQ(never.phase, Answer::kRefused);
   EXPECT_THAT(never.reason, HasSubstr("Move fewer motors at once"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done") << "a stop is not asked for room";
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, motors(17, 32), each(16, 400))).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kStop, {}).result, "done") << "a stop is not asked for room";
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, motors(17, 32), each(16, 400)).result, "reached");
   EXPECT_EQ(lab.mcu_health("hall:1").ramp_downs, 0u);
 }
 
 TEST(LineRoom, WhatDoesNotFitWaitsWhereItMay) {
-  Lab lab(crowd("fine_ticks", "queue"));
-  lab.connect();
+  ReadyLab lab(crowd("fine_ticks", "queue"));
   const auto first = lab.send(Ask::kMoveBy, motors(1, 16), each(16, 2'000));
   lab.run_for(0.3);
   const auto second = lab.send(Ask::kMoveBy, motors(17, 32), each(16, 400));
@@ -75,54 +72,50 @@ TEST(LineRoom, WhatDoesNotFitWaitsWhereItMay) {
   lab.run_for(0.3);
   EXPECT_EQ(lab.shaft_steps("m17"), 0);
   EXPECT_FALSE(lab.has_result(first));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, motors(33, 48))).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, motors(33, 48)).result, "done");
   EXPECT_EQ(lab.wait(third).result, "stopped") << "it waits no more";
   EXPECT_EQ(lab.wait(second).result, "reached");
   EXPECT_TRUE(lab.has_result(first)) << "there was room when the first had ended";
   EXPECT_EQ(lab.shaft_steps("m17"), 400);
   EXPECT_EQ(lab.shaft_steps("m33"), 0);
-  const Answer never = lab.wait(lab.send(Ask::kMoveBy, motors(33, 128), each(96, 400)));
+  const Answer never = lab.ask(Ask::kMoveBy, motors(33, 128), each(96, 400));
   EXPECT_EQ(never.phase, Answer::kRefused) << "it never fits";
 }
 
 TEST(LineRoom, ALineIsStreamedWhereSomeOfItMove) {
-  Lab lab(crowd("fine", "queue"));
-  lab.connect();
+  ReadyLab lab(crowd("fine", "queue"));
   const auto line = lab.send(api::MoveLine{.motors = motor_steps(motors(1, 16), each(16, 20'000))});
   lab.run_for(0.5);
-  const Answer refused = lab.wait(lab.send(api::MoveLine{
-      .motors = motor_steps(motors(1, 60), each(60, 20'000)), .speed = api::Speed{.per_s = 500}}));
+  const Answer refused = lab.ask(api::MoveLine{
+      .motors = motor_steps(motors(1, 60), each(60, 20'000)), .speed = api::Speed{.per_s = 500}});
   EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_FALSE(lab.has_result(line));
   const auto other =
       lab.send(api::MoveLine{.motors = motor_steps(motors(129, 144), each(16, 400))});
   EXPECT_EQ(lab.wait(other).result, "reached") << "made by an MCU that makes no other line";
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {}).result, "done");
 }
 
 // A motor that its MCU moves is streamed from its new target on.
 TEST(LineRoom, NewTargetsAreStreamed) {
-  Lab lab(crowd("fine_table", "refuse"));
-  lab.connect();
+  ReadyLab lab(crowd("fine_table", "refuse"));
   const auto all = motors(1, 256);
   const auto move = lab.send(Ask::kMoveBy, all, each(all.size(), 30'000));
   lab.run_for(0.5);
-  const Answer refused = lab.wait(lab.send(Ask::kMoveBy, all, each(all.size(), 100)));
+  const Answer refused = lab.ask(Ask::kMoveBy, all, each(all.size(), 100));
   EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_FALSE(lab.has_result(move)) << "it goes on";
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {100}).result, "reached");
   EXPECT_EQ(lab.wait(move).motor_results.front(), "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), 30'100);
 }
 
 // Paths and trajectories are told tick by tick, of which the line carries those of some 24 motors.
 TEST(LineRoom, PathsAndTrajectoriesAreAskedWhenTheyBegin) {
-  Lab lab(crowd("fine_table", "refuse"));
-  lab.connect();
+  ReadyLab lab(crowd("fine_table", "refuse"));
   const auto many = motors(1, 40);
   const std::vector<double> there(many.size(), 100);
-  const Answer path =
-      lab.wait(lab.send(api::MovePath{.motors = many, .rows = 1, .positions = there}));
+  const Answer path = lab.ask(api::MovePath{.motors = many, .rows = 1, .positions = there});
   EXPECT_EQ(path.phase, Answer::kRefused);
   EXPECT_THAT(path.reason, HasSubstr("bus hall has no room for it: polls take "));
   std::vector<double> rows(many.size(), 0);
@@ -133,9 +126,9 @@ TEST(LineRoom, PathsAndTrajectoriesAreAskedWhenTheyBegin) {
                          .motors = many,
                          .time_s = {0, 2, 3},
                          .positions = rows};
-  EXPECT_EQ(lab.wait(lab.send(trajectory)).result, "done") << "rows alone move nothing";
+  EXPECT_EQ(lab.ask(trajectory).result, "done") << "rows alone move nothing";
   const Answer run =
-      lab.wait(lab.send(api::Follow{.part = api::Follow::Part::kRun, .array = 1, .motors = many}));
+      lab.ask(api::Follow{.part = api::Follow::Part::kRun, .array = 1, .motors = many});
   EXPECT_EQ(run.phase, Answer::kRefused);
   EXPECT_THAT(run.reason, HasSubstr("has no room for it"));
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
@@ -146,8 +139,7 @@ TEST(LineRoom, PathsAndTrajectoriesAreAskedWhenTheyBegin) {
 
 // It would begin when its key may have been let go long ago.
 TEST(LineRoom, AJogThatDoesNotFitIsRefusedAlsoWhereOthersWait) {
-  Lab lab(crowd("fine_table", "queue"));
-  lab.connect();
+  ReadyLab lab(crowd("fine_table", "queue"));
   const auto path = lab.send(api::MovePath{
       .motors = motors(1, 20), .rows = 1, .positions = std::vector<double>(20, 20'000)});
   lab.run_for(0.5);
@@ -163,29 +155,28 @@ TEST(LineRoom, AJogThatDoesNotFitIsRefusedAlsoWhereOthersWait) {
   EXPECT_THAT(last.reason, HasSubstr("has no room for it"));
   EXPECT_THAT(last.reason, testing::Not(HasSubstr("queue")));
   EXPECT_FALSE(lab.has_result(path));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {}).result, "done");
   EXPECT_EQ(lab.shaft_steps(motor), 0);
   EXPECT_EQ(lab.mcu_health("hall:1").ramp_downs, 0u);
 }
 
 // Where one bus has no room, nothing moves on the other.
 TEST(LineRoom, AMoveOfTwoBusesNeedsRoomOnBoth) {
-  Lab lab(crowd("fine_ticks", "refuse") +
-          "[[bus]]\nname = \"annex\"\nport = \"/dev/null1\"\nbaud = 500000\ntick_us = 2560\n"
-          "format = \"fine\"\n[[mcu]]\nbus = \"annex\"\naddress = 1\n[[motor]]\nname = \"a\"\n"
-          "mcu = \"annex:1\"\noutput = 0\ngroup = \"axes\"\n");
-  lab.connect();
+  ReadyLab lab(crowd("fine_ticks", "refuse") +
+               "[[bus]]\nname = \"annex\"\nport = \"/dev/null1\"\nbaud = 500000\ntick_us = 2560\n"
+               "format = \"fine\"\n[[mcu]]\nbus = \"annex\"\naddress = 1\n[[motor]]\nname = \"a\"\n"
+               "mcu = \"annex:1\"\noutput = 0\ngroup = \"axes\"\n");
   const auto first = lab.send(Ask::kMoveBy, motors(1, 16), each(16, 2'000));
   lab.run_for(0.3);
   std::vector<std::string> both = motors(17, 32);
   both.emplace_back("a");
-  const Answer refused = lab.wait(lab.send(Ask::kMoveBy, both, each(17, 400)));
+  const Answer refused = lab.ask(Ask::kMoveBy, both, each(17, 400));
   EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_THAT(refused.reason, HasSubstr("bus hall has no room for it"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"a"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"a"}, {100}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("a"), 100) << "of the second move alone";
   EXPECT_EQ(lab.wait(first).result, "reached");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, both, each(17, 400))).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, both, each(17, 400)).result, "reached");
 }
 
 }  // namespace

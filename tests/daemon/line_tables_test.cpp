@@ -61,15 +61,14 @@ INSTANTIATE_TEST_SUITE_P(Manners, UploadedLine, testing::Values("fine", "coarse"
                          [](const auto& manner) { return std::string(manner.param); });
 
 TEST_P(UploadedLine, IsMadeByBothMcusExactToASlot) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const SentTypes sent(lab);
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, kOwnTable))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to(kMotors, kOwnTable)).result, "reached");
   EXPECT_EQ(sent[BUSHD_MSG_TABLE_END], 2);
   // The way back has the same table; another way has not.
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {0, 0, 0, 0}))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to(kMotors, {0, 0, 0, 0})).result, "reached");
   EXPECT_EQ(sent[BUSHD_MSG_TABLE_END], 2);
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {-400, 333, 1, -200}))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to(kMotors, {-400, 333, 1, -200})).result, "reached");
   EXPECT_EQ(sent[BUSHD_MSG_TABLE_END], 4);
   EXPECT_EQ(sent[BUSHD_MSG_LINE_RUN], 6);
   EXPECT_EQ(sent[BUSHD_MSG_TICKS] + sent[BUSHD_MSG_TABLE_TICKS], 0);
@@ -91,11 +90,10 @@ TEST_P(UploadedLine, IsMadeByBothMcusExactToASlot) {
 }
 
 TEST_P(UploadedLine, GoesOnAfterAPauseAndRampsDownAlongItself) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto move = lab.send(line_to(kMotors, kOwnTable));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  lab.wait(lab.send(api::Pause{{"m03"}}));
+  lab.ask(api::Pause{{"m03"}});
   lab.run_for(0.2);
   lab.send(api::Resume{});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1700; });
@@ -111,8 +109,7 @@ TEST_P(UploadedLine, GoesOnAfterAPauseAndRampsDownAlongItself) {
 }
 
 TEST_P(UploadedLine, BeginsByATrigger) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const SentTypes sent(lab);
   const auto move = lab.send(api::ArmLine{.edge = api::Edge::kRising,
                                           .delay_us = 7'777,
@@ -141,8 +138,7 @@ TEST_P(UploadedLine, BeginsByATrigger) {
 
 // The daemon plans the stop, and both must count alike.
 TEST_P(UploadedLine, IsCountedAlikeWhereverItIsStopped) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   for (int i = 0; i < 12; ++i) {
     SCOPED_TRACE(i);
     const auto move = lab.send(api::ArmLine{
@@ -170,8 +166,7 @@ TEST_P(UploadedLine, IsCountedAlikeWhereverItIsStopped) {
 TEST_P(UploadedLine, IsCountedAlikeIfAnMcuBeginsLate) {
   for (int i = 2; i < 24; ++i) {
     SCOPED_TRACE(i);
-    Lab lab(hall(2, 2, GetParam()));
-    lab.connect();
+    ReadyLab lab(hall(2, 2, GetParam()));
     const auto move =
         lab.send(api::ArmLine{.edge = api::Edge::kRising,
                               .delay_us = 100,
@@ -228,7 +223,7 @@ class WaitingLine : public testing::Test {
     }));
   }
   void expect_reached() {
-    EXPECT_EQ(lab.wait(lab.send(line_to(kFour, kOwnTable))).result, "reached");
+    EXPECT_EQ(lab.ask(line_to(kFour, kOwnTable)).result, "reached");
     expect_rest_at(kOwnTable);
   }
 
@@ -244,9 +239,8 @@ TEST_F(WaitingLine, IsStoppedBeforeItBegins) {
     SCOPED_TRACE(request.index());
     const auto line = begin();
     lab.send(request);
-    const Answer answer = lab.wait(line, 0.1);
-    EXPECT_EQ(answer.result, "stopped");
-    EXPECT_THAT(answer.reason, HasSubstr("before this was carried out; nothing has moved"));
+    EXPECT_THAT(lab.wait(line, 0.1),
+                Ends("stopped", "before this was carried out; nothing has moved"));
     lab.run_for(0.02);
     const int parts = sent[BUSHD_MSG_TABLE_DATA];
     expect_rest_at({0, 0, 0, 0});
@@ -254,9 +248,9 @@ TEST_F(WaitingLine, IsStoppedBeforeItBegins) {
     EXPECT_EQ(sent[BUSHD_MSG_LINE_RUN], 0);
     EXPECT_EQ(results(line), 1);
     if (request.index() != api::Request(api::Pause{}).index()) continue;
-    lab.wait(lab.send(api::Resume{}));
+    lab.ask(api::Resume{});
   }
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   expect_reached();
 }
 
@@ -312,7 +306,7 @@ TEST_F(WaitingLine, EndsWithItsMcuOrLink) {
   EXPECT_NE(lab.wait(after_a_reset).result, "reached");
   lab.run_until([&] { return lab.all_ready(); }, 20);
   expect_rest_at({0, 0, 0, 0});
-  lab.wait(lab.send(Ask::kSetPosition, {"m04", "m05", "m06"}, {0, 0, 0}));
+  lab.ask(Ask::kSetPosition, {"m04", "m05", "m06"}, {0, 0, 0});
   const auto unplugged = begin();
   lab.unplug(0);
   EXPECT_EQ(lab.wait(unplugged, 0.1).result, "refused");
@@ -332,7 +326,7 @@ TEST_F(WaitingLine, OutlivesLostParts) {
     const auto line = lab.send(line_to(kFour, {3000, second, 17, 2998}));
     EXPECT_EQ(lab.wait(line).result, "reached") << lab.last_reply(line).reason;
     EXPECT_EQ(sent[BUSHD_MSG_LINE_RUN], runs + 2);
-    EXPECT_EQ(lab.wait(lab.send(line_to(kFour, {0, 0, 0, 0}))).result, "reached");
+    EXPECT_EQ(lab.ask(line_to(kFour, {0, 0, 0, 0})).result, "reached");
   }
   EXPECT_EQ(sent[BUSHD_MSG_TICKS], 0);
 }
@@ -379,7 +373,7 @@ TEST_F(WaitingLine, IsForgottenWithTheDaemon) {
   lab.restart_daemon();
   lab.run_until([&] { return lab.all_ready(); }, 20);
   expect_rest_at({0, 0, 0, 0});
-  lab.wait(lab.send(api::Confirm{.motors = {}}));
+  lab.ask(api::Confirm{.motors = {}});
   expect_reached();
 }
 
@@ -393,8 +387,7 @@ TEST_F(WaitingLine, IsRefusedIfItsMotorsGetAnotherTable) {
 }
 
 TEST(WaitingLines, DoNotBeginTowardsALimitThatHasClosed) {
-  Lab lab(with_keys(hall(2, 2), "m03", "limit = \"positive\"\n"));
-  lab.connect();
+  ReadyLab lab(with_keys(hall(2, 2), "m03", "limit = \"positive\"\n"));
   const SentTypes sent(lab);
   const auto line = lab.send(line_to(kMotors, kOwnTable));
   ASSERT_TRUE(lab.run_until([&] { return sent[BUSHD_MSG_TABLE_DATA] > 1; }, 1));
@@ -411,10 +404,9 @@ TEST(WaitingLines, DoNotWaitLong) {
   for (int code = 4999; code > 1000; code -= 2) codes += std::to_string(code) + ", ";
   const std::string table =
       "name = \"glacier\"\ntime_unit_ns = 1000\naccel = [" + codes + "1000]\n";
-  Lab lab(hall(2, 2, "fine", "glacier"), table);
-  lab.connect();
+  ReadyLab lab(hall(2, 2, "fine", "glacier"), table);
   const SentTypes sent(lab);
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, kOwnTable))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to(kMotors, kOwnTable)).result, "reached");
   EXPECT_EQ(sent[BUSHD_MSG_TABLE_BEGIN], 0);
   // For a trigger there is nothing else.
   const auto armed = lab.send(api::ArmLine{.delay_us = 100,

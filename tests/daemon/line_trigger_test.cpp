@@ -71,8 +71,7 @@ INSTANTIATE_TEST_SUITE_P(Manners, TriggeredLine,
                          [](const auto& manner) { return std::string(manner.param); });
 
 TEST_P(TriggeredLine, IsMadeByBothMcusFromTheEdgeOn) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto move = arm(lab, armed_to(kShort, 12'345));
   for (const std::string& motor : kMotors) EXPECT_FALSE(lab.motor(motor).moving);
   EXPECT_EQ(lab.motor("m03").target_steps, 34);
@@ -106,8 +105,7 @@ TEST_P(TriggeredLine, IsMadeByBothMcusFromTheEdgeOn) {
 
 // Edges that are apart, so that the runs are in other steps: all stop on one point of the line.
 TEST_P(TriggeredLine, StopsOnOnePointHoweverFarTheEdgesWereApart) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   std::vector<std::int64_t> at{0, 0, 0, 0};
   for (int i = 0; i < 4; ++i) {
     SCOPED_TRACE(i);
@@ -135,12 +133,11 @@ TEST_P(TriggeredLine, StopsOnOnePointHoweverFarTheEdgesWereApart) {
 }
 
 TEST_P(TriggeredLine, IsPausedAndResumedAndGivenANearerEnd) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto move = arm(lab, armed_to(kInMcus));
   fire_both(lab, 200e-6);
   lab.run_for(0.5);
-  EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m03"}})).reason, "paused: 4 motors");
+  EXPECT_EQ(lab.ask(api::Pause{{"m03"}}).reason, "paused: 4 motors");
   lab.run_for(0.3);
   lab.send(api::Resume{});
   lab.run_for(0.4);
@@ -153,36 +150,31 @@ TEST_P(TriggeredLine, IsPausedAndResumedAndGivenANearerEnd) {
 }
 
 TEST_P(TriggeredLine, WaitsUntilItIsDisarmed) {
-  Lab lab(hall(2, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()));
   auto move = arm(lab, armed_to(kInMcus));
-  EXPECT_EQ(lab.wait(lab.send(api::Disarm{{"m03"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Disarm{{"m03"}}).result, "done");
   Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "stopped");
-  EXPECT_THAT(result.reason, HasSubstr("disarmed, because m03, armed with it"));
+  EXPECT_THAT(result, Ends("stopped", "disarmed, because m03, armed with it"));
   fire_both(lab);
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, kInMcus))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to(kMotors, kInMcus)).result, "reached");
   move = arm(lab, armed_to({0, 0, 0, 0}));
   lab.send(Ask::kStop, {"m01"});
   EXPECT_EQ(lab.wait(move).result, "stopped");
   move = arm(lab, armed_to({0, 0, 0, 0}));
-  EXPECT_EQ(lab.wait(lab.send(api::EmergencyStop{})).result, "done");
+  EXPECT_EQ(lab.ask(api::EmergencyStop{}).result, "done");
   EXPECT_NE(lab.wait(move).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m04"), 3000);
 }
 
 // One of them has not had it: the others do not go on alone.
 TEST_P(TriggeredLine, EndsIfTheTriggerComesToOneMcuOnly) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto move = arm(lab, armed_to(kInMcus));
   fire(lab, 0);
   const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "stopped");
-  EXPECT_THAT(result.reason,
-              HasSubstr("the trigger has come to MCU hall:1, and not to MCU hall:2"));
+  EXPECT_THAT(result, Ends("stopped", "the trigger has come to MCU hall:1, and not to MCU hall:2"));
   EXPECT_LT(lab.shaft_steps("m01"), 1000);
   EXPECT_EQ(lab.shaft_steps("m02"), -lab.shaft_steps("m01"));
   EXPECT_EQ(lab.shaft_steps("m04"), 0);
@@ -190,30 +182,27 @@ TEST_P(TriggeredLine, EndsIfTheTriggerComesToOneMcuOnly) {
   fire(lab, 1);
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m04"), 0);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, kMotors, {0, 0, 0, 0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, kMotors, {0, 0, 0, 0}).result, "reached");
   expect_explained(lab);
 }
 
 TEST_P(TriggeredLine, EndsIfTheTriggersAreTooFarApart) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto move = arm(lab, armed_to(kInMcus, 50'000));
   fire_both(lab, 0.004);
   const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "stopped");
-  EXPECT_THAT(result.reason, HasSubstr("the trigger came to MCU hall:2 "));
+  EXPECT_THAT(result, Ends("stopped", "the trigger came to MCU hall:2 "));
   EXPECT_THAT(result.reason, HasSubstr(" us later than to MCU hall:1"));
   EXPECT_LT(lab.shaft_steps("m01"), 1000);
   expect_explained(lab);
 }
 
 TEST_P(TriggeredLine, EndsForAllIfAnMcuGivesUp) {
-  Lab lab(hall(2, 2, GetParam()));
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()));
   auto move = arm(lab, armed_to(kInMcus));
   lab.bus(0).reboot(1, 50'000'000);
   EXPECT_NE(lab.wait(move).result, "reached");
-  lab.run_until([&] { return lab.state_of("hall:2").state == api::McuState::kReady; }, 20);
+  lab.mcu_comes_to("hall:2", api::McuState::kReady, 20);
   EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
   fire_both(lab);
   lab.run_for(0.3);
@@ -225,8 +214,7 @@ TEST_P(TriggeredLine, EndsForAllIfAnMcuGivesUp) {
 TEST_P(TriggeredLine, MayBeOverWhenItsBeginningIsTold) {
   for (const std::size_t deaf : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
     SCOPED_TRACE(deaf);
-    Lab lab(hall(2, 2, GetParam()));
-    lab.connect();
+    ReadyLab lab(hall(2, 2, GetParam()));
     const auto move = arm(lab, armed_to({3, -3, 3, 3}));
     lab.on_send = [](std::size_t, std::vector<std::uint8_t>&) { return false; };
     if (deaf == 2) {
@@ -241,16 +229,14 @@ TEST_P(TriggeredLine, MayBeOverWhenItsBeginningIsTold) {
       EXPECT_EQ(result.result, "reached") << result.reason;
       EXPECT_EQ(lab.shaft_steps("m04"), 3);
     } else {
-      EXPECT_EQ(result.result, "stopped");
-      EXPECT_THAT(result.reason, HasSubstr("the trigger has come to MCU"));
+      EXPECT_THAT(result, Ends("stopped", "the trigger has come to MCU"));
       EXPECT_EQ(lab.motor(deaf == 1 ? "m04" : "m01").activity, api::Activity::kResting);
     }
   }
 }
 
 TEST_P(TriggeredLine, IsMadeOfLegsWithBacklash) {
-  Lab lab(with_keys(hall(2, 2, GetParam()), "m02", "backlash = 20\n"));
-  lab.connect();
+  ReadyLab lab(with_keys(hall(2, 2, GetParam()), "m02", "backlash = 20\n"));
   const auto move = arm(lab, armed_to(kInMcus));
   fire_both(lab);
   EXPECT_EQ(lab.wait(move).result, "reached");
@@ -275,8 +261,7 @@ class ArmedLine : public testing::Test {
 };
 
 TEST_F(ArmedLine, IsRefusedWhereItCannotWait) {
-  Lab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_SCRATCH);
-  lab.connect();
+  ReadyLab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_SCRATCH);
   EXPECT_THAT(refusal(lab, kMotors, kInMcus, 49), HasSubstr("allowed: 50 to 1650000"));
   EXPECT_THAT(refusal(lab, kMotors, kSteps), HasSubstr("m04: a move of no steps"));
   EXPECT_THAT(refusal(lab, kMotors, {3000, -1201, 17, 3}),
@@ -298,8 +283,7 @@ TEST_F(ArmedLine, IsRefusedWhereItCannotWait) {
 }
 
 TEST_F(ArmedLine, EndsWithItsClientIfThatIsAskedFor) {
-  Lab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_SCRATCH);
-  lab.connect();
+  ReadyLab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_SCRATCH);
   const auto waits =
       lab.send_as("panel", api::ArmLine{.delay_us = 100,
                                         .motors = motor_steps({"m01", "m03"}, {9, 9}),
@@ -307,14 +291,12 @@ TEST_F(ArmedLine, EndsWithItsClientIfThatIsAskedFor) {
   lab.run_for(0.2);
   EXPECT_THAT(lab.motor("m03").armed_by, HasSubstr("of panel"));
   lab.leave("panel");
-  EXPECT_EQ(lab.wait(waits).result, "stopped");
-  EXPECT_THAT(lab.last_reply(waits).reason, HasSubstr("because its client has gone"));
+  EXPECT_THAT(lab.wait(waits), Ends("stopped", "because its client has gone"));
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 TEST_F(ArmedLine, IsRefusedForAnMcuWithoutLines) {
-  Lab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_LINE_RUN);
-  lab.connect();
+  ReadyLab lab(hall(2, 2, "fine"), {}, nullptr, BUSHD_CAN_LINE_RUN);
   EXPECT_THAT(refusal(lab, kMotors, kInMcus),
               HasSubstr("MCU hall:1 makes no lines that a trigger begins"));
 }

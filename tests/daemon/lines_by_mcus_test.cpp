@@ -28,18 +28,17 @@ TEST(LinesByMcus, OneFrameTellsAnMcuAllOfIt) {
                          {"fine", 1999, BUSHD_CAN_SCRATCH, 1000},
                          {"fine_ticks", 2000, 0, 1000}}) {
     SCOPED_TRACE(std::string(manner) + " " + std::to_string(steps));
-    Lab lab(hall(2, 2, manner), {}, nullptr, disabled_capabilities);
-    lab.connect();
+    ReadyLab lab(hall(2, 2, manner), {}, nullptr, disabled_capabilities);
     auto line = line_to({"m01", "m02", "m03"}, {2000, -2000, steps});
     line.dry_run = true;
-    const auto plan = lab.wait(lab.send(line)).plan;
+    const auto plan = lab.ask(line).plan;
     line.dry_run = false;
     MotionFrames sent;
     lab.on_send = [&](std::size_t, std::vector<std::uint8_t>& bytes) {
       sent.add(bytes);
       return true;
     };
-    EXPECT_EQ(lab.wait(lab.send(line)).result, "reached");
+    EXPECT_EQ(lab.ask(line).result, "reached");
     lab.run_for(0.3);
     if (most == 2) {
       EXPECT_EQ(sent.frames, 2);
@@ -58,8 +57,7 @@ TEST(LinesByMcus, ALostLinkLeavesAllOnTheLine) {
   for (const char* manner : {"fine", "coarse"}) {
     for (const double after_s : {0.3, 1.0, 1.61}) {
       SCOPED_TRACE(std::string(manner) + " " + std::to_string(after_s));
-      Lab lab(hall(2, 2, manner));
-      lab.connect();
+      ReadyLab lab(hall(2, 2, manner));
       const auto move = lab.send(line_to(kMotors, steps));
       lab.run_for(after_s);
       const std::int64_t before = lab.shaft_steps("m01");
@@ -82,8 +80,8 @@ TEST(LinesByMcus, ALostLinkLeavesAllOnTheLine) {
       for (const std::string& motor : kMotors) {
         EXPECT_EQ(lab.motor(motor).position_steps, lab.shaft_steps(motor));
       }
-      lab.wait(lab.send(Ask::kClearFaults, {}));
-      EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {0, 0, 0, 0}))).result, "reached");
+      lab.ask(Ask::kClearFaults, {});
+      EXPECT_EQ(lab.ask(line_to(kMotors, {0, 0, 0, 0})).result, "reached");
     }
   }
 }
@@ -91,8 +89,7 @@ TEST(LinesByMcus, ALostLinkLeavesAllOnTheLine) {
 TEST(LinesByMcus, TakeANearerEndAndAnotherSpeed) {
   for (const char* manner : {"fine", "coarse"}) {
     SCOPED_TRACE(manner);
-    Lab lab(hall(2, 2, manner));
-    lab.connect();
+    ReadyLab lab(hall(2, 2, manner));
     const std::vector<std::int64_t> steps{6000, -6000, 401, 6000};
     const auto move = lab.send(line_to(kMotors, steps));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 1000; });
@@ -130,8 +127,7 @@ TEST(LinesByMcus, AreStreamedIfTooFastForThem) {
                          {BUSHD_CAN_TABLE_TICKS, 2500, 3, false},
                          {BUSHD_CAN_TABLE_TICKS, 2520, 3, true}}) {
     SCOPED_TRACE(std::to_string(disabled_capabilities) + " " + std::to_string(speed));
-    Lab lab(hall(2, 2, "fine", "glacier"), table, nullptr, disabled_capabilities);
-    lab.connect();
+    ReadyLab lab(hall(2, 2, "fine", "glacier"), table, nullptr, disabled_capabilities);
     const std::vector<std::int64_t> steps{3000, -3000, 3000, 3000};
     auto line = line_to({kMotors.begin(), kMotors.begin() + static_cast<std::ptrdiff_t>(motors)},
                         {steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(motors)});
@@ -141,7 +137,7 @@ TEST(LinesByMcus, AreStreamedIfTooFastForThem) {
       sent.add(bytes);
       return true;
     };
-    EXPECT_EQ(lab.wait(lab.send(line)).result, "reached");
+    EXPECT_EQ(lab.ask(line).result, "reached");
     lab.run_for(0.3);
     if (streamed) {
       EXPECT_GT(sent.frames, 8);

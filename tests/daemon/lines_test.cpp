@@ -28,12 +28,11 @@ TEST(Lines, AllMotorsAreOnTheLineAtAnyTime) {
 
 TEST(Lines, EqualMotorsTakeTheTimeOfOne) {
   StreamedLab lab(hall(1, 3));
-  lab.connect();
   auto alone = api::Move{.motors = motor_steps({"m01"}, {2000}), .dry_run = true};
   auto line = line_to({"m01", "m02", "m03"}, {2000, 0, -2000});
   line.dry_run = true;
-  const auto of_one = lab.wait(lab.send(alone)).plan;
-  const auto of_line = lab.wait(lab.send(line)).plan;
+  const auto of_one = lab.ask(alone).plan;
+  const auto of_line = lab.ask(line).plan;
   ASSERT_TRUE(of_one && of_line);
   EXPECT_EQ(of_line->duration_us, of_one->duration_us);
   EXPECT_EQ(of_line->motors[0].duration_us, of_one->motors[0].duration_us);
@@ -45,7 +44,6 @@ TEST(Lines, EqualMotorsTakeTheTimeOfOne) {
 
 TEST(Lines, StateTellsTheShareAndTheTimeLeft) {
   StreamedLab lab(hall(2, 1));
-  lab.connect();
   const auto move = lab.send(line_to({"m01", "m02"}, {1000, 4000}));
   lab.run_until([&] { return lab.shaft_steps("m02") >= 2000; });
   lab.run_for(0.2);
@@ -67,20 +65,18 @@ void expect_on_line_after_a_stop(const std::vector<std::int64_t>& steps) {
     for (const double after_s : {0.105, 0.12, 0.15, 0.3, 0.6, 0.9, 1.0}) {
       SCOPED_TRACE(std::string(manner) + " " + std::to_string(after_s));
       StreamedLab lab(hall(2, 2, manner));
-      lab.connect();
       const auto move = lab.send(line_to(kMotors, steps));
       lab.run_for(after_s);
-      EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m03"})).result, "done");
+      EXPECT_EQ(lab.ask(Ask::kStop, {"m03"}).result, "done");
       const Answer result = lab.wait(move);
-      EXPECT_EQ(result.result, "stopped");
-      EXPECT_THAT(result.reason, HasSubstr("stopped on request, asked for by command"));
+      EXPECT_THAT(result, Ends("stopped", "stopped on request, asked for by command"));
       EXPECT_THAT(result.reason, Not(HasSubstr("off it")));
       EXPECT_LE(off_line(lab, kMotors, steps), kOffAtRest);
       lab.run_for(0.5);
       EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0u);
       EXPECT_EQ(lab.mcu_health("hall:2").rejected_frames, 0u);
       // The motors' counters and remainders are whole: they move on from there.
-      EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {0, 0, 0, 0}))).result, "reached");
+      EXPECT_EQ(lab.ask(line_to(kMotors, {0, 0, 0, 0})).result, "reached");
       for (const std::string& motor : kMotors) EXPECT_EQ(lab.shaft_steps(motor), 0);
     }
   }
@@ -95,17 +91,16 @@ void expect_pause(const std::vector<std::int64_t>& steps) {
   for (const char* manner : {"fine", "coarse"}) {
     SCOPED_TRACE(manner);
     StreamedLab lab(hall(2, 2, manner));
-    lab.connect();
     const auto move = lab.send(line_to(kMotors, steps));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 700; });
-    EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m02"}})).reason, "paused: 4 motors");
+    EXPECT_EQ(lab.ask(api::Pause{{"m02"}}).reason, "paused: 4 motors");
     EXPECT_LE(off_line(lab, kMotors, steps), kOffAtRest);
     EXPECT_TRUE(lab.motor("m01").paused);
     EXPECT_FALSE(lab.has_result(move));
     const std::int64_t stands = lab.shaft_steps("m01");
     lab.run_for(2);
     EXPECT_EQ(lab.shaft_steps("m01"), stands);
-    EXPECT_EQ(lab.wait(lab.send(api::Resume{{"m01"}})).reason, "resumed: 4 motors");
+    EXPECT_EQ(lab.ask(api::Resume{{"m01"}}).reason, "resumed: 4 motors");
     double most = 0;
     lab.run_until([&] {
       most = std::max(most, off_line(lab, kMotors, steps));
@@ -128,7 +123,6 @@ TEST(Lines, PausesAndGoesOn) {
 
 TEST(Lines, ResumedWhileTheyRampDownTheyStandFirst) {
   StreamedLab lab(hall(2, 2));
-  lab.connect();
   const auto move = lab.send(line_to(kMotors, kSteps));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1500; });
   lab.send(api::Pause{});
@@ -140,10 +134,9 @@ TEST(Lines, ResumedWhileTheyRampDownTheyStandFirst) {
 
 TEST(Lines, ASpeedIsThatOfEachMotor) {
   StreamedLab lab(hall(1, 2));
-  lab.connect();
   auto line = line_to({"m01", "m02"}, {1000, 500});
   line.speed = api::Speed{.per_s = 100, .in_steps = true};
-  const Answer result = lab.wait(lab.send(line));
+  const Answer result = lab.ask(line);
   EXPECT_EQ(result.result, "reached");
   EXPECT_LE(result.most_steps_per_s[0], 100.0);
   EXPECT_GT(result.most_steps_per_s[0], 99.0);
@@ -152,31 +145,28 @@ TEST(Lines, ASpeedIsThatOfEachMotor) {
 
 TEST(Lines, ADurationIsAsked) {
   StreamedLab lab(hall(1, 2));
-  lab.connect();
   auto line = line_to({"m01", "m02"}, {1000, 300});
   line.duration_s = 12;
   line.dry_run = true;
-  const auto plan = lab.wait(lab.send(line)).plan;
+  const auto plan = lab.ask(line).plan;
   ASSERT_TRUE(plan);
   EXPECT_NEAR(static_cast<double>(plan->duration_us), 12e6, 0.1e6);
   EXPECT_GE(plan->motors[0].duration_us, 12'000'000);
   line.duration_s = 0.1;
-  EXPECT_THAT(lab.wait(lab.send(line)).reason, HasSubstr("the line takes at least"));
+  EXPECT_THAT(lab.ask(line).reason, HasSubstr("the line takes at least"));
   EXPECT_THAT(lab.last_reply(lab.send(line)).reason, HasSubstr("limited by m01"));
   line.duration_s = 1e7;
-  EXPECT_THAT(lab.wait(lab.send(line)).reason, HasSubstr("the line takes at most"));
+  EXPECT_THAT(lab.ask(line).reason, HasSubstr("the line takes at most"));
 }
 
 TEST(Lines, ANearerEndAndAnotherSpeed) {
   StreamedLab lab(hall(2, 2));
-  lab.connect();
   const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 800; });
   auto slower = line_to(kMotors, {4000, -2000, 1000, 0});
   slower.speed = api::Speed{.per_s = 300, .in_steps = true};
   const auto second = lab.send(slower);
-  EXPECT_EQ(lab.wait(move).result, "stopped");
-  EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("was given a new target by command"));
+  EXPECT_THAT(lab.wait(move), Ends("stopped", "was given a new target by command"));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1200; });
   EXPECT_LE(off_line(lab, kMotors, {4000, -2000, 1000, 0}), kOffFine);
   // Named in another order, as a distance from the target.
@@ -193,7 +183,6 @@ TEST(Lines, AnEndThatComesTooLateIsReachedFromBeyond) {
   for (const std::int64_t steps : {-200, -400}) {  // the latter by the MCUs
     SCOPED_TRACE(steps);
     StreamedLab lab(hall(2, 2));
-    lab.connect();
     const auto move = lab.send(line_to(kMotors, {4000, 10 * steps, 0, 4000}));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
     const auto back = lab.send(line_to(kMotors, {400, steps, 0, 400}));
@@ -207,12 +196,9 @@ TEST(Lines, AnEndThatComesTooLateIsReachedFromBeyond) {
 
 TEST(Lines, WhatIsNotOnTheLineIsRefused) {
   StreamedLab lab(hall(2, 2));
-  lab.connect();
   const auto move = lab.send(line_to(kMotors, {4000, -2000, 1000, 0}));
   lab.run_for(0.5);
-  const auto refusal = [&](const api::Request& request) {
-    return lab.wait(lab.send(request)).reason;
-  };
+  const auto refusal = [&](const api::Request& request) { return lab.ask(request).reason; };
   EXPECT_THAT(
       refusal(line_to(kMotors, {2000, -1002, 500, 0})),
       HasSubstr(
@@ -232,29 +218,24 @@ TEST(Lines, BeginAtRestAndOnOneBus) {
       "\n[[bus]]\nname = \"lab\"\nport = \"/dev/null1\"\nbaud = 500000\ntick_us = 2560\n"
       "format = \"fine\"\n[[mcu]]\nbus = \"lab\"\naddress = 1\n"
       "[[motor]]\nname = \"far\"\nmcu = \"lab:1\"\noutput = 0\ngroup = \"axes\"\n");
-  lab.connect();
-  EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "far"}, {10, 10}))).reason,
+  EXPECT_THAT(lab.ask(line_to({"m01", "far"}, {10, 10})).reason,
               HasSubstr("m01 is on bus hall and far on bus lab"));
   const auto move = lab.send(Ask::kMoveTo, {"m02"}, {500});
   lab.run_for(0.2);
-  EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "m02"}, {10, 10}))).reason,
-              HasSubstr("begin it at rest"));
+  EXPECT_THAT(lab.ask(line_to({"m01", "m02"}, {10, 10})).reason, HasSubstr("begin it at rest"));
   lab.wait(move);
-  EXPECT_EQ(lab.wait(lab.send(line_to({"m01", "m02"}, {0, 500}))).reason,
-            "m01: stands at its target already");
+  EXPECT_EQ(lab.ask(line_to({"m01", "m02"}, {0, 500})).reason, "m01: stands at its target already");
 }
 
 TEST(Lines, SoftLimitsAreThoseOfEachMotor) {
   StreamedLab lab(with_keys(hall(1, 2), "m02", "soft_limits = [-100, 100]\n"));
-  lab.connect();
-  const std::string why = lab.wait(lab.send(line_to({"m01", "m02"}, {1000, 101}))).reason;
+  const std::string why = lab.ask(line_to({"m01", "m02"}, {1000, 101})).reason;
   EXPECT_THAT(why, HasSubstr("m02: target 101 steps is beyond the soft limit at 100"));
-  EXPECT_EQ(lab.wait(lab.send(line_to({"m01", "m02"}, {1000, 100}))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to({"m01", "m02"}, {1000, 100})).result, "reached");
 }
 
 TEST(Lines, BacklashIsTakenUpWhenAllHaveArrived) {
   StreamedLab lab(with_keys(hall(1, 2), "m02", "backlash = 30\n"));
-  lab.connect();
   const auto move = lab.send(line_to({"m01", "m02"}, {-600, -300}));
   lab.run_until([&] { return lab.shaft_steps("m01") == -600; });
   EXPECT_NEAR(static_cast<double>(lab.shaft_steps("m02")), -300, 1);
@@ -270,14 +251,13 @@ TEST(Lines, BacklashIsTakenUpWhenAllHaveArrived) {
   EXPECT_EQ(lab.shaft_steps("m02"), -300);
   EXPECT_EQ(lab.shaft_steps("m01"), -600);
   // From its side it goes straight.
-  EXPECT_THAT(lab.wait(lab.send(line_to({"m01", "m02"}, {0, 0}))).legs, ElementsAre(1, 1));
+  EXPECT_THAT(lab.ask(line_to({"m01", "m02"}, {0, 0})).legs, ElementsAre(1, 1));
 }
 
 TEST(Lines, OneThatIsLostEndsTheOthersAlongTheLine) {
   for (const std::int64_t steps : {-3001, -6000}) {  // the latter by the MCUs
     SCOPED_TRACE(steps);
     StreamedLab lab(hall(2, 2));
-    lab.connect();
     const auto move = lab.send(line_to(kMotors, {6000, steps, 500, 6000}));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
     lab.bus(0).reboot(1, 100'000'000);
@@ -293,7 +273,6 @@ TEST(Lines, OneThatIsLostEndsTheOthersAlongTheLine) {
 
 void expect_end_at_a_limit(const std::vector<std::int64_t>& steps, const std::string& limited_by) {
   StreamedLab lab(with_keys(hall(2, 2), "m03", "limit = \"positive\"\n"));
-  lab.connect();
   const auto move = lab.send(line_to(kMotors, steps));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
   lab.bus(0).mcu(1).set_inputs({0b001, 0});
@@ -305,7 +284,7 @@ void expect_end_at_a_limit(const std::vector<std::int64_t>& steps, const std::st
               HasSubstr("; the line was limited by " + limited_by + ", which was left at "));
   EXPECT_THAT(result.reason, HasSubstr("; m03 stands "));
   EXPECT_LE(off_line(lab, {"m01", "m02", "m04"}, {steps[0], steps[1], steps[3]}), kOffAtRest);
-  const std::string why = lab.wait(lab.send(line_to(kMotors, steps))).reason;
+  const std::string why = lab.ask(line_to(kMotors, steps)).reason;
   EXPECT_THAT(why, HasSubstr("m03: its limit switch at the positive end is active"));
 }
 
@@ -318,9 +297,7 @@ struct NearlyArrived {
   explicit NearlyArrived(const std::string& settle)
       : lab(with_keys(
             with_keys(hall(2, 2), "m03", "limit = \"positive\"\nlimit_action = \"immediate\"\n"),
-            "m01", settle)) {
-    lab.connect();
-  }
+            "m01", settle)) {}
   // The other one meets its switch so many steps before the end.
   std::int64_t move(bool path, std::int64_t left) {
     const auto move =
@@ -394,7 +371,6 @@ TEST(Lines, WhatIsToldIsTrueOnABadLine) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(seed);
     StreamedLab lab(hall(3, 2));
-    lab.connect();
     std::mt19937 random(seed);
     lab.on_send = [&random](std::size_t, std::vector<std::uint8_t>&) { return random() % 12 != 0; };
     const std::vector<std::string> motors{"m01", "m02", "m03", "m04", "m05", "m06"};
@@ -404,8 +380,8 @@ TEST(Lines, WhatIsToldIsTrueOnABadLine) {
                      : std::vector<std::int64_t>{9000, -9000, 170, 12, -9000, 0};
     const auto move = lab.send(line_to(motors, steps));
     lab.run_for(0.3 + 0.1 * static_cast<double>(seed));
-    if (seed % 3 != 0) lab.wait(lab.send(api::Pause{{"m02"}}));
-    if (seed % 3 == 1) lab.wait(lab.send(api::Resume{}));
+    if (seed % 3 != 0) lab.ask(api::Pause{{"m02"}});
+    if (seed % 3 == 1) lab.ask(api::Resume{});
     if (seed % 3 == 1) lab.run_for(0.4);
     lab.send(Ask::kStop, {"m05"});
     const Answer result = lab.wait(move);
@@ -419,41 +395,37 @@ TEST(Lines, WhatIsToldIsTrueOnABadLine) {
       EXPECT_EQ(lab.shaft_steps(motors[i]), lab.motor(motors[i]).position_steps);
     }
     lab.on_send = nullptr;
-    EXPECT_EQ(lab.wait(lab.send(line_to(motors, {0, 0, 0, 0, 0, 0}))).result, "reached");
+    EXPECT_EQ(lab.ask(line_to(motors, {0, 0, 0, 0, 0, 0})).result, "reached");
   }
 }
 
 TEST(Lines, AnEmergencyStopEndsThem) {
   StreamedLab lab(hall(2, 2));
-  lab.connect();
   const auto move = lab.send(line_to(kMotors, kSteps));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1000; });
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kEmergencyStop, {}).result, "done");
   const Answer result = lab.wait(move);
-  EXPECT_EQ(result.result, "stopped");
-  EXPECT_THAT(result.reason, HasSubstr("stopped by an emergency stop"));
+  EXPECT_THAT(result, Ends("stopped", "stopped by an emergency stop"));
   lab.run_for(0.5);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, {0, 0, 0, 0}))).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
+  EXPECT_EQ(lab.ask(line_to(kMotors, {0, 0, 0, 0})).result, "reached");
 }
 
 TEST(Lines, AStopBeforeTheStartMovesNothing) {
   StreamedLab lab(hall(2, 2));
-  lab.connect();
   const auto move = lab.send(line_to(kMotors, kSteps));
   lab.run_for(0.005);
-  lab.wait(lab.send(Ask::kStop, {"m01"}));
+  lab.ask(Ask::kStop, {"m01"});
   EXPECT_EQ(lab.wait(move).result, "stopped");
   for (const std::string& motor : kMotors) EXPECT_EQ(lab.shaft_steps(motor), 0);
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, kSteps))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to(kMotors, kSteps)).result, "reached");
 }
 
 TEST(Lines, AreKeptLikeOtherMoves) {
   StreamedLab lab(hall(2, 2));
-  lab.connect();
   lab.keep_positions();
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(line_to(kMotors, kSteps))).result, "reached");
+  EXPECT_EQ(lab.ask(line_to(kMotors, kSteps)).result, "reached");
   const auto history = lab.send(api::GetHistory{.motor = "m02"});
   lab.wait(history);
   const auto past = lab.history(history);

@@ -32,9 +32,7 @@ namespace bushd::test {
 
 // As hall(2, 2); the first MCU has an emergency input.
 inline std::string hall_with_emergency_input() {
-  std::string toml = hall(2, 2);
-  const std::string mcu = "address = 1\n";
-  return toml.insert(toml.find(mcu) + mcu.size(), "emergency_input = \"ramp\"\n");
+  return with_mcu_keys(hall(2, 2), "emergency_input = \"ramp\"\n");
 }
 
 class LiveBench : public Bench {

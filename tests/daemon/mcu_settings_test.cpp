@@ -141,10 +141,7 @@ TEST(MotorSettings, OfTheMcuAreRefusedWhereTheyDoNotApplyOrAnotherMotorMoves) {
 
 // An MCU with two motors by phases; m01 has a unit.
 std::string phases() {
-  std::string toml = blade("");
-  const std::string mcu = "address = 1\n";
-  return toml.insert(toml.find(mcu) + mcu.size(),
-                     "steps = \"phases\" # unipolar\nphase_sequence = \"full\"\n");
+  return with_mcu_keys(blade(""), "steps = \"phases\" # unipolar\nphase_sequence = \"full\"\n");
 }
 
 const bushd_emission& emission_of(SettingsLab& lab) {

@@ -31,9 +31,7 @@ const std::string kHomes =
 
 // Two motors on one MCU; the keys are of m01.
 std::string lab_with(const std::string& manner, const std::string& keys) {
-  std::string toml = hall(1, 2, manner);
-  const std::string name = "name = \"m01\"\n";
-  return toml.insert(toml.find(name) + name.size(), keys);
+  return with_keys(hall(1, 2, manner), "m01", keys);
 }
 
 // A stage: a limit switch at each end, that at the negative one opens, and a lever between.
@@ -70,8 +68,7 @@ TEST_P(MotorInputs, EachLimitInhibitsItsDirectionAlone) {
   EXPECT_EQ(lab.motor("m01").inputs, "");
   for (const int sign : {1, -1}) {
     const std::string end = sign > 0 ? "positive" : "negative";
-    const Answer result =
-        lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {sign * 20'000, sign * 100}));
+    const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m02"}, {sign * 20'000, sign * 100});
     EXPECT_EQ(result.motor_results, (std::vector<std::string>{"limit", "reached"})) << end;
     EXPECT_THAT(result.reason, HasSubstr(end + " end"));
     EXPECT_GE(sign * lab.shaft_steps("m01"), kEnd);
@@ -82,7 +79,7 @@ TEST_P(MotorInputs, EachLimitInhibitsItsDirectionAlone) {
     EXPECT_FALSE(lab.motor("m02").input);
     EXPECT_EQ(word(lab.motor("m01").inhibited), end);
     EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {sign * 10})).result, "refused");
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
     lab.run_for(0.2);
     EXPECT_EQ(lab.motor("m01").inputs, "");
     EXPECT_EQ(word(lab.motor("m01").inhibited), "");
@@ -107,7 +104,7 @@ TEST_P(MotorInputs, TheHomeSwitchIsFoundFromEitherSideAndFromEitherLimit) {
   lab.connect();
   // Counted from the switch, at which it stands at -50.
   const auto go_to = [&](std::int64_t place) {
-    const Answer away = lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {place - lab.shaft_steps("m01")}));
+    const Answer away = lab.ask(Ask::kMoveBy, {"m01"}, {place - lab.shaft_steps("m01")});
     EXPECT_TRUE(away.result == "reached" || away.result == "limit") << away.reason;
   };
   for (const std::int64_t from : {std::int64_t{0}, std::int64_t{-4000}, std::int64_t{7000},
@@ -132,7 +129,7 @@ TEST_P(MotorInputs, ALimitMayBeTheHomeSwitch) {
                        kHomes));
   furnish(lab.bus(0).mcu(0), 100'000);
   lab.connect();
-  const Answer result = lab.wait(lab.send(Ask::kHome, {"m01"}));
+  const Answer result = lab.ask(Ask::kHome, {"m01"});
   ASSERT_EQ(result.result, "reached") << result.reason;
   EXPECT_LE(std::abs(lab.shaft_steps("m01") + kEnd), kSlowOverrun);
   lab.run_for(0.2);
@@ -145,9 +142,7 @@ TEST(MotorInputsTold, ASwitchThatIsNotBetweenTheLimits) {
   furnish(lab.bus(0).mcu(0), -100'000);
   lab.connect();
   const Answer result = lab.wait(lab.send(Ask::kHome, {"m01"}), 60);
-  EXPECT_EQ(result.result, "fault");
-  EXPECT_THAT(result.reason,
-              HasSubstr("was not found within home.most_steps, or up to its limits"));
+  EXPECT_THAT(result, Ends("fault", "was not found within home.most_steps, or up to its limits"));
   EXPECT_GE(lab.shaft_steps("m01"), kEnd) << "it has turned";
   EXPECT_EQ(result.position_steps.at(0), lab.shaft_steps("m01"));
 }
@@ -157,9 +152,8 @@ TEST(MotorInputsTold, ALimitTooNearToTheHomeSwitch) {
   furnish(lab.bus(0).mcu(0), -kEnd - 10);
   lab.connect();
   const Answer result = lab.wait(lab.send(Ask::kHome, {"m01"}), 60);
-  EXPECT_EQ(result.result, "fault");
-  EXPECT_THAT(result.reason, HasSubstr("came to a limit switch while it looked slowly"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {500})).result, "reached");
+  EXPECT_THAT(result, Ends("fault", "came to a limit switch while it looked slowly"));
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {500}).result, "reached");
 }
 
 TEST(MotorInputsTold, TheStepSensorIsShownAndStopsNothing) {
@@ -169,19 +163,19 @@ TEST(MotorInputsTold, TheStepSensorIsShownAndStopsNothing) {
   lab.run_for(0.2);
   EXPECT_EQ(lab.motor("m01").inputs, "step");
   EXPECT_FALSE(lab.motor("m01").input);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {50})).result, "reached");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {-50})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {50}).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {-50}).result, "reached");
 }
 
 TEST(MotorInputsTold, ANewDaemonFindsTheSameSwitches) {
   Lab lab(lab_with("fine", kInputs));
   furnish(lab.bus(0).mcu(0), 100'000);
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {20'000})).result, "limit");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {20'000}).result, "limit");
   lab.restart_daemon();
   lab.connect();
   EXPECT_EQ(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {1})).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {-1})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {-1}).result, "reached");
 }
 
 }  // namespace

@@ -50,11 +50,10 @@ TEST(MotorSettings, SayWhereAMotorStandsThatIsOutside) {
   SettingsLab lab;
   lab.move_to("m01", 400);
   const Answer answer = lab.change("m01", "soft_limits", "[2, 3]");
-  EXPECT_EQ(answer.result, "done");
-  EXPECT_THAT(
-      answer.reason,
-      HasSubstr("m01: soft_limits = [2, 3]; it stands at 11.0000 mm, beyond its soft limits "
-                "of 12.0000 mm to 13.0000 mm; it may be moved towards them"));
+  EXPECT_THAT(answer,
+              Ends("done",
+                   "m01: soft_limits = [2, 3]; it stands at 11.0000 mm, beyond its soft limits "
+                   "of 12.0000 mm to 13.0000 mm; it may be moved towards them"));
   lab.expect_refused(lab.move_by("m01", -1), "soft limit");
   lab.expect_reached(lab.move_by("m01", 100));
   EXPECT_THAT(lab.change("m01", "soft_limits", "[1, 3]").reason, Not(HasSubstr("stands")));

@@ -8,16 +8,14 @@ namespace bushd::test {
 namespace {
 
 TEST(Moves, ConnectedMcusBecomeReadyWithEnabledDrivers) {
-  Lab lab(hall(2, 16));
-  lab.connect();
+  ReadyLab lab(hall(2, 16));
   EXPECT_EQ(lab.state_of("hall:1").motors.size(), 16u);
   EXPECT_EQ(lab.state_of("hall:2").boot, 2);
   EXPECT_TRUE(lab.motor("m32").enabled);
 }
 
 TEST(Moves, ShortAndLongMovesReachTheirTargets) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   for (const std::int64_t steps : {1, 2, 3, 7, 400, 475, 476, 477, 2000, -1, -2883, -5}) {
     const std::int64_t from = lab.motor("m01").position_steps;
     const auto number = lab.send(Ask::kMoveBy, {"m01"}, {steps});
@@ -33,15 +31,14 @@ TEST(Moves, ShortAndLongMovesReachTheirTargets) {
 TEST(Moves, AllMotorsOfTwoMcusAtOnce) {
   for (const char* manner :
        {"fine", "coarse", "fine_table", "coarse_table", "fine_ticks", "coarse_ticks"}) {
-    Lab lab(hall(2, 16, manner));
-    lab.connect();
+    ReadyLab lab(hall(2, 16, manner));
     std::vector<std::string> names;
     std::vector<std::int64_t> steps;
     for (int i = 1; i <= 32; ++i) {
       names.push_back((i < 10 ? "m0" : "m") + std::to_string(i));
       steps.push_back((i % 2 ? 1 : -1) * i * 117);
     }
-    const Answer result = lab.wait(lab.send(Ask::kMoveBy, names, steps));
+    const Answer result = lab.ask(Ask::kMoveBy, names, steps);
     EXPECT_EQ(result.result, "reached") << result.reason;
     for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(lab.shaft_steps(names[i]), steps[i]);
     EXPECT_EQ(lab.bus(0).collisions(), 0u);
@@ -51,8 +48,7 @@ TEST(Moves, AllMotorsOfTwoMcusAtOnce) {
 }
 
 TEST(Moves, MotorsStartAndEndIndependently) {
-  Lab lab(hall(1, 3));
-  lab.connect();
+  ReadyLab lab(hall(1, 3));
   const auto long_move = lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.7);
   const auto short_move = lab.send(Ask::kMoveBy, {"m02"}, {-30});
@@ -66,8 +62,7 @@ TEST(Moves, MotorsStartAndEndIndependently) {
 }
 
 TEST(Moves, StopInFlightRampsDownAndKnowsWhereItStands) {
-  Lab lab(hall(1, 3));
-  lab.connect();
+  ReadyLab lab(hall(1, 3));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   const auto other = lab.send(Ask::kMoveBy, {"m02"}, {3000});
   lab.run_for(1.5);
@@ -84,27 +79,25 @@ TEST(Moves, StopInFlightRampsDownAndKnowsWhereItStands) {
 
 TEST(Moves, StopAtEveryPhaseOfAMoveLosesNoStep) {
   for (int ms = 0; ms <= 2400; ms += 40) {
-    Lab lab(hall(1, 1));
-    lab.connect();
+    ReadyLab lab(hall(1, 1));
     const auto move = lab.send(Ask::kMoveBy, {"m01"}, {-900});
     lab.run_for(ms * 1e-3);
-    lab.wait(lab.send(Ask::kStop, {}));
+    lab.ask(Ask::kStop, {});
     const Answer result = lab.wait(move);
     EXPECT_THAT(result.result, testing::AnyOf("stopped", "reached"))
         << ms << " ms: " << result.reason;
     EXPECT_EQ(lab.shaft_steps("m01"), result.position_steps.at(0)) << ms << " ms";
     // And it can move again.
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {5})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {5}).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), 5);
   }
 }
 
 // What is told in few frames begins sooner than a stop can take effect.
 TEST(Moves, StopBeforeTheStartMakesNoStep) {
-  Lab lab(hall(1, 2, "fine_ticks"));
-  lab.connect();
+  ReadyLab lab(hall(1, 2, "fine_ticks"));
   const auto move = lab.send(Ask::kMoveBy, {"m01", "m02"}, {500, 500});
-  lab.wait(lab.send(Ask::kStop, {}));
+  lab.ask(Ask::kStop, {});
   EXPECT_EQ(lab.wait(move).result, "stopped");
   lab.run_for(1);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
@@ -112,8 +105,7 @@ TEST(Moves, StopBeforeTheStartMakesNoStep) {
 }
 
 TEST(Moves, RefusalsNameMotorAndCause) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   const auto refused = [&](Ask kind, std::vector<std::string> motors,
                            std::vector<std::int64_t> steps) {
     const Answer reply = lab.last_reply(lab.send(kind, motors, steps));
@@ -138,37 +130,33 @@ TEST(Moves, RefusalsNameMotorAndCause) {
 }
 
 TEST(Moves, AMoveOfManyYearsIsRefused) {
-  Lab lab(hall(1, 1, "fine", "glacier"),
-          "name = \"glacier\"\ntime_unit_ns = 1000000000\naccel = [60000]\n");
-  lab.connect();
+  ReadyLab lab(hall(1, 1, "fine", "glacier"),
+               "name = \"glacier\"\ntime_unit_ns = 1000000000\naccel = [60000]\n");
   const Answer reply = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {2'000'000'000}));
   EXPECT_EQ(reply.phase, Answer::kRefused);
   EXPECT_THAT(reply.reason, testing::HasSubstr("days"));
 }
 
 TEST(Moves, DisabledDriversRefuseMovesUntilEnabled) {
-  Lab lab(hall(1, 1));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {})).result, "done");
+  ReadyLab lab(hall(1, 1));
+  EXPECT_EQ(lab.ask(Ask::kDisable, {}).result, "done");
   const Answer reply = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5}));
   EXPECT_THAT(reply.reason, testing::HasSubstr("disabled"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEnable, {"m01"})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kEnable, {"m01"}).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {5}).result, "reached");
 }
 
 TEST(Moves, SetPositionMovesNothing) {
-  Lab lab(hall(1, 2));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m02"}, {-1234})).result, "done");
+  ReadyLab lab(hall(1, 2));
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m02"}, {-1234}).result, "done");
   EXPECT_EQ(lab.motor("m02").position_steps, -1234);
   EXPECT_EQ(lab.shaft_steps("m02"), 0);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m02"}, {-1200})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m02"}, {-1200}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m02"), 34);
 }
 
 TEST(Moves, SecondStopChangesNothing) {
-  Lab lab(hall(1, 1));
-  lab.connect();
+  ReadyLab lab(hall(1, 1));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   lab.run_for(1.5);
   lab.send(Ask::kStop, {"m01"});
@@ -181,8 +169,7 @@ TEST(Moves, SecondStopChangesNothing) {
 }
 
 TEST(Moves, ShutDownRampsEverythingDown) {
-  Lab lab(hall(2, 16));
-  lab.connect();
+  ReadyLab lab(hall(2, 16));
   const auto move = lab.send(Ask::kMoveBy, {"m01", "m17"}, {9000, -9000});
   lab.run_for(1.2);
   lab.core().shut_down(lab.now_us());

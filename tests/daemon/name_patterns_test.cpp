@@ -42,16 +42,16 @@ TEST_F(LabWithPatterns, MoveStopAndPauseTakeThemAlike) {
   const auto move = lab.send(api::Move{.motors = {{"m0[1-3]", 4000}, {"m08", 4000}}});
   lab.run_for(0.3);
   EXPECT_THAT(moving(), ElementsAre("m01", "m02", "m03", "m08"));
-  EXPECT_EQ(lab.wait(lab.send(api::Pause{{"*3"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Pause{{"*3"}}).result, "done");
   EXPECT_TRUE(lab.motor("m03").paused);
   EXPECT_FALSE(lab.motor("m01").paused);
-  EXPECT_EQ(lab.wait(lab.send(api::Resume{{"m0?"}})).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(api::Stop{{"m0[12]"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Resume{{"m0?"}}).result, "done");
+  EXPECT_EQ(lab.ask(api::Stop{{"m0[12]"}}).result, "done");
   EXPECT_THAT(moving(), ElementsAre("m03", "m08"));
-  EXPECT_EQ(lab.wait(lab.send(api::Stop{{"@*"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Stop{{"@*"}}).result, "done");
   EXPECT_THAT(moving(), ElementsAre());
   EXPECT_THAT(lab.last_reply(move).motors, ElementsAre("m01", "m02", "m03", "m08"));
-  EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m01", "m0*"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Hold{{"m01", "m0*"}}).result, "done");
   EXPECT_TRUE(lab.motor("m08").held);
 }
 
@@ -65,7 +65,7 @@ TEST_F(LabWithPatterns, WhatStandsForNoMotorIsRefusedAndAStopStopsTheOthers) {
               HasSubstr("m01 is named twice"));
   lab.send(api::Move{.motors = {{"m01", 4000}}});
   lab.run_for(0.3);
-  EXPECT_THAT(lab.wait(lab.send(api::Stop{{"slit*", "m0*"}})).reason, HasSubstr("slit*"));
+  EXPECT_THAT(lab.ask(api::Stop{{"slit*", "m0*"}}).reason, HasSubstr("slit*"));
   EXPECT_TRUE(lab.run_until([this] { return !lab.motor("m01").moving; }, 5));
   EXPECT_LT(lab.motor("m01").position_steps, 4000);
 }

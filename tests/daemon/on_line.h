@@ -18,16 +18,10 @@ inline api::MoveLine line_to(const std::vector<std::string>& motors,
   return {.kind = api::Move::Kind::kAbsolute, .motors = motor_steps(motors, steps)};
 }
 
-// Keys of the motor of this name.
-inline std::string with_keys(std::string toml, const std::string& motor, const std::string& keys) {
-  const std::string name = "name = \"" + motor + "\"\n";
-  return toml.insert(toml.find(name) + name.size(), keys);
-}
-
 // None of its MCUs takes tables for lines: a line that goes by one of its own is streamed.
-struct StreamedLab : Lab {
+struct StreamedLab : ReadyLab {
   explicit StreamedLab(const std::string& toml, const std::string& glacier = {})
-      : Lab(toml, glacier, nullptr, BUSHD_CAN_SCRATCH) {}
+      : ReadyLab(toml, glacier, nullptr, BUSHD_CAN_SCRATCH) {}
 };
 
 // How far the shafts are from a polyline from 0 through these points, a row of them each: at its
@@ -102,7 +96,6 @@ inline void expect_on_line_all_the_way(const char* manner, const std::vector<std
                                        double bound_steps) {
   SCOPED_TRACE(manner);
   StreamedLab lab(hall(2, 2, manner));
-  lab.connect();
   const auto move = lab.send(line_to(kMotors, steps));
   double most = 0;
   lab.run_until([&] {

@@ -39,12 +39,11 @@ INSTANTIATE_TEST_SUITE_P(Formats, PathTrace, testing::Values("fine", "coarse"),
                          [](const auto& format) { return std::string(format.param); });
 
 TEST_P(PathTrace, EveryEdgeIsOnThePath) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto move = lab.send(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()});
   for (int pause = 0; pause < 3; ++pause) {
     lab.run_for(0.8);
-    lab.wait(lab.send(api::Pause{}));
+    lab.ask(api::Pause{});
     lab.send(api::Resume{});
   }
   EXPECT_EQ(lab.wait(move).result, "reached");
@@ -60,8 +59,7 @@ TEST_P(PathTrace, EveryEdgeIsOnThePath) {
 }
 
 TEST_P(PathTrace, OfALogOfSeveralPathsEachIsJudgedByItsPoints) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto move = lab.send(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()});
   EXPECT_EQ(lab.wait(move).result, "reached");
   // Back by another way, and without one of the motors.
@@ -81,10 +79,9 @@ TEST_P(PathTrace, OfALogOfSeveralPathsEachIsJudgedByItsPoints) {
 }
 
 TEST_P(PathTrace, PathsAndOtherMotionsInAnyOrderAreJudgedTogether) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
   const auto reaches = [&lab](auto request) {
-    EXPECT_EQ(lab.wait(lab.send(std::move(request))).result, "reached");
+    EXPECT_EQ(lab.ask(std::move(request)).result, "reached");
   };
   const api::MovePath path_there{.motors = kTraced, .rows = 63, .positions = points()};
   reaches(api::Move{.motors = {{"m01", 200}, {"m04", -90}}});
@@ -120,9 +117,8 @@ TEST_P(PathTrace, PathsAndOtherMotionsInAnyOrderAreJudgedTogether) {
 }
 
 TEST_P(PathTrace, ATraceThatIsStillWrittenIsToldAsThat) {
-  Lab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(api::Move{.motors = {{"m01", 20}}})).result, "reached");
+  ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
+  EXPECT_EQ(lab.ask(api::Move{.motors = {{"m01", 20}}}).result, "reached");
   EXPECT_EQ(Traced::check(lab, ""), 2);
   EXPECT_THAT(said(), testing::HasSubstr("the trace is unfinished: bushsim still writes it"));
   ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());

@@ -37,8 +37,7 @@ TEST(Paths, AllMotorsAreOnThePathAtAnyTime) {
     for (const auto corners :
          {api::MovePath::Corners::kContinuous, api::MovePath::Corners::kExact}) {
       SCOPED_TRACE(manner);
-      Lab lab(hall(2, 2, manner));
-      lab.connect();
+      ReadyLab lab(hall(2, 2, manner));
       api::MovePath path = path_of(kOnPath, kPoints);
       path.corners = corners;
       const auto move = lab.send(path);
@@ -57,8 +56,7 @@ TEST(Paths, AllMotorsAreOnThePathAtAnyTime) {
 }
 
 TEST(Paths, PauseAndResumeKeepThePath) {
-  Lab lab(hall(2, 2));
-  lab.connect();
+  ReadyLab lab(hall(2, 2));
   const auto move = lab.send(path_of(kOnPath, kPoints));
   double most = 0;
   for (const std::int64_t at : {300, 790, 1099}) {
@@ -66,7 +64,7 @@ TEST(Paths, PauseAndResumeKeepThePath) {
       most = std::max(most, off_polyline(lab, kOnPath, kPoints));
       return lab.shaft_steps("m01") >= at;
     });
-    EXPECT_EQ(lab.wait(lab.send(api::Pause{})).result, "done");
+    EXPECT_EQ(lab.ask(api::Pause{}).result, "done");
     lab.run_for(0.1);
     EXPECT_LE(off_polyline(lab, kOnPath, kPoints), kOffAtRest);
     lab.send(api::Resume{});
@@ -82,22 +80,18 @@ TEST(Paths, PauseAndResumeKeepThePath) {
 }
 
 TEST(Paths, AStopRampsAllDownAlongIt) {
-  Lab lab(hall(2, 2));
-  lab.connect();
+  ReadyLab lab(hall(2, 2));
   const auto move = lab.send(path_of(kOnPath, kPoints));
   lab.run_until([&] { return lab.shaft_steps("m02") >= 100; });
-  lab.wait(lab.send(api::Stop{{"m03"}}));
+  lab.ask(api::Stop{{"m03"}});
   lab.run_until([&] { return lab.has_result(move); });
-  const Answer result = lab.last_reply(move);
-  EXPECT_EQ(result.result, "stopped");
-  EXPECT_THAT(result.reason, HasSubstr("the path has ended, which was left at"));
+  EXPECT_THAT(lab.last_reply(move), Ends("stopped", "the path has ended, which was left at"));
   EXPECT_LE(off_polyline(lab, kOnPath, kPoints), kOffAtRest);
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
 TEST(Paths, ALimitOfOneRampsTheOthersDownAlongIt) {
-  Lab lab(with_keys(hall(2, 2), "m01", "limit = \"positive\"\n"));
-  lab.connect();
+  ReadyLab lab(with_keys(hall(2, 2), "m01", "limit = \"positive\"\n"));
   const std::vector<double> points{500, 100, -40, 2000, 900, -300, 2500, 2000, 600};
   const auto move = lab.send(path_of(kOnPath, points));
   lab.run_until([&] { return lab.shaft_steps("m01") >= 800; });
@@ -122,15 +116,14 @@ TEST(Paths, WhatIsToldIsTrueOnABadLine) {
   }
   for (unsigned seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(seed);
-    Lab lab(hall(3, 2));
-    lab.connect();
+    ReadyLab lab(hall(3, 2));
     std::mt19937 random(seed);
     lab.on_send = [&random](std::size_t, std::vector<std::uint8_t>&) { return random() % 12 != 0; };
     const auto move = lab.send(path_of(motors, points));
     for (unsigned pause = 0; pause < seed % 3; ++pause) {
       lab.run_for(0.5 + 0.1 * static_cast<double>(seed));
-      lab.wait(lab.send(api::Pause{{"m02"}}));
-      lab.wait(lab.send(api::Resume{}));
+      lab.ask(api::Pause{{"m02"}});
+      lab.ask(api::Resume{});
     }
     lab.run_for(0.6);
     if (seed % 2 == 0) lab.send(Ask::kStop, {"m05"});
@@ -152,19 +145,17 @@ TEST(Paths, WhatIsToldIsTrueOnABadLine) {
 }
 
 TEST(Paths, AStopBeforeTheStartMovesNothing) {
-  Lab lab(hall(2, 2));
-  lab.connect();
+  ReadyLab lab(hall(2, 2));
   const auto move = lab.send(path_of(kOnPath, kPoints));
   lab.run_for(0.005);
-  lab.wait(lab.send(api::Stop{{"m01"}}));
+  lab.ask(api::Stop{{"m01"}});
   EXPECT_EQ(lab.wait(move).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 
 TEST(Paths, PointsComeInSeveralRequests) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   std::vector<double> points;
   for (int i = 1; i <= 50; ++i) points.insert(points.end(), {i * 20.0, (i % 5) * 3.0});
   const std::vector<std::string> motors{"m01", "m02"};
@@ -179,26 +170,23 @@ TEST(Paths, PointsComeInSeveralRequests) {
   EXPECT_EQ(lab.wait(first).result, "done");
   ASSERT_EQ(lab.replies(first).size(), 2u);
   EXPECT_EQ(lab.replies(first).front().phase, Answer::kAccepted);
-  EXPECT_EQ(lab.wait(lab.send(part(20, 40))).result, "done");
+  EXPECT_EQ(lab.ask(part(20, 40)).result, "done");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
   const auto move = lab.send(part(40, 50));
   EXPECT_EQ(lab.wait(move).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 1000);
   // Not in their order.
-  EXPECT_EQ(lab.wait(lab.send(part(0, 20))).result, "done");
-  EXPECT_THAT(lab.wait(lab.send(part(30, 50))).reason,
+  EXPECT_EQ(lab.ask(part(0, 20)).result, "done");
+  EXPECT_THAT(lab.ask(part(30, 50)).reason,
               HasSubstr("points from 31 on where those from 21 on were to come"));
-  EXPECT_THAT(lab.wait(lab.send(part(20, 50))).reason, HasSubstr("send it again"));
+  EXPECT_THAT(lab.ask(part(20, 50)).reason, HasSubstr("send it again"));
 }
 
 TEST(Paths, PointsAreMeantByOneOffset) {
-  std::string toml = hall(1, 2);
-  toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n");
-  Lab lab(toml);
-  lab.connect();
+  ReadyLab lab(with_keys(hall(1, 2), "m01", "unit = \"mm\"\nsteps_per_unit = 400\n"));
   api::MovePath path = path_of({"m01", "m02"}, {0.5, 100});
   path.rows = 2;
-  EXPECT_EQ(lab.wait(lab.send(path)).result, "done");
+  EXPECT_EQ(lab.ask(path).result, "done");
   const auto configure = [](const char* key, const char* value) {
     return api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", key, value}}};
   };
@@ -207,27 +195,22 @@ TEST(Paths, PointsAreMeantByOneOffset) {
                                  api::SetPosition{.motors = {{"m01", api::UserUnits{10}}}}}) {
     path.first_row = 0;
     path.positions = {0.5, 100};
-    EXPECT_EQ(lab.wait(lab.send(path)).result, "done");
-    ASSERT_EQ(lab.wait(lab.send(change)).result, "done");
+    EXPECT_EQ(lab.ask(path).result, "done");
+    ASSERT_EQ(lab.ask(change).result, "done");
     path.first_row = 1;
     path.positions = {10.25, 0};
-    const Answer answer = lab.wait(lab.send(path));
-    EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, HasSubstr("m01: its offset or direction has changed"));
+    EXPECT_THAT(lab.ask(path), Ends("refused", "m01: its offset or direction has changed"));
     EXPECT_EQ(lab.shaft_steps("m01"), 0);
   }
   path.first_row = 0;
   path.positions = {10.5, 100, 10.25, 0};
-  EXPECT_EQ(lab.wait(lab.send(path)).result, "reached");
+  EXPECT_EQ(lab.ask(path).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), -100);
 }
 
 TEST(Paths, AreRefusedIfWhatTheyWereCheckedByHasChangedWhileTheyWerePlanned) {
-  std::string toml = hall(1, 2);
-  toml.insert(toml.find("name = \"m01\""),
-              "unit = \"mm\"\nsteps_per_unit = 400\nsoft_limits = [-5, 5]\n");
-  Lab lab(toml);
-  lab.connect();
+  ReadyLab lab(
+      with_keys(hall(1, 2), "m01", "unit = \"mm\"\nsteps_per_unit = 400\nsoft_limits = [-5, 5]\n"));
   const auto configure = [](const char* key, const char* value) {
     return api::Configure{.kind = api::Configure::Kind::kChange, .changes = {{"m01", key, value}}};
   };
@@ -244,27 +227,24 @@ TEST(Paths, AreRefusedIfWhatTheyWereCheckedByHasChangedWhileTheyWerePlanned) {
     path.dry_run = !path.dry_run;
     const auto planned = lab.send(path);
     ASSERT_FALSE(lab.has_result(planned));
-    ASSERT_EQ(lab.wait(lab.send(change)).result, "done");
-    const Answer answer = lab.wait(planned);
-    EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, HasSubstr(reason));
+    ASSERT_EQ(lab.ask(change).result, "done");
+    EXPECT_THAT(lab.wait(planned), Ends("refused", reason));
     EXPECT_EQ(lab.shaft_steps("m01"), 0);
   }
-  ASSERT_EQ(lab.wait(lab.send(configure("soft_limits", "[-1, 0.5]"))).result, "done");
+  ASSERT_EQ(lab.ask(configure("soft_limits", "[-1, 0.5]")).result, "done");
   path.dry_run = false;
-  EXPECT_EQ(lab.wait(lab.send(path)).result, "reached");
+  EXPECT_EQ(lab.ask(path).result, "reached");
 }
 
 TEST(Paths, ADryRunTellsWhenEachPointIsReached) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   api::MovePath path = path_of({"m01", "m02"}, {500, 0, 500, 0, 500, 500});
   path.corners = api::MovePath::Corners::kExact;
   path.dry_run = true;
-  const auto plan = lab.wait(lab.send(path)).plan;
+  const auto plan = lab.ask(path).plan;
   ASSERT_TRUE(plan);
   const auto alone =
-      lab.wait(lab.send(api::Move{.motors = motor_steps({"m01"}, {500}), .dry_run = true})).plan;
+      lab.ask(api::Move{.motors = motor_steps({"m01"}, {500}), .dry_run = true}).plan;
   ASSERT_TRUE(alone);
   ASSERT_EQ(plan->points_us.size(), 3u);
   EXPECT_EQ(plan->points_us[0], alone->motors[0].duration_us);
@@ -275,11 +255,10 @@ TEST(Paths, ADryRunTellsWhenEachPointIsReached) {
 }
 
 TEST(Paths, ADryRunOfOneThatLeadsBackTellsHowLongItTakes) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   auto path = path_of({"m01", "m02"}, {500, 0, 0, 0});
   path.dry_run = true;
-  const auto plan = lab.wait(lab.send(path)).plan;
+  const auto plan = lab.ask(path).plan;
   ASSERT_TRUE(plan);
   EXPECT_EQ(plan->motors[0].steps, 0);
   EXPECT_GE(plan->duration_us, plan->points_us.back());
@@ -289,25 +268,23 @@ TEST(Paths, ADryRunOfOneThatLeadsBackTellsHowLongItTakes) {
 }
 
 TEST(Paths, SpeedsOfPointsSlowASingleMotorDown) {
-  Lab lab(hall(1, 1));
-  lab.connect();
+  ReadyLab lab(hall(1, 1));
   api::MovePath path = path_of({"m01"}, {1000, 1500, 3000});
   path.dry_run = true;
-  const auto fast = lab.wait(lab.send(path)).plan;
+  const auto fast = lab.ask(path).plan;
   path.speeds = {0, 100, 0};
-  const auto slow = lab.wait(lab.send(path)).plan;
+  const auto slow = lab.ask(path).plan;
   ASSERT_TRUE(fast && slow);
   EXPECT_GE(slow->points_us[1] - slow->points_us[0], 5'000'000);
   EXPECT_LT(slow->points_us[1] - slow->points_us[0], 5'100'000);
   EXPECT_LT(fast->points_us[1] - fast->points_us[0], 2'500'000);
   path.positions = {1000, 500, 3000};
-  EXPECT_THAT(lab.wait(lab.send(path)).reason, HasSubstr("point 2, m01"));
+  EXPECT_THAT(lab.ask(path).reason, HasSubstr("point 2, m01"));
 }
 
 TEST(Paths, RefusesWhatCannotBe) {
-  Lab lab(hall(1, 2));
-  lab.connect();
-  const auto why = [&](const api::MovePath& path) { return lab.wait(lab.send(path)).reason; };
+  ReadyLab lab(hall(1, 2));
+  const auto why = [&](const api::MovePath& path) { return lab.ask(path).reason; };
   EXPECT_THAT(why(path_of({"m01", "m02"}, {100, 0, 3e9, 0})), HasSubstr("point 2, m01"));
   EXPECT_THAT(why(path_of({"m01", "m02"}, {100, 0.5})), HasSubstr("point 1, m02"));
   EXPECT_THAT(why(path_of({"m01", "nobody"}, {100, 0})), HasSubstr("nobody"));

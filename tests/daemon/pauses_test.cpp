@@ -10,22 +10,17 @@
 namespace bushd::test {
 namespace {
 
-using testing::HasSubstr;
-
 std::string lab_with_keys(const std::string& keys = "", const char* manner = "fine") {
-  std::string toml = hall(1, 3, manner);
-  const std::string motor = "output = 0\n";
-  return toml.insert(toml.find(motor) + motor.size(), keys);
+  return with_keys(hall(1, 3, manner), "m01", keys);
 }
 
 TEST(Pauses, KeepTheTargetAndTheMove) {
   for (const char* manner : {"fine", "coarse", "fine_table", "coarse_ticks"}) {
     SCOPED_TRACE(manner);
-    Lab lab(lab_with_keys("", manner));
-    lab.connect();
+    ReadyLab lab(lab_with_keys("", manner));
     const auto move = lab.send(Ask::kMoveTo, {"m01", "m02"}, {2000, 800});
     lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-    EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m01"}})).reason, "paused: 1 motor");
+    EXPECT_EQ(lab.ask(api::Pause{{"m01"}}).reason, "paused: 1 motor");
     const std::int64_t stands = lab.shaft_steps("m01");
     EXPECT_LT(stands, 1500);
     lab.run_for(5);
@@ -35,7 +30,7 @@ TEST(Pauses, KeepTheTargetAndTheMove) {
     EXPECT_TRUE(lab.motor("m01").paused);
     EXPECT_FALSE(lab.motor("m02").paused);
     EXPECT_EQ(lab.motor("m01").target_steps, 2000);
-    EXPECT_EQ(lab.wait(lab.send(api::Resume{})).reason, "resumed: 1 motor");
+    EXPECT_EQ(lab.ask(api::Resume{}).reason, "resumed: 1 motor");
     EXPECT_EQ(lab.wait(move).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), 2000);
     EXPECT_FALSE(lab.motor("m01").paused);
@@ -45,8 +40,7 @@ TEST(Pauses, KeepTheTargetAndTheMove) {
 }
 
 TEST(Pauses, AreTakenBackWhileItRampsDown) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {3000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 1000; });
   lab.send(api::Pause{});
@@ -57,56 +51,51 @@ TEST(Pauses, AreTakenBackWhileItRampsDown) {
 }
 
 TEST(Pauses, OfAGroupAreOfItsMotors) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto move = lab.send(Ask::kMoveTo, {"m01", "m03"}, {2000, -2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  EXPECT_EQ(lab.wait(lab.send(api::Pause{{"axes"}})).reason, "paused: 2 motors");
-  EXPECT_EQ(lab.wait(lab.send(api::Pause{{"axis"}})).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(api::Pause{})).reason, "paused: 2 motors") << "as they are";
-  EXPECT_EQ(lab.wait(lab.send(api::Resume{{"axes"}})).reason, "resumed: 2 motors");
+  EXPECT_EQ(lab.ask(api::Pause{{"axes"}}).reason, "paused: 2 motors");
+  EXPECT_EQ(lab.ask(api::Pause{{"axis"}}).result, "refused");
+  EXPECT_EQ(lab.ask(api::Pause{}).reason, "paused: 2 motors") << "as they are";
+  EXPECT_EQ(lab.ask(api::Resume{{"axes"}}).reason, "resumed: 2 motors");
   EXPECT_EQ(lab.wait(move).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m03"), -2000);
 }
 
 TEST(Pauses, AStopEndsThePausedMove) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   const std::int64_t stands = lab.shaft_steps("m01");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
-  EXPECT_EQ(lab.wait(move).result, "stopped");
-  EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("stopped on request, asked for by command"));
-  EXPECT_EQ(lab.wait(lab.send(api::Resume{})).reason, "resumed: 0 motors");
+  EXPECT_EQ(lab.ask(Ask::kStop, {}).result, "done");
+  EXPECT_THAT(lab.wait(move), Ends("stopped", "stopped on request, asked for by command"));
+  EXPECT_EQ(lab.ask(api::Resume{}).reason, "resumed: 0 motors");
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), stands);
   EXPECT_EQ(lab.motor("m01").activity, api::Activity::kResting);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
 }
 
 TEST(Pauses, ANewTargetEndsThem) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  lab.wait(lab.send(api::Pause{}));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {-100})).result, "reached");
+  lab.ask(api::Pause{});
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {-100}).result, "reached");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), -100);
 }
 
 // Before any report has told that it was stopped where it stood.
 TEST(Pauses, ANewTargetRightAfterAStopBeginsFromRest) {
-  Lab lab(lab_with_keys("backlash = 40\n"));
-  lab.connect();
+  ReadyLab lab(lab_with_keys("backlash = 40\n"));
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   const std::int64_t stands = lab.shaft_steps("m01");
   lab.send(Ask::kStop, {"m01"});
-  const Answer reached = lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {stands + 500}));
+  const Answer reached = lab.ask(Ask::kMoveTo, {"m01"}, {stands + 500});
   EXPECT_EQ(reached.result, "reached");
   EXPECT_THAT(reached.legs, testing::ElementsAre(1)) << "straight, from that side";
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
@@ -120,16 +109,15 @@ TEST(Pauses, ANewTargetRightAfterAStopBeginsFromRest) {
 }
 
 TEST(Pauses, HoldInEveryLeg) {
-  Lab lab(lab_with_keys("backlash = 40\nbacklash_speed = 200.0\n"));
-  lab.connect();
+  ReadyLab lab(lab_with_keys("backlash = 40\nbacklash_speed = 200.0\n"));
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") <= -300; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   lab.run_for(1);
   lab.send(api::Resume{});
   lab.run_until([&] { return lab.shaft_steps("m01") == -640; });
   lab.run_until([&] { return lab.shaft_steps("m01") >= -630; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   lab.run_for(1);
   EXPECT_LT(lab.shaft_steps("m01"), -600);
   EXPECT_FALSE(lab.has_result(move));
@@ -139,11 +127,10 @@ TEST(Pauses, HoldInEveryLeg) {
 }
 
 TEST(Pauses, BetweenTwoLegsTheNextOneWaits) {
-  Lab lab(lab_with_keys("backlash = 40\n"));
-  lab.connect();
+  ReadyLab lab(lab_with_keys("backlash = 40\n"));
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {-600});
   lab.run_until([&] { return lab.shaft_steps("m01") == -640; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   lab.run_for(1);
   EXPECT_EQ(lab.shaft_steps("m01"), -640);
   EXPECT_EQ(lab.motor("m01").target_steps, -600);
@@ -153,17 +140,16 @@ TEST(Pauses, BetweenTwoLegsTheNextOneWaits) {
 }
 
 TEST(Pauses, ALostLinkEndsThePausedMove) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   lab.unplug(0);
   EXPECT_EQ(lab.wait(move).result, "link");
   lab.plug(0);
   lab.connect();
   EXPECT_FALSE(lab.motor("m01").paused);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
 }
 
 TEST(Pauses, APausedMotorIsNotTakenForOneAtRest) {
@@ -172,10 +158,10 @@ TEST(Pauses, APausedMotorIsNotTakenForOneAtRest) {
   lab.connect();
   lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   lab.run_for(2);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kDisable, {"m01"})).result, "refused");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {0}).result, "refused");
+  EXPECT_EQ(lab.ask(Ask::kDisable, {"m01"}).result, "refused");
   lab.bus(0).reboot(0);
   lab.cut_pc_power();
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
@@ -184,47 +170,41 @@ TEST(Pauses, APausedMotorIsNotTakenForOneAtRest) {
 }
 
 TEST(Pauses, EndJogs) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto jog = lab.send(api::Jog{.motor = "m01", .per_s = 500, .in_steps = true});
   lab.run_for(0.3);
   lab.send_as("panel", api::Pause{});
-  EXPECT_EQ(lab.wait(jog).result, "stopped");
-  EXPECT_THAT(lab.last_reply(jog).reason, HasSubstr("of panel paused it"));
+  EXPECT_THAT(lab.wait(jog), Ends("stopped", "of panel paused it"));
 }
 
 TEST(Holds, RefuseWhatWouldBegin) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {1000});
   lab.run_for(0.1);
-  EXPECT_EQ(lab.wait(lab.send(api::Hold{{"m01"}})).reason, "held: 1 motor");
+  EXPECT_EQ(lab.ask(api::Hold{{"m01"}}).reason, "held: 1 motor");
   EXPECT_EQ(lab.wait(move).result, "reached") << "what is under way goes on";
   EXPECT_TRUE(lab.motor("m01").held);
   for (const api::Request& request :
        {request_of(Ask::kMoveTo, {"m01"}, {0}),
         api::Request(api::Jog{.motor = "m01", .per_s = 100, .in_steps = true})}) {
-    const Answer refused = lab.wait(lab.send(request));
-    EXPECT_EQ(refused.result, "refused");
-    EXPECT_THAT(refused.reason, HasSubstr("m01: it is held by test since "));
+    const Answer refused = lab.ask(request);
+    EXPECT_THAT(refused, Ends("refused", "m01: it is held by test since "));
   }
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m02"}, {100})).result, "reached");
-  EXPECT_EQ(lab.wait(lab.send(api::Release{})).reason, "released: 1 motor");
-  EXPECT_EQ(lab.wait(lab.send(api::Release{})).reason, "done; none of them was held");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m02"}, {100}).result, "reached");
+  EXPECT_EQ(lab.ask(api::Release{}).reason, "released: 1 motor");
+  EXPECT_EQ(lab.ask(api::Release{}).reason, "done; none of them was held");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {0}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 TEST(Holds, KeepAPausedMotorWhereItIs) {
-  Lab lab(lab_with_keys());
-  lab.connect();
+  ReadyLab lab(lab_with_keys());
   const auto move = lab.send(Ask::kMoveTo, {"m01"}, {2000});
   lab.run_until([&] { return lab.shaft_steps("m01") >= 500; });
-  lab.wait(lab.send(api::Pause{}));
+  lab.ask(api::Pause{});
   lab.send(api::Hold{});
-  const Answer refused = lab.wait(lab.send(api::Resume{{"m01"}}));
-  EXPECT_EQ(refused.result, "refused");
-  EXPECT_THAT(refused.reason, HasSubstr("it is held"));
+  const Answer refused = lab.ask(api::Resume{{"m01"}});
+  EXPECT_THAT(refused, Ends("refused", "it is held"));
   lab.send(api::Release{});
   lab.send(api::Resume{});
   EXPECT_EQ(lab.wait(move).result, "reached");

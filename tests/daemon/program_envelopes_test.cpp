@@ -55,8 +55,8 @@ struct EnvelopeLab : private Times, public Lab {
 
   Answer put(const std::string& frames, const std::string& envelope = kEnvelope,
              const std::string& head = "motors = [\"m01\"]\n") {
-    return wait(send(api::PutProgram{
-        .program = "scan", .text = head + frames, .points = {{"in.envelope", envelope}}}));
+    return ask(api::PutProgram{
+        .program = "scan", .text = head + frames, .points = {{"in.envelope", envelope}}});
   }
 };
 
@@ -72,8 +72,7 @@ TEST(ProgramEnvelopes, AnMcuMakesEachStepAtItsTime) {
   const std::int64_t due_us = due_units().back() * kUnitNs / 1000;
   EXPECT_GE(put.programs[0].duration_us, due_us);
   EXPECT_LE(put.programs[0].duration_us, due_us + 2 * 2560);
-  const Answer run = lab.wait(lab.send(api::RunPrograms{{"scan"}}));
-  EXPECT_EQ(run.result, "reached") << run.reason;
+  EXPECT_THAT(lab.ask(api::RunPrograms{{"scan"}}), Ends("reached"));
   EXPECT_EQ(lab.shaft_steps("m01"), 50);
   expect_due(lab.steps(), 1.5 * kSlotNs);
 }
@@ -83,7 +82,7 @@ TEST(ProgramEnvelopes, RunAgainAndAgainBetweenMovesByTheTable) {
   const std::string frames = std::string("[[frame]]\nrepeat = 2\n") + kRun +
                              "[[frame]]\nmove_by = [-50]\n[[frame]]\nnext = true\n";
   ASSERT_EQ(lab.put(frames, kEnvelope, "motors = [\"m01\"]\nunit = \"steps\"\n").result, "done");
-  EXPECT_EQ(lab.wait(lab.send(api::RunPrograms{{"scan"}})).result, "reached");
+  EXPECT_EQ(lab.ask(api::RunPrograms{{"scan"}}).result, "reached");
   const auto all = lab.steps();
   ASSERT_THAT(all, SizeIs(4 * 50));
   expect_due({all.begin(), all.begin() + 50}, 1.5 * kSlotNs);
@@ -93,9 +92,10 @@ TEST(ProgramEnvelopes, RunAgainAndAgainBetweenMovesByTheTable) {
 
 TEST(ProgramEnvelopes, AreWhatAMotionByThesePointsMakes) {
   EnvelopeLab lab;
-  const Answer moved = lab.wait(lab.send(api::MovePath{
-      .motors = {"m01"}, .rows = 3, .positions = {10, 40, 50}, .speeds = {200, 500, 100}}));
-  EXPECT_EQ(moved.result, "reached") << moved.reason;
+  EXPECT_THAT(
+      lab.ask(api::MovePath{
+          .motors = {"m01"}, .rows = 3, .positions = {10, 40, 50}, .speeds = {200, 500, 100}}),
+      Ends("reached"));
   // A tick tells a mean where the delay changes within it, by 2 ms at most here: a quarter of that
   // is the most by which a step is off. The last one comes at the end of its tick.
   auto made = lab.steps();
@@ -139,8 +139,7 @@ TEST(ProgramEnvelopes, AStopRampsDownByTheTable) {
   const std::int64_t run = lab.send(api::RunPrograms{{"scan"}});
   ASSERT_TRUE(lab.run_until([&] { return lab.steps().size() > 12; }));
   lab.send(api::Stop{{"m01"}});
-  const Answer ended = lab.wait(run);
-  EXPECT_EQ(ended.result, "stopped") << ended.reason;
+  EXPECT_THAT(lab.wait(run), Ends("stopped"));
   const auto made = lab.steps().size();
   EXPECT_LT(made, 50U);
   EXPECT_EQ(lab.shaft_steps("m01"), static_cast<std::int64_t>(made));

@@ -32,10 +32,7 @@ class StepTimes final : public sim::EdgeSink {
 // With these keys in each [[mcu]].
 inline std::string hall_with(int mcus, int motors, const std::string& keys) {
   std::string toml = hall(mcus, motors);
-  const std::string mcu = "[[mcu]]\n";
-  for (std::size_t at = toml.find(mcu); at != std::string::npos; at = toml.find(mcu, at + 1)) {
-    toml.insert(at + mcu.size(), keys);
-  }
+  for (int mcu = 1; mcu <= mcus; ++mcu) toml = with_mcu_keys(toml, keys, mcu);
   return toml;
 }
 
@@ -58,13 +55,13 @@ struct ProgramLab : Lab {
   }
   Answer put(const std::string& name, const std::string& motors, const std::string& frames,
              const std::string& head = {}) {
-    return wait(send(put_of(name, motors, frames, head)));
+    return ask(put_of(name, motors, frames, head));
   }
   std::int64_t run(const std::vector<std::string>& programs) {
     return send(api::RunPrograms{programs});
   }
   api::ProgramEntry entry(std::size_t index = 0) {
-    const std::vector<api::ProgramEntry> all = wait(send(api::ListPrograms{})).programs;
+    const std::vector<api::ProgramEntry> all = ask(api::ListPrograms{}).programs;
     return index < all.size() ? all[index] : api::ProgramEntry{};
   }
   bool comes_to(const std::string& stage) {

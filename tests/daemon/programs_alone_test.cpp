@@ -87,7 +87,7 @@ TEST(ProgramsAlone, AStopThatDoesNotReachItsMcuIsTakenThere) {
   lab.unplug(0);
   ASSERT_TRUE(lab.run_until([&] { return !lab.all_ready(); }));
   lab.run_for(2);
-  const Answer stop = lab.wait(lab.send(Ask::kStop, {"m01"}));
+  const Answer stop = lab.ask(Ask::kStop, {"m01"});
   EXPECT_EQ(stop.result, "link");
   EXPECT_FALSE(lab.has_result(run));
   lab.plug(0);
@@ -105,17 +105,17 @@ TEST(ProgramsAlone, ANewDaemonFindsOneThatRuns) {
   EXPECT_EQ(lab.entry().stage, "runs");
   EXPECT_EQ(lab.entry().program, "");
   EXPECT_THAT(lab.warnings(), Contains(HasSubstr("goes on")));
-  EXPECT_THAT(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason, HasSubstr("a program of its"));
-  const auto refusal = [&] { return lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).reason; };
+  EXPECT_THAT(lab.ask(Ask::kMoveBy, {"m01"}, {5}).reason, HasSubstr("a program of its"));
+  const auto refusal = [&] { return lab.ask(Ask::kMoveBy, {"m02"}, {5}).reason; };
   ASSERT_TRUE(lab.run_until([&] { return refusal().find("offline") == std::string::npos; }));
   EXPECT_THAT(refusal(), HasSubstr("is told its inputs when the program of before"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
   EXPECT_EQ(lab.entry().stage, "ended");
   EXPECT_EQ(lab.motor("m01").position_steps, lab.shaft_steps("m01"));
   const std::size_t made = lab.steps.of(0, 0).size();
   lab.run_for(3);
   EXPECT_EQ(lab.steps.of(0, 0).size(), made);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached") << "it is free";
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {5}).result, "reached") << "it is free";
 }
 
 // It is no MCU of this configuration, and never goes online while its program runs.
@@ -130,7 +130,7 @@ TEST(ProgramsAlone, AStopReachesAnMcuThatIsLeftAlone) {
   ASSERT_TRUE(lab.run_until([&] { return !lab.warnings().empty(); }));
   EXPECT_THAT(lab.warnings(), Contains(HasSubstr("goes on")));
   EXPECT_FALSE(lab.all_ready());
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "link") << "nobody sees it stand";
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "link") << "nobody sees it stand";
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   const std::size_t made = lab.steps.of(0, 0).size();
   lab.run_for(3);
@@ -147,17 +147,15 @@ TEST(ProgramsAlone, APauseThatDoesNotReachItsMcuSaysSo) {
   const std::int64_t pause = lab.send(api::Pause{{"m01"}});
   lab.run_for(0.01);
   lab.unplug(0);
-  const Answer answer = lab.wait(pause);
-  EXPECT_EQ(answer.result, "link");
-  EXPECT_THAT(answer.reason, HasSubstr("may go on without a host"));
+  EXPECT_THAT(lab.wait(pause), Ends("link", "may go on without a host"));
   lab.on_send = nullptr;
   lab.plug(0);
   ASSERT_TRUE(
       lab.run_until([&] { return lab.state_of("hall:1").state != api::McuState::kOffline; }));
   ASSERT_TRUE(lab.comes_to("runs"));
-  ASSERT_TRUE(lab.run_until(
-      [&] { return lab.wait(lab.send(api::Pause{{"m01"}})).reason == "paused: 1 motor"; }));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  ASSERT_TRUE(
+      lab.run_until([&] { return lab.ask(api::Pause{{"m01"}}).reason == "paused: 1 motor"; }));
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
   EXPECT_EQ(lab.wait(run).result, "stopped");
 }
 
@@ -168,7 +166,7 @@ TEST(ProgramsAlone, ANewDaemonThatKeepsPositionsKnowsThemByName) {
   api::PutProgram put = ProgramLab::put_of(
       "a", "\"m01\"", "[[frame]]\nline_by = \"way.csv\"\n[[frame]]\nwait_s = 2\n", kWithoutHost);
   put.points = {{"way.csv", "m01\n40\n-40\n"}};
-  ASSERT_EQ(lab.wait(lab.send(put)).result, "done");
+  ASSERT_EQ(lab.ask(put).result, "done");
   lab.run({"a"});
   ASSERT_TRUE(lab.run_until([&] { return lab.steps.of(0, 0).size() == 80; }));
   lab.restart_daemon();
@@ -177,10 +175,9 @@ TEST(ProgramsAlone, ANewDaemonThatKeepsPositionsKnowsThemByName) {
   EXPECT_EQ(lab.entry().frame, 2);
   ASSERT_TRUE(lab.comes_to("ended"));
   lab.run_for(0.5);
-  const Answer again = lab.wait(lab.run({"a"}));
-  EXPECT_EQ(again.result, "reached") << again.reason;
+  EXPECT_THAT(lab.wait(lab.run({"a"})), Ends("reached"));
   EXPECT_THAT(lab.steps.of(0, 0), SizeIs(160));
-  ASSERT_EQ(lab.wait(lab.send(api::EraseProgram{"a"})).result, "done");
+  ASSERT_EQ(lab.ask(api::EraseProgram{"a"}).result, "done");
   lab.restart_daemon();
   lab.connect();
   EXPECT_EQ(lab.entry().program, "");

@@ -43,10 +43,10 @@ TEST(ProgramsKept, PutAnswersWhenAPowerCutWouldLeaveIt) {
   EXPECT_EQ(lab.entry().stage, "loaded");
   EXPECT_EQ(lab.entry().program, "a");
   EXPECT_TRUE(lab.steps.none());
-  ASSERT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+  ASSERT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {0}).result, "done");
   EXPECT_EQ(lab.wait(lab.run({"a"})).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 50);
-  ASSERT_EQ(lab.wait(lab.send(api::EraseProgram{"a"})).result, "done");
+  ASSERT_EQ(lab.ask(api::EraseProgram{"a"}).result, "done");
   lab.cut_power();
   ASSERT_TRUE(lab.is_back());
   EXPECT_EQ(lab.entry().stage, "none");
@@ -60,9 +60,8 @@ TEST(ProgramsKept, PutAndEraseSayThatItIsNotKeptYet) {
   const Answer put = lab.put("a", "\"m01\"", kThere, "kept = true\n");
   ASSERT_EQ(put.result, "done") << put.reason;
   EXPECT_FALSE(put.programs.at(0).stored);
-  const Answer erased = lab.wait(lab.send(api::EraseProgram{"a"}));
-  EXPECT_EQ(erased.result, "fault");
-  EXPECT_THAT(erased.reason, HasSubstr("would have it again after a power cut"));
+  EXPECT_THAT(lab.ask(api::EraseProgram{"a"}),
+              Ends("fault", "would have it again after a power cut"));
   EXPECT_FALSE(lab.has_result(move)) << "longer than both";
 }
 
@@ -90,9 +89,7 @@ TEST(ProgramsKept, AnMcuThatIsLostWhileItWritesIsTold) {
   lab.run_for(0.3);
   ASSERT_FALSE(lab.has_result(put));
   lab.cut_power();
-  const Answer answer = lab.wait(put);
-  EXPECT_EQ(answer.result, "link");
-  EXPECT_THAT(answer.reason, HasSubstr("it is put, and may outlive a power cut or not"));
+  EXPECT_THAT(lab.wait(put), Ends("link", "it is put, and may outlive a power cut or not"));
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   EXPECT_EQ(lab.entry().stage, "none");
 }
@@ -103,7 +100,7 @@ TEST(ProgramsKept, WhatIsBeingWrittenWaitsForNobodyElse) {
   ASSERT_TRUE(lab.run_until([&] { return lab.entry().stage == "loaded"; }));
   ASSERT_FALSE(lab.has_result(put));
   const std::string checksum = lab.entry().checksum;
-  EXPECT_THAT(lab.wait(lab.send(api::EraseProgram{checksum})).reason,
+  EXPECT_THAT(lab.ask(api::EraseProgram{checksum}).reason,
               HasSubstr("gets or erases a program; wait for its end"));
   EXPECT_EQ(lab.wait(put).result, "done");
   const std::int64_t erase = lab.send(api::EraseProgram{"a"});
@@ -132,8 +129,8 @@ TEST(ProgramsKept, OneThatBeginsAtPowerOnIsFollowed) {
   EXPECT_THAT(lab.state_of("hall:1").program, StartsWith("a runs, frame "));
   EXPECT_THAT(lab.state_of("hall:1").program, EndsWith(" repeats, without host"));
   EXPECT_NE(lab.motor("m01").trust, api::Trust::kKnown) << "nobody knows where it began";
-  EXPECT_THAT(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason, HasSubstr("a program of its"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  EXPECT_THAT(lab.ask(Ask::kMoveBy, {"m01"}, {5}).reason, HasSubstr("a program of its"));
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
   const std::size_t made = lab.steps.of(0, 0).size();
   lab.run_for(3);
   EXPECT_EQ(lab.steps.of(0, 0).size(), made);
@@ -160,8 +157,8 @@ TEST(ProgramsKept, AnotherConfigurationStopsItAndErasesIt) {
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   const std::string checksum = lab.entry().checksum;
   EXPECT_EQ(lab.entry().program, "");
-  EXPECT_EQ(lab.wait(lab.send(api::EraseProgram{"ffffffff"})).phase, Answer::kRefused);
-  ASSERT_EQ(lab.wait(lab.send(api::EraseProgram{checksum})).result, "done");
+  EXPECT_EQ(lab.ask(api::EraseProgram{"ffffffff"}).phase, Answer::kRefused);
+  ASSERT_EQ(lab.ask(api::EraseProgram{checksum}).result, "done");
   const std::size_t made = lab.steps.of(0, 0).size();
   lab.cut_power();
   ASSERT_TRUE(lab.is_back());
@@ -175,10 +172,8 @@ TEST(ProgramsKept, IsRefusedWithoutConsentOrMemoryForIt) {
   EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_THAT(refused.reason, HasSubstr("set programs_at_power_on = true in its [[mcu]]"));
   ProgramLab none(hall_with(1, 2, kConsents));
-  const Answer put = none.put("a", "\"m01\"", kThere, "kept = true\n");
-  EXPECT_EQ(put.result, "fault");
-  EXPECT_THAT(put.reason,
-              HasSubstr("keeps no program over a reset; leave kept and at_power_on out"));
+  EXPECT_THAT(none.put("a", "\"m01\"", kThere, "kept = true\n"),
+              Ends("fault", "keeps no program over a reset; leave kept and at_power_on out"));
 }
 
 }  // namespace

@@ -107,11 +107,10 @@ TEST(PseudoAxes, TheExamplesOfTheDocument) {
     // To where the calibrated ones begin.
     if (!example.files.empty()) {
       const auto first = targets_of(example.moves.substr(example.moves.find(':')));
-      ASSERT_EQ(
-          lab.wait(lab.send(to({first.begin(), first.begin() + static_cast<std::ptrdiff_t>(
-                                                                   example.motors().size())})))
-              .result,
-          "reached");
+      ASSERT_EQ(lab.ask(to({first.begin(),
+                            first.begin() + static_cast<std::ptrdiff_t>(example.motors().size())}))
+                    .result,
+                "reached");
     }
     std::istringstream lines(example.moves);
     std::string line;
@@ -120,7 +119,7 @@ TEST(PseudoAxes, TheExamplesOfTheDocument) {
       SCOPED_TRACE(line);
       const auto asked = targets_of(line.substr(0, line.find(':')));
       const auto expected = targets_of(line.substr(line.find(':')));
-      const Answer result = lab.wait(lab.send(to(asked)));
+      const Answer result = lab.ask(to(asked));
       ASSERT_EQ(result.result, "reached") << result.reason;
       lab.run_for(0.2);
       double half_steps = 0;
@@ -149,8 +148,7 @@ const std::string kSlit =
     "kind = \"slit\"\nsoft_limits = [[0, 20], [-10, 10]]\nprecision = 3\n";
 
 TEST(PseudoAxes, AreShownAsTheirMotorsAre) {
-  Lab lab(motors({"left", "right", "beam"}) + kSlit);
-  lab.connect();
+  ReadyLab lab(motors({"left", "right", "beam"}) + kSlit);
   EXPECT_EQ(lab.description("gap").scale.unit, "mm");
   EXPECT_EQ(lab.description("gap").text, "computed from left, right");
   EXPECT_EQ(lab.description("centre").soft_limits, (units::SoftLimits{-10, 10}));
@@ -171,22 +169,21 @@ TEST(PseudoAxes, AreShownAsTheirMotorsAre) {
 }
 
 TEST(PseudoAxes, ResultsNameTheAxesBeforeTheMotors) {
-  Lab lab(motors({"left", "right", "beam"}) + kSlit);
-  lab.connect();
-  const Answer opened = lab.wait(lab.send(to({{"gap", 4.002}})));
+  ReadyLab lab(motors({"left", "right", "beam"}) + kSlit);
+  const Answer opened = lab.ask(to({{"gap", 4.002}}));
   EXPECT_THAT(opened.motors, testing::ElementsAre("gap", "left", "right"));
   EXPECT_THAT(opened.motor_results, testing::Each("reached"));
   // 800.4 steps of each blade are 800.
   EXPECT_THAT(opened.users, testing::ElementsAre(4, -2, 2));
   EXPECT_EQ(opened.position_steps.front(), 4000) << "counts of the last decimal";
-  const Answer both = lab.wait(lab.send(to({{"centre", 0.5}, {"gap", 3}})));
+  const Answer both = lab.ask(to({{"centre", 0.5}, {"gap", 3}}));
   EXPECT_THAT(both.motors, testing::ElementsAre("centre", "gap", "left", "right"));
   EXPECT_THAT(both.users, testing::ElementsAre(0.5, 3, -1, 2));
-  EXPECT_THAT(lab.wait(lab.send(to({{"beam", 1}}))).motors, testing::ElementsAre("beam"));
+  EXPECT_THAT(lab.ask(to({{"beam", 1}})).motors, testing::ElementsAre("beam"));
   // What has been stopped on its way stands somewhere too.
   const auto move = lab.send(to({{"gap", 20}}));
   lab.run_for(0.3);
-  lab.wait(lab.send(api::Stop{{"gap"}}));
+  lab.ask(api::Stop{{"gap"}});
   EXPECT_THAT(lab.last_reply(move).motors, testing::ElementsAre("gap", "left", "right"));
   EXPECT_EQ(lab.last_reply(move).motor_results.front(), "stopped");
   EXPECT_EQ(lab.last_reply(move).users.front(), lab.motor("gap").user);
@@ -200,8 +197,7 @@ TEST(PseudoAxes, AreAsTrustedAsTheLeastTrustedMotor) {
                  "name = \"" + std::string(number == "1" ? "left" : "right") +
                      "\"\nunit = \"mm\"\nsteps_per_unit = 400\n");
   }
-  Lab lab(toml + kSlit);
-  lab.connect();
+  ReadyLab lab(toml + kSlit);
   EXPECT_EQ(lab.motor("gap").trust, api::Trust::kKnown);
   lab.bus(0).reboot(1);
   ASSERT_TRUE(lab.run_until([&] { return lab.motor("right").trust != api::Trust::kKnown; }));
@@ -224,18 +220,17 @@ TEST(PseudoAxes, BeyondItsCalibrationAnAxisIsUncertain) {
   EXPECT_EQ(lab.motor("angle").uncertain_reason, "lift stands beyond the calibration");
   EXPECT_THAT(lab.last_reply(lab.send(to({{"angle", 10.1}}))).reason,
               HasSubstr("angle: 10.1 is beyond the calibration; allowed: 0 to 10"));
-  EXPECT_EQ(lab.wait(lab.send(to({{"angle", 10}}))).result, "reached");
+  EXPECT_EQ(lab.ask(to({{"angle", 10}})).result, "reached");
   lab.run_for(0.2);
   EXPECT_EQ(lab.motor("angle").trust, api::Trust::kKnown);
 }
 
 TEST(PseudoAxes, StopAndPauseAreThoseOfTheMotors) {
-  Lab lab(motors({"left", "right", "beam"}) + kSlit);
-  lab.connect();
+  ReadyLab lab(motors({"left", "right", "beam"}) + kSlit);
   const auto move = lab.send(to({{"gap", 20}}));
   const auto other = lab.send(to({{"beam", 30}}));
   lab.run_for(0.4);
-  ASSERT_EQ(lab.wait(lab.send(api::Pause{{"gap"}})).result, "done");
+  ASSERT_EQ(lab.ask(api::Pause{{"gap"}}).result, "done");
   EXPECT_TRUE(lab.motor("left").paused && lab.motor("right").paused);
   EXPECT_FALSE(lab.motor("beam").paused);
   EXPECT_TRUE(lab.motor("gap").paused);
@@ -245,17 +240,16 @@ TEST(PseudoAxes, StopAndPauseAreThoseOfTheMotors) {
   // The line is kept: both blades have gone as far.
   EXPECT_EQ(lab.motor("left").position_steps, -lab.motor("right").position_steps);
   EXPECT_EQ(lab.motor("centre").user, 0);
-  ASSERT_EQ(lab.wait(lab.send(api::Resume{{"centre"}})).result, "done");
+  ASSERT_EQ(lab.ask(api::Resume{{"centre"}}).result, "done");
   lab.run_for(0.3);
-  EXPECT_EQ(lab.wait(lab.send(api::Stop{{"gap"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Stop{{"gap"}}).result, "done");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   EXPECT_EQ(lab.motor("left").position_steps, -lab.motor("right").position_steps);
   EXPECT_EQ(lab.wait(other).result, "reached");
 }
 
 TEST(PseudoAxes, WhatCannotBeAskedSaysWhatCan) {
-  Lab lab(motors({"left", "right", "beam"}) + kSlit);
-  lab.connect();
+  ReadyLab lab(motors({"left", "right", "beam"}) + kSlit);
   const auto refusal = [&](const api::Request& request) {
     const Answer answer = lab.last_reply(lab.send(request));
     EXPECT_EQ(answer.result, "refused");
@@ -279,20 +273,19 @@ TEST(PseudoAxes, WhatCannotBeAskedSaysWhatCan) {
     EXPECT_EQ(refusal(request).substr(refusal(request).find(" is computed")),
               " is computed from motors left, right; name these");
   }
-  EXPECT_EQ(lab.wait(lab.send(api::Disarm{{"gap"}})).result, "done") << "as a stop";
-  EXPECT_THAT(lab.wait(lab.send(to({{"gap", 0}}))).reason, HasSubstr("left"));
+  EXPECT_EQ(lab.ask(api::Disarm{{"gap"}}).result, "done") << "as a stop";
+  EXPECT_THAT(lab.ask(to({{"gap", 0}})).reason, HasSubstr("left"));
 }
 
 TEST(PseudoAxes, DryRunsAndSpeeds) {
-  Lab lab(motors({"left", "right", "beam"}) + kSlit);
-  lab.connect();
+  ReadyLab lab(motors({"left", "right", "beam"}) + kSlit);
   // Each blade makes half of the way of the gap, at half its speed: 2 mm/s, so 4 mm take 2 s and
   // their ramps.
   api::Move move{.kind = api::Move::Kind::kAbsolute,
                  .motors = {{"gap", api::UserUnits{8}}},
                  .speed = api::Speed{.per_s = 4}};
   const std::int64_t began_us = lab.now_us();
-  EXPECT_EQ(lab.wait(lab.send(move)).result, "reached");
+  EXPECT_EQ(lab.ask(move).result, "reached");
   const double took_s = static_cast<double>(lab.now_us() - began_us) * 1e-6;
   EXPECT_GE(took_s, 2.0);
   // The table starts at 100 steps/s and is at 800 within 0.06 s; a report comes within 0.3 s.
@@ -300,7 +293,7 @@ TEST(PseudoAxes, DryRunsAndSpeeds) {
   move.dry_run = true;
   move.speed.reset();
   move.motors[0].amount = api::UserUnits{0};
-  EXPECT_EQ(lab.wait(lab.send(move)).result, "done");
+  EXPECT_EQ(lab.ask(move).result, "done");
   EXPECT_EQ(lab.motor("gap").user, 8);
 }
 

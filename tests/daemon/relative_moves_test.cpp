@@ -30,7 +30,7 @@ struct RelativeLab : Lab {
     return api::Move{.kind = api::Move::Kind::kAbsolute,
                      .motors = {{"m01", api::UserUnits{position}}}};
   }
-  void reach(const api::Request& request) { EXPECT_EQ(wait(send(request)).result, "reached"); }
+  void reach(const api::Request& request) { EXPECT_EQ(ask(request).result, "reached"); }
   void reach_by(double distance) { reach(by(distance)); }
   void restart() {
     run_for(0.2);
@@ -86,13 +86,12 @@ TEST(RelativeMoves, CountFromWhereItStandsWhenItIsElsewhereOrSet) {
   const std::vector<std::pair<const char*, std::function<void(RelativeLab&)>>> ends{
       {"set",
        [](RelativeLab& lab) {
-         EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {0})).result, "done");
+         EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {0}).result, "done");
        }},
       {"set in mm",
        [](RelativeLab& lab) {
-         EXPECT_EQ(
-             lab.wait(lab.send(api::SetPosition{.motors = {{"m01", api::UserUnits{7}}}})).result,
-             "done");
+         EXPECT_EQ(lab.ask(api::SetPosition{.motors = {{"m01", api::UserUnits{7}}}}).result,
+                   "done");
        }},
       {"jog",
        [](RelativeLab& lab) {
@@ -106,7 +105,7 @@ TEST(RelativeMoves, CountFromWhereItStandsWhenItIsElsewhereOrSet) {
        [](RelativeLab& lab) {
          const auto move = lab.send(RelativeLab::by(200));
          lab.run_for(0.5);
-         lab.wait(lab.send(Ask::kStop, {"m01"}));
+         lab.ask(Ask::kStop, {"m01"});
          EXPECT_EQ(lab.last_reply(move).result, "stopped");
          const std::int64_t stands = lab.shaft_steps("m01");
          lab.reach_by(0.04);

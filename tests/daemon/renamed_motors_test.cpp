@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/lab.h"
+#include "daemon/kept_lab.h"
 
 namespace bushd::test {
 namespace {
@@ -16,45 +16,24 @@ std::string with(std::string toml, const std::string& from, const std::string& t
   return toml.replace(at, from.size(), to);
 }
 
-struct RenamedLab : Lab {
+struct RenamedLab : KeptLab {
   RenamedLab() : RenamedLab(hall(1, 2)) {}
-  explicit RenamedLab(const std::string& text) : Lab(text), toml(text) {
-    keep_positions();
-    connect();
+  explicit RenamedLab(const std::string& text) : KeptLab(text), toml(text) {
     reach("m01", 300);
     reach("m02", -70);
     run_for(0.2);
-  }
-  void reach(const std::string& motor, std::int64_t steps) {
-    EXPECT_EQ(wait(send(Ask::kMoveBy, {motor}, {steps})).result, "reached");
   }
   void use(const std::string& text) {
     use_configuration(text);
     reconnect();
   }
-  void reconnect() {
-    run_for(0.1);
-    ASSERT_TRUE(run_until([this] { return all_ready(); }, 20));
-    run_for(1);
-  }
-  void cut_all_power() {
-    bus(0).reboot(0);
-    cut_pc_power();
-    reconnect();
-  }
   void expect_uncertain(const std::string& name, const std::string& why) {
     EXPECT_EQ(motor(name).trust, api::Trust::kUncertain);
     EXPECT_EQ(motor(name).position_steps, shaft_steps(name)) << "what people may confirm";
-    const Answer answer = wait(send(Ask::kMoveBy, {name}, {10}));
-    EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, HasSubstr(why));
-  }
-  void expect_trusted(const std::string& name, api::Trust trust) {
-    EXPECT_EQ(motor(name).trust, trust) << motor(name).uncertain_reason;
-    EXPECT_EQ(motor(name).position_steps, shaft_steps(name));
+    expect_refused(name, why);
   }
   void confirm(const std::string& name) {
-    EXPECT_EQ(wait(send(api::Confirm{{name}})).result, "done");
+    EXPECT_EQ(ask(api::Confirm{{name}}).result, "done");
     run_for(0.2);
   }
   std::string toml;
@@ -70,12 +49,12 @@ TEST(RenamedMotors, HaveThePositionOfTheirOutputAndPeopleSayWhetherItIsTheirs) {
     if (power_cut) lab.cut_all_power();
     lab.expect_uncertain("other",
                          "output 0 of MCU hall:1 was motor \"m01\" before; last known: 300");
-    lab.expect_trusted("m02", power_cut ? api::Trust::kRestored : api::Trust::kKnown);
+    lab.expect_at_shaft("m02", power_cut ? api::Trust::kRestored : api::Trust::kKnown);
     lab.confirm("other");
     lab.reach("other", 10);
     lab.run_for(0.2);
     lab.cut_all_power();
-    lab.expect_trusted("other", api::Trust::kRestored);
+    lab.expect_at_shaft("other", api::Trust::kRestored);
   }
 }
 
@@ -94,13 +73,11 @@ TEST(RenamedMotors, FindWhatMovedMeanwhileWhenTheirNameComesBack) {
     EXPECT_EQ(lab.shaft_steps("m01"), 540);
     lab.expect_uncertain("m01", "");
     // It stays so until somebody says where it stands.
-    lab.restart_daemon();
-    lab.reconnect();
+    lab.go_on_with_next_daemon();
     lab.expect_uncertain("m01", "");
     lab.confirm("m01");
-    lab.restart_daemon();
-    lab.reconnect();
-    lab.expect_trusted("m01", api::Trust::kKnown);
+    lab.go_on_with_next_daemon();
+    lab.expect_at_shaft("m01", api::Trust::kKnown);
   }
 }
 
@@ -108,7 +85,7 @@ TEST(RenamedMotors, FindWhatMovedMeanwhileWhenTheirNameComesBack) {
 TEST(RenamedMotors, DoNotBelieveACounterThatAnotherNameHasSet) {
   RenamedLab lab;
   lab.use(with(lab.toml, kM01, kOther));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"other"}, {0})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"other"}, {0}).result, "done");
   lab.run_for(0.2);
   lab.use(lab.toml);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
@@ -142,7 +119,7 @@ TEST(RenamedMotors, ThatChangePlacesAreUncertainThereAndBack) {
   lab.reach("m01", 10);
   lab.run_for(0.2);
   lab.cut_all_power();
-  lab.expect_trusted("m01", api::Trust::kRestored);
+  lab.expect_at_shaft("m01", api::Trust::kRestored);
   lab.use(lab.toml);
   lab.expect_uncertain("m01", "");
   lab.expect_uncertain("m02", "");
@@ -157,7 +134,7 @@ TEST(RenamedMotors, AreAsGoodAsBeforeWhenTheNameIsTakenBackBeforeTheyHaveMoved) 
     lab.expect_uncertain("other", "");
     lab.use(lab.toml);
     if ((cuts & 2) != 0) lab.cut_all_power();
-    lab.expect_trusted("m01", cuts == 0 ? api::Trust::kKnown : api::Trust::kRestored);
+    lab.expect_at_shaft("m01", cuts == 0 ? api::Trust::kKnown : api::Trust::kRestored);
   }
 }
 
@@ -166,11 +143,11 @@ TEST(RenamedMotors, OfWhichNothingIsKnownMayMoveAsBefore) {
   Lab lab(hall(1, 1));
   lab.keep_positions();
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {100}).result, "reached");
   lab.run_for(0.2);
   lab.use_configuration(with(hall(1, 1), kM01, kOther));
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"other"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"other"}, {100}).result, "reached");
   EXPECT_EQ(lab.motor("other").position_steps, 200);
 }
 
@@ -186,19 +163,18 @@ TEST(RenamedMotors, AreAsGoodAsBeforeWhenAScaleIsTakenBackBeforeTheyHaveMoved) {
     lab.use(scaled("200"));
     lab.expect_uncertain("m01", "its steps_per_unit was changed from 100 to 200");
     if ((cuts & 1) != 0) lab.cut_all_power();
-    lab.restart_daemon();
-    lab.reconnect();
+    lab.go_on_with_next_daemon();
     lab.expect_uncertain("m01", "its steps_per_unit was changed from 100 to 200");
     if ((cuts & 2) != 0) lab.cut_all_power();
     lab.use(scaled("100"));
-    lab.expect_trusted("m01", cuts == 0 ? api::Trust::kKnown : api::Trust::kRestored);
+    lab.expect_at_shaft("m01", cuts == 0 ? api::Trust::kKnown : api::Trust::kRestored);
   }
 }
 
 TEST(RenamedMotors, AreUncertainWhenAScaleIsTakenBackAfterTheyHaveMoved) {
   RenamedLab lab(scaled("100"));
   lab.use(scaled("200"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {600})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {600}).result, "done");
   lab.reach("m01", 10);
   lab.reach("m01", -10);
   lab.run_for(0.2);
@@ -207,8 +183,7 @@ TEST(RenamedMotors, AreUncertainWhenAScaleIsTakenBackAfterTheyHaveMoved) {
   EXPECT_THAT(lab.motor("m01").uncertain_reason,
               HasSubstr("its steps_per_unit was changed from 200 to 100"));
   // Nothing that was said of the first change.
-  lab.restart_daemon();
-  lab.reconnect();
+  lab.go_on_with_next_daemon();
   EXPECT_THAT(lab.motor("m01").uncertain_reason,
               HasSubstr("its steps_per_unit was changed from 200 to 100"));
 }

@@ -37,7 +37,7 @@ TEST_P(OnTheBus, ShippedTablesMoveTheirMotorsWithoutLosingSteps) {
   const std::int64_t both = table->view().accel.count + table->view().decel.count;
   for (const std::int64_t steps : {both / 4, -both / 2, both + 500}) {
     to += steps;
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {steps})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {steps}).result, "reached");
   }
   lab.run_for(0.2);
   EXPECT_EQ(plant.position_steps(0, 0), to);

@@ -139,7 +139,7 @@ TEST(SerialLines, StopEndsItOnTheLine) {
     const auto line = lab.line({"a", "b"}, steps);
     lab.run_for(after_s);
     const std::uint64_t before = lab.drive(0).steps();
-    EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"b"})).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kStop, {"b"}).result, "done");
     const Answer answer = lab.last_reply(line);
     EXPECT_EQ(answer.result, "stopped") << answer.reason;
     lab.expect_line_of(steps, Table::skew_ms(answer));
@@ -155,11 +155,11 @@ TEST(SerialLines, PauseSpeedAndAnotherEnd) {
   const std::vector<std::int64_t> steps = {4000, 2999};
   const auto first = lab.line({"a", "b"}, steps);
   lab.run_for(0.5);
-  lab.wait(lab.send(api::Pause{{"a"}}));
+  lab.ask(api::Pause{{"a"}});
   lab.run_for(0.5);
   EXPECT_EQ(lab.motor("a").velocity_steps_per_s, 0);
   lab.expect_on_line(steps);
-  lab.wait(lab.send(api::Resume{{"a"}}));
+  lab.ask(api::Resume{{"a"}});
   lab.run_for(0.4);
   // a at 3000: b where the line leads then.
   const std::int64_t b = (2999 * (2 * 3000 - 1) + 4000) / (2 * 4000);
@@ -227,7 +227,7 @@ TEST(SerialLines, LossOfOnePortBeforeItBegins) {
     lab.wait(line);
     EXPECT_EQ(lab.motor("b").position_steps, lab.drive(1).position_steps());
     EXPECT_LE(lab.drive(1).steps(), 20u);
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"b"}, {10})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"b"}, {10}).result, "reached");
   }
 }
 
@@ -261,8 +261,7 @@ TEST(SerialLines, AStalledDriverHoldsTheOtherOneBack) {
 TEST(SerialLines, LastApproachesForBacklash) {
   Whole lab(2, ports(2, "backlash = 20\nbacklash_speed = 300\n"));
   lab.connect();
-  const Answer answer = lab.wait(lab.line({"a", "b"}, {-500, -200}));
-  EXPECT_EQ(answer.result, "reached") << answer.reason;
+  EXPECT_THAT(lab.wait(lab.line({"a", "b"}, {-500, -200})), Ends("reached"));
   EXPECT_EQ(lab.drive(0).position_steps(), -500);
   EXPECT_EQ(lab.drive(1).position_steps(), -200);
   EXPECT_EQ(lab.drive(0).steps(), 540u);
@@ -275,7 +274,7 @@ TEST(SerialLines, EmergencyStopRampsAllDown) {
   lab.connect();
   const auto line = lab.line({"a", "b"}, {4000, -3000});
   lab.run_for(0.8);
-  lab.wait(lab.send(Ask::kEmergencyStop, {}));
+  lab.ask(Ask::kEmergencyStop, {});
   EXPECT_EQ(lab.wait(line).result, "stopped");
   for (const std::size_t i : {0u, 1u}) {
     lab.expect_table(lab.times(i));
@@ -287,10 +286,9 @@ TEST(SerialLines, EmergencyStopRampsAllDown) {
 TEST(SerialLines, DryRunMovesNothing) {
   Whole lab;
   lab.connect();
-  const Answer answer =
-      lab.wait(lab.send(api::MoveLine{.kind = api::Move::Kind::kRelative,
-                                      .motors = motor_steps({"a", "b"}, {1000, 300}),
-                                      .dry_run = true}));
+  const Answer answer = lab.ask(api::MoveLine{.kind = api::Move::Kind::kRelative,
+                                              .motors = motor_steps({"a", "b"}, {1000, 300}),
+                                              .dry_run = true});
   ASSERT_TRUE(answer.plan) << answer.reason;
   EXPECT_EQ(answer.plan->motors.size(), 2u);
   EXPECT_EQ(answer.plan->motors[1].steps, 300);
@@ -307,7 +305,7 @@ TEST(SerialLines, RefusesWhatCannotBe) {
   Table mixed(2, hall_too);
   mixed.connect();
   const auto refused = [](Lab& lab, const api::Request& request, const std::string& why) {
-    const Answer answer = lab.wait(lab.send(request));
+    const Answer answer = lab.ask(request);
     EXPECT_EQ(answer.result, "refused") << answer.reason;
     EXPECT_NE(answer.reason.find(why), std::string::npos) << answer.reason;
   };
@@ -331,7 +329,7 @@ TEST(SerialLines, RefusesWhatCannotBe) {
 TEST(SerialLines, MotorsOfOneMoveEachByTheirOwnRunAreNoLine) {
   Whole lab;
   lab.connect();
-  const Answer answer = lab.wait(lab.send(Ask::kMoveBy, {"a", "b"}, {500, 200}));
+  const Answer answer = lab.ask(Ask::kMoveBy, {"a", "b"}, {500, 200});
   EXPECT_EQ(answer.result, "reached");
   EXPECT_EQ(answer.reason.find("apart"), std::string::npos) << answer.reason;
 }
@@ -375,7 +373,7 @@ TEST(SerialLines, CountsEveryStepOfADayOfOrders) {
     if (below(12) == 0) lab.pause_daemon(0.001 * below(200));
   }
   lab.run_for(20);
-  lab.wait(lab.send(Ask::kStop, {"a", "b", "c"}));
+  lab.ask(Ask::kStop, {"a", "b", "c"});
   lab.run_for(1);
   for (std::size_t i = 0; i < 3; ++i) {
     const std::string name(1, static_cast<char>('a' + i));

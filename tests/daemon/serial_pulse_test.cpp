@@ -21,7 +21,8 @@ struct Desk : PulseLab {
     for (std::size_t i = 1; i < made.size(); ++i) all.push_back(made[i] - made[i - 1]);
     return all;
   }
-  Answer ask(Ask what, std::int64_t steps) { return wait(send(what, {"m"}, {steps})); }
+  using PulseLab::ask;
+  Answer ask(Ask what, std::int64_t steps) { return ask(what, {"m"}, {steps}); }
   // Steps from `from` on are one run from rest to rest.
   void expect_run(std::size_t from, std::size_t steps) {
     const auto made = times(0, from);
@@ -55,11 +56,13 @@ struct Desk : PulseLab {
   }
 };
 
+struct ReadyDesk : Desk {
+  explicit ReadyDesk(const std::string& toml = port()) : Desk(toml) { connect(); }
+};
+
 TEST(SerialPulse, MovesByItsTable) {
-  Desk lab;
-  lab.connect();
-  const Answer answer = lab.ask(Ask::kMoveBy, 1003);
-  EXPECT_EQ(answer.result, "reached") << answer.reason;
+  ReadyDesk lab;
+  EXPECT_THAT(lab.ask(Ask::kMoveBy, 1003), Ends("reached"));
   lab.expect_settled(1003);
   lab.expect_run(0, 1003);
   EXPECT_EQ(lab.motor("m").trust, api::Trust::kKnown);
@@ -71,8 +74,7 @@ TEST(SerialPulse, MovesByItsTable) {
 // Not longer than what a change of rate and the bytes between cost: the bound is that of the
 // planner's own test for such a table.
 TEST(SerialPulse, TakesHardlyLongerThanItsTable) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   lab.ask(Ask::kMoveBy, 4000);
   const auto all = pulse_codes();
   const std::int64_t ramps = 2 * std::accumulate(all.begin(), all.end(), std::int64_t{0});
@@ -86,8 +88,7 @@ TEST(SerialPulse, TakesHardlyLongerThanItsTable) {
 }
 
 TEST(SerialPulse, EveryNumberOfStepsIsExact) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   std::int64_t position = 0;
   std::size_t made = 0;
   for (int steps = 1; steps <= 24; ++steps) {
@@ -101,8 +102,7 @@ TEST(SerialPulse, EveryNumberOfStepsIsExact) {
 }
 
 TEST(SerialPulse, StopsAlongItsRamp) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto move = lab.send(Ask::kMoveBy, {"m"}, {5000});
   lab.run_for(1.0);
   const std::uint64_t before = lab.it().steps();
@@ -120,8 +120,7 @@ TEST(SerialPulse, StopsAlongItsRamp) {
 // What the driver still has has not been made, and no more is written on top of it: the ramp-down
 // comes behind 20 ms of bytes, however long the driver stood.
 TEST(SerialPulse, AStalledDriverIsNotCountedOn) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto move = lab.send(Ask::kMoveBy, {"m"}, {8000});
   lab.run_for(1.5);
   lab.stall_pulses(true);
@@ -140,8 +139,7 @@ TEST(SerialPulse, AStalledDriverIsNotCountedOn) {
 
 // A daemon was killed, and what it had written leaves later.
 TEST(SerialPulse, WhatAnEarlierDaemonHasLeftInTheDriverIsWaitedFor) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   lab.send(Ask::kMoveBy, {"m"}, {8000});
   lab.run_for(1.5);
   lab.stall_pulses(true);
@@ -155,8 +153,7 @@ TEST(SerialPulse, WhatAnEarlierDaemonHasLeftInTheDriverIsWaitedFor) {
 }
 
 TEST(SerialPulse, TakesAnotherTarget) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto first = lab.send(Ask::kMoveTo, {"m"}, {3000});
   lab.run_for(0.8);
   EXPECT_EQ(lab.ask(Ask::kMoveTo, 3500).result, "reached");
@@ -170,12 +167,11 @@ TEST(SerialPulse, TakesAnotherTarget) {
 }
 
 TEST(SerialPulse, JogsUntilItsClientLetsGo) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto jog = lab.send(api::Jog{.motor = "m", .per_s = -1000, .in_steps = true});
   lab.run_for(0.5);
   EXPECT_LT(lab.it().position_steps(), -50);
-  lab.wait(lab.send(api::Jog{.motor = "m", .per_s = 0, .in_steps = true}));
+  lab.ask(api::Jog{.motor = "m", .per_s = 0, .in_steps = true});
   EXPECT_TRUE(lab.run_until([&] { return lab.has_result(jog); }, 5));
   lab.run_for(0.1);
   lab.expect_one_run();
@@ -183,11 +179,9 @@ TEST(SerialPulse, JogsUntilItsClientLetsGo) {
 
 TEST(SerialPulse, LimitStopsIt) {
   for (const bool immediate : {false, true}) {
-    Desk lab(port(immediate ? "limit_action = \"immediate\"\n" : ""));
-    lab.connect();
+    ReadyDesk lab(port(immediate ? "limit_action = \"immediate\"\n" : ""));
     lab.it().attach_switch(1, {.at_steps = 1200, .positive_end = true});
-    const Answer answer = lab.ask(Ask::kMoveBy, 4000);
-    EXPECT_EQ(answer.result, "limit") << answer.reason;
+    EXPECT_THAT(lab.ask(Ask::kMoveBy, 4000), Ends("limit"));
     const std::int64_t position = lab.it().position_steps();
     lab.expect_settled(position);
     EXPECT_GE(position, 1200);
@@ -219,8 +213,7 @@ TEST(SerialPulse, HomesToTheStep) {
 }
 
 TEST(SerialPulse, HomingLooksBehindALimitAndGivesUp) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   lab.it().attach_switch(2, {.at_steps = -300});
   lab.it().attach_switch(0, {.at_steps = 400, .positive_end = true, .width_steps = 200});
   EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m"}), 200).result, "reached");
@@ -230,8 +223,7 @@ TEST(SerialPulse, HomingLooksBehindALimitAndGivesUp) {
 }
 
 TEST(SerialPulse, PortLostInMotionIsTold) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto move = lab.send(Ask::kMoveBy, {"m"}, {5000});
   lab.run_for(1.0);
   lab.unplug(0);
@@ -242,15 +234,14 @@ TEST(SerialPulse, PortLostInMotionIsTold) {
   EXPECT_NE(reason.find(" steps were under way: as many may be missing"), std::string::npos)
       << reason;
   EXPECT_LE(lab.most_missing(), 2 * 50 + 5);
-  lab.wait(lab.send(Ask::kSetPosition, {"m"}, {0}));
+  lab.ask(Ask::kSetPosition, {"m"}, {0});
   const std::int64_t from = lab.it().position_steps();
   EXPECT_EQ(lab.ask(Ask::kMoveTo, 50).result, "reached");
   EXPECT_EQ(lab.it().position_steps(), from + 50);
 }
 
 TEST(SerialPulse, PortLostAtRestLosesNothing) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   lab.ask(Ask::kMoveBy, 321);
   lab.unplug(0);
   lab.run_for(0.5);
@@ -262,8 +253,7 @@ TEST(SerialPulse, PortLostAtRestLosesNothing) {
 
 // Homing is none of the plan's: its ticks have gone on meanwhile, and go on.
 TEST(SerialPulse, PortLostWhileHomingDelaysNothingAfterwards) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   lab.ask(Ask::kMoveBy, 321);
   lab.run_for(10);
   const auto home = lab.send(Ask::kHome, {"m"});
@@ -272,14 +262,13 @@ TEST(SerialPulse, PortLostWhileHomingDelaysNothingAfterwards) {
   lab.wait(home);
   lab.plug(0);
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 2));
-  lab.wait(lab.send(Ask::kSetPosition, {"m"}, {0}));
+  lab.ask(Ask::kSetPosition, {"m"}, {0});
   EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m"}, {50}), 2).result, "reached");
 }
 
 // This program stood still as the port was lost: nobody knows whether what was under way has left.
 TEST(SerialPulse, PortLostWhileTheDaemonStandsStillIsUncertain) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   lab.send(Ask::kMoveBy, {"m"}, {5000});
   lab.run_for(1.0);
   const std::int64_t before = lab.it().position_steps();
@@ -293,15 +282,14 @@ TEST(SerialPulse, PortLostWhileTheDaemonStandsStillIsUncertain) {
 }
 
 TEST(SerialPulse, EmergencyStopLatchesUntilCleared) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto move = lab.send(Ask::kMoveBy, {"m"}, {5000});
   lab.run_for(0.7);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kEmergencyStop, {}).result, "done");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   lab.expect_one_run();
   EXPECT_EQ(lab.ask(Ask::kMoveBy, 10).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {"m"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {"m"}).result, "done");
   EXPECT_EQ(lab.ask(Ask::kMoveBy, 10).result, "reached");
 }
 
@@ -321,8 +309,7 @@ TEST(SerialPulse, ServesDriversThatCanLess) {
 }
 
 TEST(SerialPulse, SlowSpeedsWaitBetweenBytes) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto move = lab.send(api::Move{.kind = api::Move::Kind::kRelative,
                                        .motors = motor_steps({"m"}, {4}),
                                        .speed = api::Speed{.per_s = 2, .in_steps = true}});
@@ -335,8 +322,7 @@ TEST(SerialPulse, SlowSpeedsWaitBetweenBytes) {
 }
 
 TEST(SerialPulse, TellsPausesAmidBytes) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   EXPECT_EQ(lab.ask(Ask::kMoveBy, 1000).result, "reached");
   EXPECT_EQ(lab.state_of("com1").detail, "");
   const auto move = lab.send(Ask::kMoveBy, {"m"}, {4000});
@@ -351,20 +337,18 @@ TEST(SerialPulse, TellsPausesAmidBytes) {
 }
 
 TEST(SerialPulse, HomingStopsOnRequest) {
-  Desk lab;
-  lab.connect();
+  ReadyDesk lab;
   const auto home = lab.send(Ask::kHome, {"m"});
   lab.run_for(0.8);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m"}).result, "done");
   EXPECT_EQ(lab.last_reply(home).result, "stopped");
   lab.run_for(0.1);
   lab.expect_one_run();
 }
 
 TEST(SerialPulse, HasNoDriverToDisable) {
-  Desk lab;
-  lab.connect();
-  EXPECT_NE(lab.wait(lab.send(Ask::kDisable, {"m"})).result, "done");
+  ReadyDesk lab;
+  EXPECT_NE(lab.ask(Ask::kDisable, {"m"}).result, "done");
   EXPECT_EQ(lab.ask(Ask::kMoveBy, 5).result, "reached");
 }
 
@@ -416,7 +400,7 @@ TEST(SerialPulse, CountsEveryStepOfADayOfOrders) {
     lab.run_for(0.001 * below(900));
     if (below(12) == 0) lab.pause_daemon(0.001 * below(200));
   }
-  lab.wait(lab.send(Ask::kStop, {"m"}));
+  lab.ask(Ask::kStop, {"m"});
   lab.run_for(1);
   lab.expect_settled(lab.it().position_steps());
   EXPECT_EQ(lab.motor("m").trust, api::Trust::kKnown) << lab.motor("m").uncertain_reason;

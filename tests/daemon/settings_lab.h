@@ -14,8 +14,7 @@ namespace bushd::test {
 
 // m01 has a unit, m02 has none.
 inline std::string blade(const std::string& keys = "offset = 10\nsoft_limits = [-5, 5.5]\n") {
-  std::string toml = hall(1, 2);
-  return toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n" + keys);
+  return with_keys(hall(1, 2), "m01", "unit = \"mm\"\nsteps_per_unit = 400\n" + keys);
 }
 
 struct SettingsLab : Lab {
@@ -26,7 +25,6 @@ struct SettingsLab : Lab {
   static api::Request changes(std::vector<api::Configure::Change> changes) {
     return api::Configure{.kind = api::Configure::Kind::kChange, .changes = std::move(changes)};
   }
-  Answer ask(const api::Request& request) { return wait(send(request)); }
   Answer change(const std::string& motor, const std::string& key, const std::string& value) {
     return ask(changes({{motor, key, value}}));
   }
@@ -38,27 +36,23 @@ struct SettingsLab : Lab {
   void expect_done(const std::string& motor, const std::string& key, const std::string& value) {
     expect_done(changes({{motor, key, value}}));
   }
-  void expect_done(const api::Request& request) {
-    const Answer answer = ask(request);
-    EXPECT_EQ(answer.result, "done") << answer.reason;
-  }
+  void expect_done(const api::Request& request) { EXPECT_THAT(ask(request), Ends("done")); }
   void expect_refused(const Answer& answer, const std::string& why) {
-    EXPECT_EQ(answer.result, "refused");
-    EXPECT_THAT(answer.reason, testing::HasSubstr(why));
+    EXPECT_THAT(answer, Ends("refused", why));
   }
   void expect_refused(const std::string& motor, const std::string& key, const std::string& value,
                       const std::string& why) {
     expect_refused(change(motor, key, value), why);
   }
   Answer move_by(const std::string& motor, std::int64_t steps) {
-    return wait(send(Ask::kMoveBy, {motor}, {steps}));
+    return ask(Ask::kMoveBy, {motor}, {steps});
   }
   void expect_reached(const Answer& answer) {
     EXPECT_EQ(answer.result, "reached") << answer.reason;
   }
   // To a dial position, in steps.
   void move_to(const std::string& motor, std::int64_t steps) {
-    expect_reached(wait(send(Ask::kMoveTo, {motor}, {steps})));
+    expect_reached(ask(Ask::kMoveTo, {motor}, {steps}));
   }
   std::vector<api::PastMotion> past(const std::string& motor, std::int32_t most) {
     const auto number = send(api::GetHistory{.motor = motor, .most = most});

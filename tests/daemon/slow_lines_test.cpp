@@ -32,8 +32,7 @@ TEST_P(SlowLines, AStopOfAllMotorsIsMadeAndTheBusIsNotSilent) {
   const Line& line = GetParam();
   for (int phase_ms = 0; phase_ms < 50; phase_ms += 7) {
     SCOPED_TRACE(phase_ms);
-    Lab lab(slow_hall(line.baud, line.tick_us, line.motors, line.manner));
-    lab.connect();
+    ReadyLab lab(slow_hall(line.baud, line.tick_us, line.motors, line.manner));
     std::vector<std::string> motors;
     for (int m = 1; m <= line.motors; ++m) motors.push_back("m0" + std::to_string(m));
     const std::int64_t move =

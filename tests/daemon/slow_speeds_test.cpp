@@ -43,8 +43,7 @@ INSTANTIATE_TEST_SUITE_P(Manners, SlowSpeeds,
                          [](const auto& manner) { return std::string(manner.param); });
 
 TEST_P(SlowSpeeds, MovesAndTheirChangesAreOnTheEdge) {
-  Lab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
   const std::int64_t begin_us = lab.now_us();
   expect(lab, lab.send(moved({"m01", "m03"}, {3, -2}, 2)));
   EXPECT_GT(lab.now_us() - begin_us, 1'500'000);
@@ -75,8 +74,7 @@ TEST_P(SlowSpeeds, MovesAndTheirChangesAreOnTheEdge) {
 }
 
 TEST_P(SlowSpeeds, LinesAreOnTheEdge) {
-  Lab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
   const std::vector<std::string> motors{"m01", "m02", "m03"};
   api::MoveLine line{.motors = motor_steps(motors, {9, -4, 6})};
   line.speed = api::Speed{.per_s = 5, .in_steps = true};
@@ -93,8 +91,7 @@ TEST_P(SlowSpeeds, LinesAreOnTheEdge) {
 }
 
 TEST_P(SlowSpeeds, PathsAreOnTheEdge) {
-  Lab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
   api::MovePath path{.motors = {"m01", "m03"}, .rows = 3, .positions = {5, 2, 8, 8, 3, 0}};
   path.speed = api::Speed{.per_s = 6, .in_steps = true};
   expect(lab, lab.send(path));
@@ -104,8 +101,7 @@ TEST_P(SlowSpeeds, PathsAreOnTheEdge) {
 
 // A ramp-down makes no step that is more than half a second away.
 TEST_P(SlowSpeeds, AStopWaitsForHalfASecondAtMost) {
-  Lab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam(), "glacier"), kNanoseconds, vcd_.get());
   for (const bool waits : {true, false}) {
     const std::int64_t from = lab.shaft_steps("m01");
     const auto move = lab.send(moved({"m01"}, {50}, 0.5));
@@ -126,8 +122,7 @@ TEST_P(SlowSpeeds, AnEmergencyAndSilenceMakeNoStepThatIsFarAway) {
   // Bytes of a coarse stream tell no parts of a step: the MCU may make the one that it is in.
   const int unseen = std::string(GetParam()) == "coarse" ? 1 : 0;
   for (const bool silence : {false, true}) {
-    Lab lab(hall(1, 1, GetParam(), "glacier"), kNanoseconds);
-    lab.connect();
+    ReadyLab lab(hall(1, 1, GetParam(), "glacier"), kNanoseconds);
     lab.send(moved({"m01"}, {50}, 0.1));
     EXPECT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") == 1; }));
     lab.run_for(4);
@@ -145,9 +140,7 @@ TEST_P(SlowSpeeds, AnEmergencyAndSilenceMakeNoStepThatIsFarAway) {
 TEST(SlowRuns, HomingIsAsSlowAsAsked) {
   const std::string home =
       "home = { direction = \"negative\", position_steps = 0, most_steps = 60 }\n";
-  std::string toml = hall(1, 1, "fine", "glacier");
-  toml.insert(toml.find("output = 0\n") + 11, home);
-  Lab lab(toml, kNanoseconds);
+  Lab lab(with_keys(hall(1, 1, "fine", "glacier"), "m01", home), kNanoseconds);
   lab.bus(0).mcu(0).attach_switch(0, {.at_steps = -4, .hysteresis_steps = 1});
   lab.connect();
   const std::int64_t begin_us = lab.now_us();
@@ -160,8 +153,7 @@ TEST(SlowRuns, HomingIsAsSlowAsAsked) {
 }
 
 TEST(SlowRuns, AnEdgeStartsThemExactToASlot) {
-  Lab lab(hall(1, 2, "fine_table", "glacier"), kNanoseconds);
-  lab.connect();
+  ReadyLab lab(hall(1, 2, "fine_table", "glacier"), kNanoseconds);
   const auto armed = lab.send(api::Arm{.edge = api::Edge::kRising,
                                        .delay_us = 1000,
                                        .motors = motor_steps({"m01", "m02"}, {3, -2}),
@@ -182,14 +174,12 @@ TEST(SlowRuns, AnEdgeStartsThemExactToASlot) {
 TEST(SlowRuns, AnMcuWithoutThemStreams) {
   const std::string home =
       "home = { direction = \"negative\", position_steps = 0, most_steps = 60 }\n";
-  std::string toml = hall(1, 1, "fine_table", "glacier");
-  toml.insert(toml.find("output = 0\n") + 11, home);
-  Lab lab(toml, kNanoseconds, nullptr, BUSHD_CAN_SLOW_RUNS);
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(moved({"m01"}, {3}, 2))).result, "reached");
+  ReadyLab lab(with_keys(hall(1, 1, "fine_table", "glacier"), "m01", home), kNanoseconds, nullptr,
+               BUSHD_CAN_SLOW_RUNS);
+  EXPECT_EQ(lab.ask(moved({"m01"}, {3}, 2)).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 3);
   const api::Speed slow{.per_s = 2, .in_steps = true};
-  const Answer homed = lab.wait(lab.send(api::Home{{"m01"}, slow}));
+  const Answer homed = lab.ask(api::Home{{"m01"}, slow});
   EXPECT_THAT(homed.reason, HasSubstr("m01: MCU hall:1 cannot home it so slowly; ask for 762.951 "
                                       "steps/s or more"));
   const Answer armed = lab.wait(
@@ -209,7 +199,7 @@ TEST(SlowRuns, AStepAnHourIsMadeWhenTheHourIsOver) {
     const Answer result = lab.wait(move);
     EXPECT_EQ(result.result, "reached") << result.reason;
     EXPECT_EQ(lab.shaft_steps("m01"), 1) << manner;
-    const Answer slower = lab.wait(lab.send(moved({"m01"}, {1}, 1.0 / 3601)));
+    const Answer slower = lab.ask(moved({"m01"}, {1}, 1.0 / 3601));
     EXPECT_THAT(slower.reason, HasSubstr("allowed: up to an hour a step"));
   }
 }

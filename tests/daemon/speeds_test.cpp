@@ -14,9 +14,7 @@ using testing::HasSubstr;
 
 // Two motors on one MCU by a table of 40 us: 100 to 2500 steps/s. `keys` are of m01.
 std::string lab_with(const std::string& keys, const char* manner = "fine") {
-  std::string toml = hall(1, 2, manner);
-  const std::string motor = "output = 0\n";
-  return toml.insert(toml.find(motor) + motor.size(), keys);
+  return with_keys(hall(1, 2, manner), "m01", keys);
 }
 
 api::Move by(std::int64_t steps, double per_s, bool in_steps = true) {
@@ -43,8 +41,7 @@ TEST(Speeds, AMoveIsNotFasterThanAskedInAnyManner) {
   for (const char* manner :
        {"fine", "coarse", "fine_table", "coarse_table", "fine_ticks", "coarse_ticks"}) {
     SCOPED_TRACE(manner);
-    Lab lab(lab_with("", manner));
-    lab.connect();
+    ReadyLab lab(lab_with("", manner));
     const auto move = lab.send(by(1500, 700));
     // 35.7 units of 40 us, rounded up to 36.
     EXPECT_DOUBLE_EQ(fastest(lab, move), 1e9 / (36 * 40'000.0));
@@ -56,19 +53,17 @@ TEST(Speeds, AMoveIsNotFasterThanAskedInAnyManner) {
 }
 
 TEST(Speeds, ADryRunTellsThePeakAndTheTimeOfTheMove) {
-  Lab lab(lab_with(""));
-  lab.connect();
+  ReadyLab lab(lab_with(""));
   api::Move move = by(1500, 500);
   move.dry_run = true;
-  const Answer planned = lab.wait(lab.send(move));
+  const Answer planned = lab.ask(move);
   ASSERT_TRUE(planned.plan);
   EXPECT_DOUBLE_EQ(planned.plan->motors[0].peak_steps_per_s, 500);
   EXPECT_GT(planned.plan->duration_us, 3'000'000);
 }
 
 TEST(Speeds, MaxSpeedHoldsForEveryMoveInTheMotorsUnit) {
-  Lab lab(lab_with("unit = \"mm\"\nsteps_per_unit = 400\nmax_speed = 1.25\n"));
-  lab.connect();
+  ReadyLab lab(lab_with("unit = \"mm\"\nsteps_per_unit = 400\nmax_speed = 1.25\n"));
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {800});
   EXPECT_DOUBLE_EQ(fastest(lab, move), 500);
   EXPECT_DOUBLE_EQ(fastest(lab, lab.send(by(800, 2, false))), 500) << "max_speed is slower";
@@ -76,14 +71,12 @@ TEST(Speeds, MaxSpeedHoldsForEveryMoveInTheMotorsUnit) {
 }
 
 TEST(Speeds, ASpeedThatNoStepCanHaveIsRefusedWithItsFigure) {
-  Lab lab(lab_with("unit = \"mm\"\nsteps_per_unit = 400\n"));
-  lab.connect();
-  const Answer slow = lab.wait(lab.send(by(5, 6e-7, false)));
-  EXPECT_EQ(slow.result, "refused");
-  EXPECT_THAT(slow.reason, HasSubstr("m01: 6e-07 mm/s would take 4166.67 s a step"));
+  ReadyLab lab(lab_with("unit = \"mm\"\nsteps_per_unit = 400\n"));
+  const Answer slow = lab.ask(by(5, 6e-7, false));
+  EXPECT_THAT(slow, Ends("refused", "m01: 6e-07 mm/s would take 4166.67 s a step"));
   EXPECT_THAT(slow.reason, HasSubstr("6.94445e-07 mm/s"));
   for (const double speed : {-1.0, std::nan(""), HUGE_VAL}) {
-    EXPECT_EQ(lab.wait(lab.send(by(5, speed))).result, "refused") << speed;
+    EXPECT_EQ(lab.ask(by(5, speed)).result, "refused") << speed;
   }
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
@@ -91,8 +84,7 @@ TEST(Speeds, ASpeedThatNoStepCanHaveIsRefusedWithItsFigure) {
 TEST(Speeds, AMotorThatMovesTakesAnotherSpeedWithItsTarget) {
   for (const char* manner : {"fine", "coarse_table"}) {
     SCOPED_TRACE(manner);
-    Lab lab(lab_with("", manner));
-    lab.connect();
+    ReadyLab lab(lab_with("", manner));
     const auto to = [](std::int64_t position, double speed) {
       return api::Move{.kind = api::Move::Kind::kAbsolute,
                        .motors = {{"m01", position}},
@@ -107,8 +99,7 @@ TEST(Speeds, AMotorThatMovesTakesAnotherSpeedWithItsTarget) {
     EXPECT_TRUE(speed_is(250)) << "slower, to the same target";
     lab.send(to(9001, 2000));
     EXPECT_TRUE(speed_is(1e9 / (13 * 40'000.0)));
-    const Answer last = lab.wait(lab.send(to(-100, 500)));
-    EXPECT_EQ(last.result, "reached") << last.reason;
+    EXPECT_THAT(lab.ask(to(-100, 500)), Ends("reached"));
     EXPECT_EQ(lab.shaft_steps("m01"), -100);
     EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0);
   }
@@ -121,10 +112,10 @@ TEST(Speeds, HomingKeepsToThem) {
   lab.bus(0).mcu(0).attach_switch(0, {.at_steps = -700, .hysteresis_steps = 4});
   lab.connect();
   const double begin_s = seconds(lab);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kHome, {"m01"}).result, "reached");
   EXPECT_GT(seconds(lab) - begin_s, 1.4) << "700 steps at 500 steps/s";
   const double slow_s = seconds(lab);
-  EXPECT_EQ(lab.wait(lab.send(api::Home{{"m01"}, api::Speed{100, true}})).result, "reached");
+  EXPECT_EQ(lab.ask(api::Home{{"m01"}, api::Speed{100, true}}).result, "reached");
   EXPECT_GT(seconds(lab), slow_s);
 }
 

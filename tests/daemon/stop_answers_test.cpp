@@ -13,14 +13,8 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-std::string with_keys(const std::string& keys) {
-  std::string toml = hall(2, 2);
-  const std::string motor = "name = \"m01\"\n";
-  return toml.insert(toml.find(motor) + motor.size(), keys);
-}
-
-struct StopLab : Lab {
-  explicit StopLab(const std::string& keys = "") : Lab(with_keys(keys)) { connect(); }
+struct StopLab : ReadyLab {
+  explicit StopLab(const std::string& keys = "") : ReadyLab(with_keys(hall(2, 2), "m01", keys)) {}
   void move_to(const std::string& motor, std::int64_t target, std::int64_t until) {
     move = send(Ask::kMoveTo, {motor}, {target});
     ASSERT_TRUE(run_until([&] { return shaft_steps(motor) >= until; }));
@@ -33,11 +27,11 @@ TEST(StopAnswers, ADoubledNameIsOne) {
   for (const api::Request& stop :
        {api::Request(api::Stop{{"m01", "m01"}}), api::Request(api::Pause{{"m01", "axes", "m01"}}),
         api::Request(api::Disarm{{"m01", "m01"}}), api::Request(api::Hold{{"m01", "m01"}})}) {
-    EXPECT_EQ(lab.wait(lab.send(stop)).result, "done") << api::name_of(stop);
+    EXPECT_EQ(lab.ask(stop).result, "done") << api::name_of(stop);
   }
-  EXPECT_EQ(lab.wait(lab.send(api::Release{})).result, "done");
+  EXPECT_EQ(lab.ask(api::Release{}).result, "done");
   lab.move_to("m01", 5000, 300);
-  EXPECT_EQ(lab.wait(lab.send(api::Stop{{"m01", "m01"}})).result, "done");
+  EXPECT_EQ(lab.ask(api::Stop{{"m01", "m01"}}).result, "done");
   EXPECT_EQ(lab.wait(lab.move).result, "stopped");
 }
 
@@ -48,12 +42,10 @@ TEST(StopAnswers, WhatIsKnownIsStoppedAndTheOtherNamesAreTold) {
         api::Request(api::Pause{{"nosuch", "m01"}}), api::Request(api::Disarm{{"m01", "nosuch"}}),
         api::Request(api::Hold{{"nosuch", "m01"}})}) {
     SCOPED_TRACE(api::name_of(stop));
-    lab.wait(lab.send(api::Release{}));
-    lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {0}));
+    lab.ask(api::Release{});
+    lab.ask(Ask::kMoveTo, {"m01"}, {0});
     lab.move_to("m01", 5000, 300);
-    const Answer answer = lab.wait(lab.send(stop));
-    EXPECT_EQ(answer.result, "fault");
-    EXPECT_THAT(answer.reason, HasSubstr("\"nosuch\"; 'bushctl status' lists them"));
+    EXPECT_THAT(lab.ask(stop), Ends("fault", "\"nosuch\"; 'bushctl status' lists them"));
     lab.run_for(2);
     const bool stops =
         std::holds_alternative<api::Stop>(stop) || std::holds_alternative<api::Pause>(stop);
@@ -66,7 +58,7 @@ TEST(StopAnswers, OfUnknownNamesAloneAreRefusals) {
   for (const api::Request& stop :
        {api::Request(api::Stop{{"nosuch"}}), api::Request(api::Pause{{"nosuch"}}),
         api::Request(api::Disarm{{"nosuch"}}), api::Request(api::Hold{{"nosuch"}})}) {
-    EXPECT_EQ(lab.wait(lab.send(stop)).result, "refused") << api::name_of(stop);
+    EXPECT_EQ(lab.ask(stop).result, "refused") << api::name_of(stop);
   }
 }
 
@@ -75,33 +67,28 @@ TEST(StopAnswers, OfAnMcuThatIsOfflineNothingIsDone) {
   lab.move_to("m01", 20'000, 300);
   lab.unplug(0);
   EXPECT_EQ(lab.wait(lab.move).result, "link");
-  const Answer named = lab.wait(lab.send(api::Stop{{"m01"}}));
-  EXPECT_EQ(named.result, "link");
-  EXPECT_THAT(named.reason, HasSubstr("not online, so it is unknown whether they stand: hall:1"));
+  const Answer named = lab.ask(api::Stop{{"m01"}});
+  EXPECT_THAT(named, Ends("link", "not online, so it is unknown whether they stand: hall:1"));
   EXPECT_THAT(named.reason, Not(HasSubstr("hall:2")));
-  const Answer all = lab.wait(lab.send(api::Stop{}));
-  EXPECT_EQ(all.result, "link") << "it was lost while it moved";
-  EXPECT_THAT(all.reason, HasSubstr("hall:1 hall:2"));
-  const Answer paused = lab.wait(lab.send(api::Pause{{"m01"}}));
-  EXPECT_EQ(paused.result, "link");
-  EXPECT_THAT(paused.reason, HasSubstr("not online, so it is unknown whether they stand: hall:1"));
+  EXPECT_THAT(lab.ask(api::Stop{}), Ends("link", "hall:1 hall:2")) << "it was lost while it moved";
+  EXPECT_THAT(lab.ask(api::Pause{{"m01"}}),
+              Ends("link", "not online, so it is unknown whether they stand: hall:1"));
 }
 
 // A rack without power is no reason for every stop to fail.
 TEST(StopAnswers, OfAllMotorsNameWhatRestedWhenItWasLost) {
-  Lab lab(hall(2, 2) +
-          "[[bus]]\nname = \"annex\"\nport = \"/dev/annex\"\nbaud = 500000\ntick_us = 2560\n"
-          "format = \"fine\"\n[[mcu]]\nbus = "
-          "\"annex\"\naddress = 1\n[[motor]]\nname = \"far\"\nmcu = "
-          "\"annex:1\"\noutput = 0\ngroup = \"axes\"\n");
-  lab.connect();
+  ReadyLab lab(hall(2, 2) +
+               "[[bus]]\nname = \"annex\"\nport = \"/dev/annex\"\nbaud = 500000\ntick_us = 2560\n"
+               "format = \"fine\"\n[[mcu]]\nbus = "
+               "\"annex\"\naddress = 1\n[[motor]]\nname = \"far\"\nmcu = "
+               "\"annex:1\"\noutput = 0\ngroup = \"axes\"\n");
   lab.unplug(1);
   lab.run_for(1);
-  const Answer all = lab.wait(lab.send(api::Stop{}));
+  const Answer all = lab.ask(api::Stop{});
   EXPECT_EQ(all.result, "done");
   EXPECT_EQ(all.reason, "done; not online, so it is unknown whether they stand: annex:1");
-  EXPECT_EQ(lab.wait(lab.send(api::Stop{{"m01"}})).reason, "done");
-  EXPECT_EQ(lab.wait(lab.send(api::Stop{{"far"}})).result, "link");
+  EXPECT_EQ(lab.ask(api::Stop{{"m01"}}).reason, "done");
+  EXPECT_EQ(lab.ask(api::Stop{{"far"}}).result, "link");
 }
 
 TEST(StopAnswers, AnMcuThatIsLostMeanwhileIsTold) {
@@ -109,16 +96,14 @@ TEST(StopAnswers, AnMcuThatIsLostMeanwhileIsTold) {
   lab.move_to("m01", 20'000, 2000);
   const auto stop = lab.send(api::Stop{{"m01"}});
   lab.unplug(0);
-  const Answer answer = lab.wait(stop);
-  EXPECT_EQ(answer.result, "link");
-  EXPECT_THAT(answer.reason, HasSubstr("MCU hall:1 was lost meanwhile, so it is unknown"));
+  EXPECT_THAT(lab.wait(stop), Ends("link", "MCU hall:1 was lost meanwhile, so it is unknown"));
 }
 
 TEST(PauseAnswers, AMotorThatIsBeingStoppedIsNotPaused) {
   StopLab lab;
   lab.move_to("m01", 20'000, 2000);
   lab.send(api::Stop{{"m01"}});
-  const Answer answer = lab.wait(lab.send(api::Pause{}));
+  const Answer answer = lab.ask(api::Pause{});
   EXPECT_EQ(answer.reason, "paused: 0 motors; not paused, being stopped: m01");
   EXPECT_EQ(lab.wait(lab.move).result, "stopped");
 }
@@ -133,7 +118,7 @@ TEST(PauseAnswers, AMotorInItsLastStepsIsNotPaused) {
   EXPECT_EQ(lab.shaft_steps("m01"), 400);
   EXPECT_EQ(lab.wait(pause).reason, "paused: 0 motors; not paused, at their targets: m01");
   EXPECT_GE(reached_us, 300'000);
-  EXPECT_EQ(lab.wait(lab.send(api::Resume{})).reason, "resumed: 0 motors");
+  EXPECT_EQ(lab.ask(api::Resume{}).reason, "resumed: 0 motors");
 }
 
 TEST(PauseAnswers, AMotorThatSettlesIsNotPausedAndSettlesOn) {
@@ -142,8 +127,7 @@ TEST(PauseAnswers, AMotorThatSettlesIsNotPausedAndSettlesOn) {
   lab.run_for(0.1);
   ASSERT_FALSE(lab.has_result(lab.move));
   const std::int64_t paused_us = lab.now_us();
-  EXPECT_EQ(lab.wait(lab.send(api::Pause{})).reason,
-            "paused: 0 motors; not paused, at their targets: m01");
+  EXPECT_EQ(lab.ask(api::Pause{}).reason, "paused: 0 motors; not paused, at their targets: m01");
   EXPECT_EQ(lab.wait(lab.move).result, "reached");
   // 0.5 s after its last step, of which at most 0.1 s and what a poll takes had passed.
   EXPECT_GE(lab.now_us(), paused_us + 350'000) << "its settling time is not cut short";
@@ -157,13 +141,13 @@ TEST(PauseAnswers, WhatIsLeftAloneIsNamed) {
   lab.run_for(0.3);
   ASSERT_EQ(lab.motor("m03").activity, api::Activity::kArmed);
   lab.move_to("m02", 5000, 300);
-  const Answer answer = lab.wait(lab.send(api::Pause{}));
+  const Answer answer = lab.ask(api::Pause{});
   EXPECT_EQ(answer.result, "done");
   EXPECT_THAT(answer.reason,
               AllOf(HasSubstr("paused: 1 motor;"), HasSubstr("not paused, being homed: m01"),
                     HasSubstr("not paused, waiting for the trigger: m03")));
   // A hold lets nothing begin: what waits for the trigger would.
-  EXPECT_EQ(lab.wait(lab.send(api::Hold{})).result, "done");
+  EXPECT_EQ(lab.ask(api::Hold{}).result, "done");
   EXPECT_EQ(lab.wait(armed).result, "stopped");
 }
 

@@ -31,15 +31,10 @@ class Asking final : public api::Session {
 
 std::string toml_with_homes(const std::string& mcu_keys = "") {
   std::string toml = hall(2, 3);
-  for (const char* motor : {"name = \"m01\"\n", "name = \"m02\"\n"}) {
-    toml.insert(toml.find(motor) + std::string(motor).size(),
-                "home = { direction = \"negative\", most_steps = 3000 }\n");
+  for (const char* motor : {"m01", "m02"}) {
+    toml = with_keys(toml, motor, "home = { direction = \"negative\", most_steps = 3000 }\n");
   }
-  for (std::size_t at = toml.find("address = "); at != std::string::npos;
-       at = toml.find("address = ", at + 1)) {
-    toml.insert(toml.find('\n', at) + 1, mcu_keys);
-  }
-  return toml;
+  return with_mcu_keys(with_mcu_keys(toml, mcu_keys), mcu_keys, 2);
 }
 
 // A lab behind the reception, as in the event loop.
@@ -90,9 +85,9 @@ struct Desk : Lab {
   // Everything moves again, and the disk knows that all rests.
   void settle() {
     disk_us = 500;
-    wait(send(api::Release{}));
-    wait(send(Ask::kStop, {}));
-    wait(send(Ask::kClearFaults, {}));
+    ask(api::Release{});
+    ask(Ask::kStop, {});
+    ask(Ask::kClearFaults, {});
     run_for(1.5);
   }
 
@@ -304,7 +299,7 @@ TEST_F(StopOrder, OfAMotorThatWaitsForItsTurnToBeHomed) {
   desk.connect();
   for (const api::Request& stop : kStops) {
     SCOPED_TRACE(api::name_of(stop));
-    desk.wait(desk.send(Ask::kMoveTo, {"m02"}, {200}));
+    desk.ask(Ask::kMoveTo, {"m02"}, {200});
     const auto first = desk.take(api::Home{{"m02"}});
     const auto second = desk.take(api::Home{{"m01"}});
     desk.carry_out();
@@ -318,7 +313,7 @@ TEST_F(StopOrder, OfAMotorThatWaitsForItsTurnToBeHomed) {
     EXPECT_EQ(desk.shaft_steps("m01"), at);
     EXPECT_THAT(desk.result_of(first), AnyOf(HasSubstr("reached: "), HasSubstr("stopped: ")));
     desk.settle();
-    desk.wait(desk.send(Ask::kSetPosition, {"m02"}, {desk.shaft_steps("m02")}));
+    desk.ask(Ask::kSetPosition, {"m02"}, {desk.shaft_steps("m02")});
   }
 }
 
@@ -340,7 +335,7 @@ TEST_F(StopOrder, OfAMoveThatIsBegunInSlices) {
     const auto stopped = desk.take(desk.panel, stop);
     desk.run_for(3);
     EXPECT_EQ(desk.shaft_steps("m01"), 0);
-    if (std::holds_alternative<api::Pause>(stop)) desk.wait(desk.send(api::Resume{}));
+    if (std::holds_alternative<api::Pause>(stop)) desk.ask(api::Resume{});
     desk.run_for(3);
     EXPECT_THAT(desk.result_of(number), is_stopped_by(stopped));
     EXPECT_EQ(desk.shaft_steps("m01"), 0);
@@ -354,7 +349,7 @@ TEST_F(StopOrder, OfResume) {
     const auto start = desk.shaft_steps("m01");
     desk.send(Ask::kMoveBy, {"m01"}, {2000});
     ASSERT_TRUE(desk.run_until([&] { return desk.shaft_steps("m01") > start + 300; }));
-    desk.wait(desk.send(api::Pause{}));
+    desk.ask(api::Pause{});
     check(desk, resume, stop, 0, [&](const auto& requests) { desk.take(requests.front()); });
     desk.settle();
   }
@@ -369,11 +364,11 @@ TEST_F(StopOrder, OfAResumedPathWhoseRestIsBeingPlanned) {
     SCOPED_TRACE(api::name_of(stop));
     api::Move back = {.kind = api::Move::Kind::kAbsolute,
                       .motors = motor_steps({"m01", "m02"}, {0, 0})};
-    ASSERT_EQ(desk.wait(desk.send(back)).result, "reached");
+    ASSERT_EQ(desk.ask(back).result, "reached");
     std::int64_t path = 0;
     for (const api::Request& part : path_in_parts(6000, 2000)) path = desk.send(part);
     ASSERT_TRUE(desk.run_until([&] { return desk.shaft_steps("m01") > 200; }));
-    desk.wait(desk.send(api::Pause{}));
+    desk.ask(api::Pause{});
     desk.take(api::Resume{});
     desk.carry_out();
     desk.core().keep_up(desk.now_us());
@@ -399,7 +394,7 @@ TEST_F(StopOrder, OfWhatUndoesAStop) {
   EXPECT_THAT(desk.result_of(release), HasSubstr("stopped: m01: stopped by command"));
   EXPECT_THAT(desk.result_of(clear), HasSubstr("stopped: m01: stopped by command"));
   EXPECT_TRUE(desk.motor("m01").held);
-  EXPECT_EQ(desk.wait(desk.send(Ask::kMoveBy, {"m02"}, {10})).result, "refused");
+  EXPECT_EQ(desk.ask(Ask::kMoveBy, {"m02"}, {10}).result, "refused");
   // A stop has nothing against either.
   const auto again = desk.take(api::Release{});
   desk.take(desk.panel, api::Stop{});

@@ -56,24 +56,21 @@ api::MovePath part_of_path(std::int32_t first_row, bool dry_run) {
 }
 
 TEST(StopParts, APathIsADryRunFromItsFirstPartOn) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   for (const bool first : {false, true}) {
-    EXPECT_EQ(lab.wait(lab.send(part_of_path(0, first))).result, "done");
-    const Answer other = lab.wait(lab.send(part_of_path(1, !first)));
-    EXPECT_EQ(other.result, "refused");
-    EXPECT_THAT(other.reason, HasSubstr("send the path again from its beginning"));
+    EXPECT_EQ(lab.ask(part_of_path(0, first)).result, "done");
+    EXPECT_THAT(lab.ask(part_of_path(1, !first)),
+                Ends("refused", "send the path again from its beginning"));
   }
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 TEST(StopParts, APathThatWasEndedBeforeItsFirstPartIsNoDryRunLater) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   const auto late = std::make_shared<Late>(lab);
   for (const bool dry_run : {false, true}) {
     const std::uint64_t before = late->stops();
-    lab.wait(lab.send(Ask::kStop, {}));
+    lab.ask(Ask::kStop, {});
     const auto first = late->ask(part_of_path(0, false), before);
     const auto second = late->ask(part_of_path(1, dry_run));
     EXPECT_THAT(late->result(first), HasSubstr("stopped: m01: stopped by command"));
@@ -94,11 +91,10 @@ api::Follow part_of_trajectory(Part part, std::vector<double> time_s = {},
 
 // By its number, a later part was asked for before a stop that had ended by then.
 TEST(StopParts, APartThatWasAskedForBeforeAStopEndsTheWhole) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   const auto late = std::make_shared<Late>(lab);
   const std::uint64_t before = late->stops();
-  lab.wait(lab.send(Ask::kStop, {}));
+  lab.ask(Ask::kStop, {});
   EXPECT_THAT(late->result(late->ask(part_of_path(0, false))), HasSubstr("done: "));
   EXPECT_THAT(late->result(late->ask(part_of_path(1, false), before)),
               HasSubstr("stopped: m01: stopped by command"));
@@ -168,8 +164,7 @@ TEST(StopParts, RowsOfARunningTrajectoryThatAStopEndsSaySo) {
 
 // The end of a jog is carried out though something about it is wrong.
 TEST(StopParts, AJogEndsWhateverElseItsEndSays) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   const std::vector<api::Jog> ends{{.motor = "m01", .keepalive_ms = 0},
                                    {.motor = "m01", .steps_after = -5},
                                    {.motor = "m01", .steps_after = INT64_MAX}};
@@ -191,37 +186,31 @@ TEST(StopParts, AJogEndsWhateverElseItsEndSays) {
 
 // The gap could not become negative where its blades stand: that is not asked any more.
 TEST(StopParts, AMoveOfAComputedAxisThatAStopHasEndedIsStoppedAndNotRefused) {
-  Lab lab(hall(1, 2) +
-          "[[pseudo]]\nname = [\"gap\", \"centre\"]\nunit = \"mm\"\nmotors = [\"m01\", \"m02\"]\n"
-          "kind = \"slit\"\nsoft_limits = [[0, 20], [-10, 10]]\n");
-  lab.connect();
+  ReadyLab lab(
+      hall(1, 2) +
+      "[[pseudo]]\nname = [\"gap\", \"centre\"]\nunit = \"mm\"\nmotors = [\"m01\", \"m02\"]\n"
+      "kind = \"slit\"\nsoft_limits = [[0, 20], [-10, 10]]\n");
   const auto late = std::make_shared<Late>(lab);
   const std::uint64_t before = late->stops();
   const api::Request move =
       api::Move{.kind = api::Move::Kind::kAbsolute, .motors = {{"gap", api::UserUnits{-1}}}};
-  lab.wait(lab.send(Ask::kStop, {"m02"}));
+  lab.ask(Ask::kStop, {"m02"});
   EXPECT_THAT(late->result(late->ask(move, before)), HasSubstr("stopped: m02: stopped by command"));
   EXPECT_THAT(late->result(late->ask(move)), HasSubstr("refused: "));
 }
 
 TEST(StopParts, ADisarmingTellsWhichMcusAreAway) {
-  Lab lab(hall(1, 2));
-  lab.connect();
+  ReadyLab lab(hall(1, 2));
   lab.unplug(0);
   lab.run_for(1);
-  const Answer named = lab.wait(lab.send(api::Disarm{{"m01"}}));
-  EXPECT_EQ(named.result, "link");
-  EXPECT_THAT(named.reason, HasSubstr("not online, so it is unknown whether they stand: hall:1"));
-  const Answer all = lab.wait(lab.send(api::Disarm{}));
-  EXPECT_EQ(all.result, "done") << "none was lost in motion";
-  EXPECT_THAT(all.reason, HasSubstr("not online"));
+  EXPECT_THAT(lab.ask(api::Disarm{{"m01"}}),
+              Ends("link", "not online, so it is unknown whether they stand: hall:1"));
+  EXPECT_THAT(lab.ask(api::Disarm{}), Ends("done", "not online")) << "none was lost in motion";
 }
 
 std::string hall_with_home() {
-  std::string toml = hall(1, 2);
-  const std::string name = "name = \"m01\"\n";
-  return toml.insert(toml.find(name) + name.size(),
-                     "home = { direction = \"negative\", most_steps = 3000, then = 120 }\n");
+  return with_keys(hall(1, 2), "m01",
+                   "home = { direction = \"negative\", most_steps = 3000, then = 120 }\n");
 }
 
 TEST(StopParts, AMotorThatIsPausedWhileItIsHomedDoesNotMoveOn) {
@@ -230,13 +219,12 @@ TEST(StopParts, AMotorThatIsPausedWhileItIsHomedDoesNotMoveOn) {
   lab.connect();
   const auto home = lab.send(Ask::kHome, {"m01"});
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") < -50; }));
-  lab.wait(lab.send(api::Pause{{"m01"}}));
-  const Answer answer = lab.wait(home);
-  EXPECT_EQ(answer.result, "reached");
-  EXPECT_THAT(answer.reason, HasSubstr("m01: homed; it does not move on, stopped by command"));
+  lab.ask(api::Pause{{"m01"}});
+  EXPECT_THAT(lab.wait(home),
+              Ends("reached", "m01: homed; it does not move on, stopped by command"));
   lab.run_for(2);
   EXPECT_EQ(lab.motor("m01").position_steps, 0);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {20})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {20}).result, "reached");
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ std::string table_of(Lab& lab, const std::string& motor) {
 
 std::int64_t milliseconds_of_move(Lab& lab, std::int64_t steps) {
   const std::int64_t start = lab.now_us();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {steps})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {steps}).result, "reached");
   return (lab.now_us() - start) / 1000;
 }
 
@@ -47,23 +47,19 @@ std::string two_groups(int mcus, int motors) {
 }
 
 TEST(TableInService, IsToldByDescriptionAndResultWithRevisionAndHash) {
-  Lab lab(hall(1, 2, "fine", "glacier"), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(1, 2, "fine", "glacier"), kGlacier);
   const api::TableRef glacier{.name = "glacier", .revision = 3, .hash = kGlacierHash};
   EXPECT_EQ(lab.description("m01").table, glacier);
-  const Answer result = lab.wait(lab.send(Ask::kMoveBy, {"m01", "m02"}, {5, 0}));
+  const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m02"}, {5, 0});
   EXPECT_THAT(result.tables, ElementsAre(glacier, glacier));
 }
 
 TEST(UseTable, ServesTheNextMoveAndIsKept) {
-  Lab lab(hall(2, 2), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(2, 2), kGlacier);
   // Cruise is 10 units of 40 us a step, then 100: 1000 steps take well under 2 s, then at least 4
   // s.
   EXPECT_LT(milliseconds_of_move(lab, 1000), 2000);
-  const Answer used = lab.wait(lab.use("axes", "glacier"));
-  EXPECT_EQ(used.result, "done");
-  EXPECT_THAT(used.reason, HasSubstr("axes has glacier@3 (4259a0ec)"));
+  EXPECT_THAT(lab.wait(lab.use("axes", "glacier")), Ends("done", "axes has glacier@3 (4259a0ec)"));
   EXPECT_EQ(table_of(lab, "m04"), "glacier@3");
   EXPECT_THAT(lab.kept(), ElementsAre("glacier"));
   EXPECT_TRUE(lab.all_ready());
@@ -74,8 +70,7 @@ TEST(UseTable, ServesTheNextMoveAndIsKept) {
 }
 
 TEST(UseTable, MoveUnderWayKeepsItsTableAndNoneBeginsByTheOldOne) {
-  Lab lab(two_groups(1, 2), kGlacier);
-  lab.connect();
+  ReadyLab lab(two_groups(1, 2), kGlacier);
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {2000});
   lab.run_for(0.5);
   const auto use = lab.use("axes", "glacier");
@@ -83,7 +78,7 @@ TEST(UseTable, MoveUnderWayKeepsItsTableAndNoneBeginsByTheOldOne) {
   EXPECT_EQ(lab.last_reply(use).phase, Answer::kAccepted);
   EXPECT_EQ(table_of(lab, "m01"), "bushd2-constant@0");
   for (const char* motor : {"m02", "end"}) {
-    const Answer refused = lab.wait(lab.send(Ask::kMoveBy, {motor}, {5}));
+    const Answer refused = lab.ask(Ask::kMoveBy, {motor}, {5});
     EXPECT_EQ(refused.phase, Answer::kRefused);
     EXPECT_THAT(refused.reason, HasSubstr("about to get another table, for group axes"));
   }
@@ -96,14 +91,13 @@ TEST(UseTable, MoveUnderWayKeepsItsTableAndNoneBeginsByTheOldOne) {
   EXPECT_EQ(lab.wait(use).result, "done");
   EXPECT_EQ(table_of(lab, "m01"), "glacier@3");
   EXPECT_EQ(table_of(lab, "end"), "bushd2-scurve@0");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02", "end"}, {5, 5})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02", "end"}, {5, 5}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 2500);
 }
 
 // The parts of a group move may end long before its result.
 TEST(UseTable, ResultTellsTheTableOfTheMoveAlsoIfItHasChangedSince) {
-  Lab lab(two_groups(2, 2), kGlacier);
-  lab.connect();
+  ReadyLab lab(two_groups(2, 2), kGlacier);
   const auto move = lab.send(Ask::kMoveBy, {"m04", "end"}, {4000, 5});
   lab.run_for(0.5);
   EXPECT_EQ(lab.wait(lab.use("ends", "glacier")).result, "done");
@@ -114,8 +108,7 @@ TEST(UseTable, ResultTellsTheTableOfTheMoveAlsoIfItHasChangedSince) {
 }
 
 TEST(UseTable, WhatDoesNotFitIsRefusedAndTheOldOneStays) {
-  Lab lab(hall(1, 2), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(1, 2), kGlacier);
   lab.write_file("rocket.toml", kTooFast);
   lab.write_file("bad.toml", "name = \"bad\"\ntime_unit_ns = 40000\naccel = [1, 2]\n");
   std::string many = "name = \"many\"\ntime_unit_ns = 40000\naccel = [";
@@ -140,15 +133,13 @@ TEST(UseTable, WhatDoesNotFitIsRefusedAndTheOldOneStays) {
 }
 
 TEST(UseTable, LastOfThoseThatWaitCounts) {
-  Lab lab(hall(1, 1), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(1, 1), kGlacier);
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {2000});
   lab.run_for(0.5);
   const auto first = lab.use("axes", "glacier");
   const auto second = lab.use("axes", "bushd2-scurve");
   const Answer superseded = lab.wait(first);
-  EXPECT_EQ(superseded.result, "stopped");
-  EXPECT_THAT(superseded.reason, HasSubstr("superseded by command"));
+  EXPECT_THAT(superseded, Ends("stopped", "superseded by command"));
   // Even by the one that is in service already: it was not meant.
   const auto third = lab.use("axes", "bushd2-constant");
   EXPECT_EQ(lab.wait(second).result, "stopped");
@@ -160,25 +151,21 @@ TEST(UseTable, LastOfThoseThatWaitCounts) {
 
 // An MCU that is not there cannot move by the old table either: it gets the new one when it comes.
 TEST(UseTable, McuThatIsOfflineGetsItWhenItComes) {
-  Lab lab(hall(2, 1), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(2, 1), kGlacier);
   lab.unplug(0);
-  const Answer used = lab.wait(lab.use("axes", "glacier"));
-  EXPECT_EQ(used.result, "done");
-  EXPECT_THAT(used.reason, HasSubstr("not online, they get it when they come: hall:1 hall:2"));
+  EXPECT_THAT(lab.wait(lab.use("axes", "glacier")),
+              Ends("done", "not online, they get it when they come: hall:1 hall:2"));
   lab.plug(0);
   lab.connect();
   for (int mcu : {0, 1}) EXPECT_EQ(lab.bus(0).mcu(mcu).core().tables.bank[0].revision, 3u);
 }
 
 TEST(UseTable, McuThatIsLostWhileItGetsTheTableLeavesAllWithTheOldOne) {
-  Lab lab(hall(2, 1), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(2, 1), kGlacier);
   // The second MCU hears nothing of the table.
   lab.on_send = loses(2, BUSHD_MSG_TABLE_DATA);
   const Answer used = lab.wait(lab.use("axes", "glacier"));
-  EXPECT_EQ(used.result, "fault");
-  EXPECT_THAT(used.reason, HasSubstr("MCU hall:2 did not confirm it in time"));
+  EXPECT_THAT(used, Ends("fault", "MCU hall:2 did not confirm it in time"));
   EXPECT_THAT(used.reason, HasSubstr("group axes keeps bushd2-constant"));
   EXPECT_TRUE(lab.kept().empty());
   lab.on_send = {};
@@ -188,30 +175,26 @@ TEST(UseTable, McuThatIsLostWhileItGetsTheTableLeavesAllWithTheOldOne) {
 
 // One that comes while another gets the table may have to give it back: it begins no move by it.
 TEST(UseTable, McuThatComesDuringTheChangeWaitsForItsEnd) {
-  Lab lab(hall(2, 1), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(2, 1), kGlacier);
   lab.bus(0).deafen(1, (lab.now_us() + 2'000'000) * 1000);
-  ASSERT_TRUE(
-      lab.run_until([&] { return lab.state_of("hall:2").state == api::McuState::kOffline; }, 3));
+  ASSERT_TRUE(lab.mcu_comes_to("hall:2", api::McuState::kOffline, 3));
   // The first MCU hears nothing of the table.
   lab.on_send = loses(1, BUSHD_MSG_TABLE_DATA);
   const auto use = lab.use("axes", "glacier");
-  ASSERT_TRUE(
-      lab.run_until([&] { return lab.state_of("hall:2").state == api::McuState::kReady; }, 8));
+  ASSERT_TRUE(lab.mcu_comes_to("hall:2", api::McuState::kReady, 8));
   ASSERT_FALSE(lab.has_result(use));
-  const Answer refused = lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {100}));
+  const Answer refused = lab.ask(Ask::kMoveBy, {"m02"}, {100});
   EXPECT_EQ(refused.phase, Answer::kRefused);
   EXPECT_THAT(refused.reason, HasSubstr("about to get another table"));
   EXPECT_EQ(lab.wait(use).result, "fault");
   lab.on_send = {};
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {100})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {100}).result, "reached");
   EXPECT_EQ(table_of(lab, "m02"), "bushd2-constant@0");
 }
 
 TEST(UseTable, SurvivesALineThatLosesFrames) {
-  Lab lab(hall(2, 2), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(2, 2), kGlacier);
   int sent = 0;
   lab.on_send = [&sent](std::size_t, std::vector<std::uint8_t>&) { return ++sent % 4 != 0; };
   EXPECT_EQ(lab.wait(lab.use("axes", "glacier")).result, "done");
@@ -220,8 +203,7 @@ TEST(UseTable, SurvivesALineThatLosesFrames) {
 }
 
 TEST(ReloadTables, ChangedTableServesTheNextMove) {
-  Lab lab(hall(1, 1, "fine", "glacier"), kGlacier);
-  lab.connect();
+  ReadyLab lab(hall(1, 1, "fine", "glacier"), kGlacier);
   std::string changed = kGlacier;
   changed.replace(changed.find("revision = 3"), 12, "revision = 4");
   lab.write_file("glacier.toml", changed);
@@ -236,8 +218,7 @@ TEST(ReloadTables, ChangedTableServesTheNextMove) {
 }
 
 TEST(ReloadTables, BadTableKeepsItsGroupOnTheOldOneAndNoOther) {
-  Lab lab(two_groups(1, 1), kGlacier);
-  lab.connect();
+  ReadyLab lab(two_groups(1, 1), kGlacier);
   ASSERT_EQ(lab.wait(lab.use("ends", "glacier")).result, "done");
   EXPECT_EQ(lab.wait(lab.reload()).reason, "no table has changed");
   std::string changed = kGlacier;
@@ -245,8 +226,7 @@ TEST(ReloadTables, BadTableKeepsItsGroupOnTheOldOneAndNoOther) {
   lab.write_file("bushd2-constant.toml",
                  "name = \"bushd2-constant\"\ntime_unit_ns = 0\naccel = [9]\n");
   const Answer reloaded = lab.wait(lab.reload());
-  EXPECT_EQ(reloaded.result, "fault");
-  EXPECT_THAT(reloaded.reason, HasSubstr("group ends has glacier@9"));
+  EXPECT_THAT(reloaded, Ends("fault", "group ends has glacier@9"));
   EXPECT_THAT(reloaded.reason, HasSubstr("group axes keeps bushd2-constant"));
   EXPECT_THAT(reloaded.reason, HasSubstr("bushd2-constant.toml:2:"));
   EXPECT_EQ(table_of(lab, "end"), "glacier@9");
@@ -256,8 +236,7 @@ TEST(ReloadTables, BadTableKeepsItsGroupOnTheOldOneAndNoOther) {
 }
 
 TEST(ReloadTables, GroupsWithTheSameTableShareItInTheMcus) {
-  Lab lab(two_groups(1, 1), kGlacier);
-  lab.connect();
+  ReadyLab lab(two_groups(1, 1), kGlacier);
   for (const char* group : {"axes", "ends"}) {
     ASSERT_EQ(lab.wait(lab.use(group, "glacier")).result, "done");
   }

@@ -37,7 +37,7 @@ class Trace : public Traced<Manner> {
   }
   void move(Lab& lab, const std::vector<std::string>& motors,
             const std::vector<std::int64_t>& steps) {
-    const Answer result = lab.wait(lab.send(Ask::kMoveBy, motors, steps));
+    const Answer result = lab.ask(Ask::kMoveBy, motors, steps);
     EXPECT_EQ(result.result, "reached") << result.reason;
   }
   // Slower than the table, slower yet in motion, faster, and back to where it was.
@@ -59,7 +59,7 @@ class Trace : public Traced<Manner> {
   void change_on_the_way(Lab& lab) {
     const auto paused = lab.send(Ask::kMoveBy, {"m03", "m06"}, {900, -900});
     lab.run_for(0.35);
-    EXPECT_EQ(lab.wait(lab.send(api::Pause{})).reason, "paused: 2 motors");
+    EXPECT_EQ(lab.ask(api::Pause{}).reason, "paused: 2 motors");
     lab.run_for(0.5);
     lab.send(api::Resume{});
     const auto jog = [&lab](double speed) {
@@ -90,7 +90,7 @@ class Trace : public Traced<Manner> {
     EXPECT_EQ(lab.wait(stopped).result, "stopped");
     const auto paused = by({-1000, -3, 998});
     lab.run_for(0.35);
-    EXPECT_EQ(lab.wait(lab.send(api::Pause{{"m03"}})).reason, "paused: 3 motors");
+    EXPECT_EQ(lab.ask(api::Pause{{"m03"}}).reason, "paused: 3 motors");
     lab.send(api::Resume{});
     EXPECT_EQ(lab.wait(paused).result, "reached");
     by({2000, 1000, -500});
@@ -127,8 +127,7 @@ class Trace : public Traced<Manner> {
       for (const auto& motor : motors) begins_.push_back(lab.motor(motor).position_steps);
     };
     const auto expect_loaded = [&](std::int64_t number) {
-      const Answer loaded = lab.wait(number);
-      EXPECT_EQ(loaded.result, "done") << loaded.reason;
+      EXPECT_THAT(lab.wait(number), Ends("done"));
     };
     begin();
     expect_loaded(
@@ -236,7 +235,7 @@ TEST_P(Trace, EveryEdgeIsExplained) {
   Lab lab(toml(), {}, vcd_.get());
   lab.bus(0).mcu(0).attach_switch(0, {.at_steps = -700, .hysteresis_steps = 4});
   lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kHome, {"m01"})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kHome, {"m01"}).result, "reached");
   move(lab, {"m01", "m02", "m03", "m04", "m05"}, {500, -300, 200, -400, 1});
   lab.bus(0).mcu(0).set_inputs({0, BUSHD_INPUT_FORWARD});
   lab.run_for(0.7);

@@ -50,17 +50,15 @@ INSTANTIATE_TEST_SUITE_P(Format, TrajectoryInputs, testing::Values("fine", "coar
 
 TEST_P(TrajectoryInputs, APulseComesWhereTheMotorPasses) {
   Pins pins;
-  Lab lab(hall(2, 2, GetParam()), "", &pins);
-  lab.connect();
+  ReadyLab lab(hall(2, 2, GetParam()), "", &pins);
   const api::PositionCompare compare{.motor = "m01",
                                      .position = 100,
                                      .arrivals = {.positive = true},
                                      .delay_us = 3'000,
                                      .width_us = 500};
-  ASSERT_EQ(lab.wait(lab.send(compare)).result, "done");
-  ASSERT_EQ(lab.wait(lab.send(fly_scan_part(Part::kLastRows))).result, "done");
-  const Answer end = lab.wait(lab.send(fly_scan_part(Part::kRun)));
-  EXPECT_EQ(end.result, "reached") << end.reason;
+  ASSERT_EQ(lab.ask(compare).result, "done");
+  ASSERT_EQ(lab.ask(fly_scan_part(Part::kLastRows)).result, "done");
+  EXPECT_THAT(lab.ask(fly_scan_part(Part::kRun)), Ends("reached"));
   ASSERT_EQ(pins.steps_ns.size(), 300u);
   ASSERT_EQ(pins.pulses.size(), 2u) << "one pulse, none on the way back";
   EXPECT_TRUE(pins.pulses[0].level);
@@ -73,18 +71,13 @@ TEST_P(TrajectoryInputs, APulseComesWhereTheMotorPasses) {
 }
 
 TEST_P(TrajectoryInputs, ALimitSwitchEndsTheTrajectoryForAll) {
-  std::string toml = hall(2, 2, GetParam());
-  const std::string first = "output = 0\n";
-  toml.insert(toml.find(first) + first.size(), "limit = \"positive\"\n");
-  Lab lab(toml);
-  lab.connect();
-  ASSERT_EQ(lab.wait(lab.send(fly_scan_part(Part::kLastRows))).result, "done");
+  ReadyLab lab(with_keys(hall(2, 2, GetParam()), "m01", "limit = \"positive\"\n"));
+  ASSERT_EQ(lab.ask(fly_scan_part(Part::kLastRows)).result, "done");
   const auto run = lab.send(fly_scan_part(Part::kRun));
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m01") == 80; }));
   lab.bus(0).mcu(0).set_inputs({1, 0});
   const Answer end = lab.wait(run);
-  EXPECT_EQ(end.result, "limit") << end.reason;
-  EXPECT_THAT(end.reason, HasSubstr("m01"));
+  EXPECT_THAT(end, Ends("limit", "m01"));
   EXPECT_EQ(end.motor_results, (std::vector<std::string>{"limit", "stopped"}));
   // At 100 steps/s, where its table begins: the step that is under way, and one while the input is
   // debounced. In the coarse format the MCU reckons the speed from whole steps in ticks, which may
@@ -99,7 +92,7 @@ TEST_P(TrajectoryInputs, ALimitSwitchEndsTheTrajectoryForAll) {
   // The way back is free, the way on is not.
   EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason,
               HasSubstr("limit switch"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {-5})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {-5}).result, "reached");
   EXPECT_THAT(lab.errors(), IsEmpty());
 }
 

@@ -38,7 +38,7 @@ class Pins : public sim::EdgeSink {
 class Triggered : public testing::TestWithParam<const char*> {
  protected:
   Pins pins;
-  Lab lab{hall(2, 3, GetParam()), {}, &pins};
+  ReadyLab lab{hall(2, 3, GetParam()), {}, &pins};
 
   static api::Request armed(const std::vector<std::string>& motors,
                             const std::vector<std::int64_t>& steps, std::int32_t delay_us = 1000) {
@@ -84,7 +84,6 @@ INSTANTIATE_TEST_SUITE_P(Manners, Triggered,
                          testing::Values("fine", "coarse", "fine_table", "coarse_ticks"));
 
 TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
-  lab.connect();
   for (const std::int64_t steps : {1, 40, -700}) {
     const auto before = pins.steps(0, 0).size();
     const auto from = lab.motor("m01").position_steps;
@@ -120,7 +119,6 @@ TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
 }
 
 TEST_P(Triggered, EachMcuHasItsOwnTriggerAndTheMoveEndsWithTheLast) {
-  lab.connect();
   const auto move = arm({"m01", "m04"}, {50, -60});
   fire(0);
   lab.run_for(2);
@@ -134,7 +132,6 @@ TEST_P(Triggered, EachMcuHasItsOwnTriggerAndTheMoveEndsWithTheLast) {
 }
 
 TEST_P(Triggered, AreSaidToBeArmedWhenAnEdgeStartsThem) {
-  lab.connect();
   const auto move = lab.send(armed({"m01", "m04"}, {50, 60}));
   EXPECT_TRUE(
       lab.run_until([&] { return lab.motor("m01").activity == api::Activity::kArming; }, 1));
@@ -151,30 +148,24 @@ TEST_P(Triggered, AreSaidToBeArmedWhenAnEdgeStartsThem) {
 }
 
 TEST_P(Triggered, DisarmedTheyEndAsStopped) {
-  lab.connect();
   for (const Ask kind : {Ask::kDisarm, Ask::kStop}) {
     const auto move = arm({"m01", "m02"}, {50, 60});
     const auto disarm = lab.send(kind, {"m02"});
     EXPECT_EQ(lab.wait(disarm).result, "done");
     EXPECT_EQ(lab.last_reply(disarm).reason, "done");
-    EXPECT_EQ(lab.last_reply(move).result, "stopped");
-    EXPECT_THAT(lab.last_reply(move).reason, HasSubstr("disarmed before the trigger came"));
+    EXPECT_THAT(lab.last_reply(move), Ends("stopped", "disarmed before the trigger came"));
     fire();
     lab.run_for(1);
     EXPECT_EQ(lab.shaft_steps("m01"), 0);
     EXPECT_NE(lab.motor("m01").activity, api::Activity::kArmed);
   }
-  EXPECT_EQ(lab.wait(lab.send(Ask::kDisarm, {})).result, "done") << "nothing is armed";
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {30})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kDisarm, {}).result, "done") << "nothing is armed";
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {30}).result, "reached");
 }
 
 // All of them wait, or none.
 TEST_P(Triggered, WhereOneMcuCannotBeArmedTheOthersDoNotWait) {
-  std::string toml = hall(2, 3, GetParam());
-  const std::string fifth = "name = \"m05\"\n";
-  toml.insert(toml.find(fifth) + fifth.size(), "limit = \"positive\"\n");
-  Lab limited(toml, {}, &pins);
-  limited.connect();
+  ReadyLab limited(with_keys(hall(2, 3, GetParam()), "m05", "limit = \"positive\"\n"), {}, &pins);
   limited.bus(0).mcu(1).set_inputs({0b010, 0});
   limited.run_for(0.003);  // a tick later the MCU knows, and the daemon does not
   const auto move = limited.send(armed({"m01", "m04", "m05"}, {50, 60, 70}));
@@ -190,9 +181,8 @@ TEST_P(Triggered, WhereOneMcuCannotBeArmedTheOthersDoNotWait) {
 }
 
 TEST_P(Triggered, WhereOneMcuIsDisarmedOrLostTheOthersAreToo) {
-  lab.connect();
   auto move = arm({"m01", "m04"}, {50, 60});
-  EXPECT_EQ(lab.wait(lab.send(Ask::kDisarm, {"m04"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kDisarm, {"m04"}).result, "done");
   EXPECT_EQ(lab.wait(move, 2).result, "stopped");
   move = arm({"m01", "m04"}, {50, 60});
   lab.bus(0).reboot(1, 100'000'000);
@@ -205,18 +195,16 @@ TEST_P(Triggered, WhereOneMcuIsDisarmedOrLostTheOthersAreToo) {
 }
 
 TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
-  lab.connect();
   auto move = arm({"m01"}, {3000});
   fire();
   const auto disarm = lab.send(Ask::kDisarm, {"m01"});
-  EXPECT_EQ(lab.wait(disarm).result, "done");
-  EXPECT_THAT(lab.last_reply(disarm).reason, HasSubstr("the trigger came before"));
+  EXPECT_THAT(lab.wait(disarm), Ends("done", "the trigger came before"));
   EXPECT_TRUE(lab.motor("m01").moving);
   EXPECT_EQ(lab.wait(move).result, "reached");
   // A long delay: stopped before it has begun.
   move = arm({"m01"}, {-3000}, 1'400'000);
   fire();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {}).result, "done");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m01"), 3000);
   lab.run_for(1.6);
@@ -225,7 +213,7 @@ TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
   move = arm({"m01"}, {-3000});
   fire();
   lab.run_for(0.8);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
   const Answer result = lab.last_reply(move);
   EXPECT_EQ(result.result, "stopped");
   EXPECT_LT(result.position_steps.at(0), 3000);
@@ -234,7 +222,6 @@ TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
 }
 
 TEST_P(Triggered, AfterTheStartTheyTakeNewTargets) {
-  lab.connect();
   for (const double later_s : {0.05, 0.3, 0.6}) {
     const auto from = lab.shaft_steps("m01");
     const auto move = arm({"m01"}, {2000}, 100'000);
@@ -249,7 +236,6 @@ TEST_P(Triggered, AfterTheStartTheyTakeNewTargets) {
 }
 
 TEST_P(Triggered, WhatWaitsIsRefusedOtherCommands) {
-  lab.connect();
   const auto move = arm({"m01"}, {50});
   std::vector<api::Request> requests = {armed({"m01"}, {10})};
   for (const Ask ask :
@@ -263,14 +249,13 @@ TEST_P(Triggered, WhatWaitsIsRefusedOtherCommands) {
   }
   EXPECT_THAT(lab.last_reply(lab.send(armed({"m02"}, {10}))).reason,
               HasSubstr("m01 waits for the trigger of MCU hall:1 already"));
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {30})).result, "reached") << "others move";
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {30}).result, "reached") << "others move";
   fire();
   EXPECT_EQ(lab.wait(move).result, "reached");
 }
 
 // By default they wait though nobody is there any more: a script arms them and ends.
 TEST_P(Triggered, OutliveWhoHasArmedThemUnlessThatIsAskedFor) {
-  lab.connect();
   const auto ask = [](const char* motor, bool while_connected) {
     api::Arm arm = std::get<api::Arm>(armed({motor}, {40}));
     arm.while_connected = while_connected;
@@ -291,8 +276,7 @@ TEST_P(Triggered, OutliveWhoHasArmedThemUnlessThatIsAskedFor) {
   lab.leave("script");
   lab.leave("panel");
   lab.run_for(0.5);
-  EXPECT_EQ(lab.last_reply(ends).result, "stopped");
-  EXPECT_THAT(lab.last_reply(ends).reason, HasSubstr("disarmed, because its client has gone"));
+  EXPECT_THAT(lab.last_reply(ends), Ends("stopped", "disarmed, because its client has gone"));
   EXPECT_EQ(lab.motor("m04").armed_by, "");
   EXPECT_EQ(lab.motor("m01").activity, api::Activity::kArmed);
   EXPECT_THAT(lab.motor("m01").armed_by, HasSubstr("of script"));
@@ -305,7 +289,6 @@ TEST_P(Triggered, OutliveWhoHasArmedThemUnlessThatIsAskedFor) {
 
 // The edge is faster than the daemon: they ramp down.
 TEST_P(Triggered, AnEdgeBeforeTheyAreDisarmedForAClientThatHasGoneIsFollowedByARampDown) {
-  lab.connect();
   api::Arm arm = std::get<api::Arm>(armed({"m01"}, {3000}));
   arm.while_connected = true;
   const auto number = lab.send_as("panel", arm);
@@ -313,14 +296,11 @@ TEST_P(Triggered, AnEdgeBeforeTheyAreDisarmedForAClientThatHasGoneIsFollowedByAR
   lab.run_for(0.2);
   fire();
   lab.leave("panel");
-  const Answer result = lab.wait(number);
-  EXPECT_EQ(result.result, "stopped") << result.reason;
-  EXPECT_THAT(result.reason, HasSubstr("because its client has gone"));
+  EXPECT_THAT(lab.wait(number), Ends("stopped", "because its client has gone"));
   EXPECT_LT(lab.shaft_steps("m01"), 3000);
 }
 
 TEST_P(Triggered, ArmingIsRefusedWithAReason) {
-  lab.connect();
   const auto refusal = [this](const api::Request& request) {
     const Answer reply = lab.last_reply(lab.send(request));
     EXPECT_EQ(reply.phase, Answer::kRefused);
@@ -341,34 +321,32 @@ TEST_P(Triggered, MayBeArmedAsSoonAsAStopIsDone) {
   for (int wait_ms = 0; wait_ms <= 120; wait_ms += 4) {
     lab.send(Ask::kMoveBy, {"m01"}, {4000});
     lab.run_for(0.5);
-    ASSERT_EQ(lab.wait(lab.send(api::Pause{{"m01"}})).result, "done");
-    ASSERT_EQ(lab.wait(lab.send(api::Resume{{"m01"}})).result, "done");
+    ASSERT_EQ(lab.ask(api::Pause{{"m01"}}).result, "done");
+    ASSERT_EQ(lab.ask(api::Resume{{"m01"}}).result, "done");
     lab.run_for(wait_ms * 1e-3);
-    ASSERT_EQ(lab.wait(lab.send(Ask::kStop, {"m01"})).result, "done");
+    ASSERT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
     const auto move = lab.send(armed({"m01", "m02"}, {4, 4}));
     lab.run_for(0.5);
     EXPECT_FALSE(lab.has_result(move))
         << wait_ms << " ms after resume: " << lab.last_reply(move).reason;
-    lab.wait(lab.send(Ask::kStop, {}));
+    lab.ask(Ask::kStop, {});
   }
 }
 
 TEST_P(Triggered, AnEmergencyStopEndsThem) {
-  lab.connect();
   const auto move = arm({"m01"}, {50});
-  EXPECT_EQ(lab.wait(lab.send(Ask::kEmergencyStop, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kEmergencyStop, {}).result, "done");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   fire();
   lab.run_for(0.5);
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   const auto again = arm({"m01"}, {50});
   fire();
   EXPECT_EQ(lab.wait(again).result, "reached");
 }
 
 TEST_P(Triggered, LostFramesLeaveOneMoveAndOneResult) {
-  lab.connect();
   int frames = 0;
   for (int drop = 0; drop < 6; ++drop) {
     const auto from = lab.shaft_steps("m01");
@@ -384,7 +362,6 @@ TEST_P(Triggered, LostFramesLeaveOneMoveAndOneResult) {
 
 // It may be hours until it comes; what was armed before is nobody's any more.
 TEST_P(Triggered, ANewDaemonDisarms) {
-  lab.connect();
   arm({"m01"}, {50});
   lab.restart_daemon();
   lab.connect();
@@ -398,7 +375,6 @@ TEST_P(Triggered, ANewDaemonDisarms) {
 }
 
 TEST_P(Triggered, WithoutADaemonNothingStarts) {
-  lab.connect();
   const auto move = arm({"m01"}, {50});
   lab.unplug(0);
   EXPECT_EQ(lab.last_reply(move).result, "link");
@@ -414,7 +390,6 @@ TEST_P(Triggered, WithoutADaemonNothingStarts) {
 }
 
 TEST_P(Triggered, ShutDownDisarms) {
-  lab.connect();
   const auto move = arm({"m01"}, {50});
   lab.core().shut_down(lab.now_us());
   EXPECT_TRUE(lab.run_until([&] { return lab.core().at_rest(); }, 2));
@@ -422,14 +397,13 @@ TEST_P(Triggered, ShutDownDisarms) {
 }
 
 TEST_P(Triggered, PulseWhenTheMotorArrives) {
-  lab.connect();
   api::PositionCompare compare{.motor = "m02",
                                .position = 300,
                                .arrivals = {.positive = true},
                                .delay_us = 20'000,
                                .width_us = 500};
-  EXPECT_EQ(lab.wait(lab.send(compare)).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {1000})).result, "reached");
+  EXPECT_EQ(lab.ask(compare).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {1000}).result, "reached");
   lab.run_for(0.1);
   ASSERT_EQ(pins.compare.size(), 2u);
   const std::int64_t arrived_ns = pins.steps(0, 1).at(299);
@@ -438,16 +412,15 @@ TEST_P(Triggered, PulseWhenTheMotorArrives) {
               10'000);
   EXPECT_TRUE(pins.compare[0].level);
   EXPECT_FALSE(pins.compare[1].level);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {-1000})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {-1000}).result, "reached");
   EXPECT_EQ(pins.compare.size(), 2u) << "the other direction";
   compare.arrivals = {};
-  EXPECT_EQ(lab.wait(lab.send(compare)).result, "done");
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {1000})).result, "reached");
+  EXPECT_EQ(lab.ask(compare).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {1000}).result, "reached");
   EXPECT_EQ(pins.compare.size(), 2u) << "switched off";
 }
 
 TEST_P(Triggered, PositionCompareIsRefusedWithAReason) {
-  lab.connect();
   using Compare = api::PositionCompare;
   const Compare good{.motor = "m02",
                      .position = 300,
@@ -463,7 +436,7 @@ TEST_P(Triggered, PositionCompareIsRefusedWithAReason) {
   EXPECT_THAT(refusal(good, [](Compare& c) { c.delay_us = -1; }), HasSubstr("0 to 1500000"));
   EXPECT_THAT(refusal(good, [](Compare& c) { c.position = std::int64_t{1} << 40; }),
               HasSubstr("lie within"));
-  EXPECT_EQ(lab.wait(lab.send(good)).result, "done");
+  EXPECT_EQ(lab.ask(good).result, "done");
 }
 
 }  // namespace

@@ -34,8 +34,7 @@ TEST(Trust, AnMcuThatWasNeverHeardHasUnknownPositions) {
 }
 
 TEST(Trust, UntilTheFirstReportOfARestartedDaemonThePositionIsUnknown) {
-  Lab lab(hall(1, 1));
-  lab.connect();
+  ReadyLab lab(hall(1, 1));
   lab.send(Ask::kMoveBy, {"m01"}, {9000});
   lab.run_for(1);
   lab.restart_daemon();
@@ -57,10 +56,10 @@ TEST(Trust, NobodyHasSaidWhereItStandsAfterTheDaemonsStart) {
   Lab lab(hall(1, 2));
   find(lab);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kSetPosition, {"m01"}, {7})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kSetPosition, {"m01"}, {7}).result, "done");
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_EQ(lab.motor("m02").trust, api::Trust::kUncertain);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m02"}, {5})).result, "reached")
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {5}).result, "reached")
       << "as far as anybody knows no step is lost";
   EXPECT_EQ(lab.motor("m02").trust, api::Trust::kUncertain);
 }
@@ -69,23 +68,21 @@ TEST(Trust, NobodyHasSaidWhereItStandsAfterTheDaemonsStart) {
 TEST(Trust, ARestartOfTheDaemonMakesNothingKnown) {
   std::string toml = hall(1, 1);
   toml.insert(toml.find("[[group]]"), "emergency_stop = \"immediate\"\n");
-  Lab lab(toml);
-  lab.connect();
+  ReadyLab lab(toml);
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {9000});
   lab.run_for(1);
   lab.send(Ask::kEmergencyStop, {});
   EXPECT_EQ(lab.wait(move).result, "stopped");
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
-  EXPECT_EQ(lab.wait(lab.send(Ask::kClearFaults, {})).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kClearFaults, {}).result, "done");
   lab.restart_daemon();
   find(lab);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
 }
 
 TEST(Trust, ARestartOfDaemonAndMcuMakesNothingKnown) {
-  Lab lab(hall(1, 1));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {50})).result, "reached");
+  ReadyLab lab(hall(1, 1));
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {50}).result, "reached");
   lab.bus(0).reboot(0);
   lab.restart_daemon();
   find(lab);
@@ -95,8 +92,7 @@ TEST(Trust, ARestartOfDaemonAndMcuMakesNothingKnown) {
 
 TEST(Trust, WhatWasHeardLastIsStaleAndCorrectedInTheLogOfMoves) {
   for (const char* manner : {"fine", "fine_table"}) {
-    Lab lab(hall(1, 2, manner));
-    lab.connect();
+    ReadyLab lab(hall(1, 2, manner));
     lab.send(Ask::kMoveBy, {"m01"}, {9000});
     lab.run_for(1.3);
     lab.unplug(0);
@@ -121,9 +117,8 @@ TEST(Trust, WhatWasHeardLastIsStaleAndCorrectedInTheLogOfMoves) {
 
 // A count that begins anew says nothing of where the motor stands; what was known before does.
 TEST(Trust, WhereMotorsStoodBeforeTheirMcuRestartedIsInTheLog) {
-  Lab lab(hall(1, 1));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {50})).result, "reached");
+  ReadyLab lab(hall(1, 1));
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {50}).result, "reached");
   lab.bus(0).reboot(0, 50'000'000);
   ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == api::Trust::kUnknown; }, 5));
   find(lab);
@@ -136,9 +131,8 @@ TEST(Trust, WhereMotorsStoodBeforeTheirMcuRestartedIsInTheLog) {
 }
 
 TEST(Trust, WhoSetAPositionIsInTheLog) {
-  Lab lab(hall(1, 1));
-  lab.connect();
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {50})).result, "reached");
+  ReadyLab lab(hall(1, 1));
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {50}).result, "reached");
   const auto set = lab.send(Ask::kSetPosition, {"m01"}, {7});
   EXPECT_EQ(lab.wait(set).result, "done");
   const auto event = last_event(lab, "set");

@@ -54,8 +54,7 @@ class OtherMaster {
 TEST(TwoMasters, WhatTheOtherOneHasChangedIsSetUpAgain) {
   for (const char* manner : {"fine_table", "fine"}) {
     SCOPED_TRACE(manner);
-    Lab lab(hall(1, 1, manner));
-    lab.connect();
+    ReadyLab lab(hall(1, 1, manner));
     OtherMaster other(lab);
     other.sync(77);
     lab.run_for(0.2);
@@ -65,7 +64,7 @@ TEST(TwoMasters, WhatTheOtherOneHasChangedIsSetUpAgain) {
     ASSERT_EQ(lab.state_of("hall:1").detail, "another master talks on the bus");
     ASSERT_TRUE(lab.run_until([&] { return lab.state_of("hall:1").detail.empty(); }, 10));
     ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
-    EXPECT_EQ(lab.wait(lab.send(Ask::kMoveBy, {"m01"}, {500})).result, "reached");
+    EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {500}).result, "reached");
     EXPECT_EQ(lab.shaft_steps("m01"), 500);
   }
 }

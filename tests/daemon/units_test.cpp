@@ -15,9 +15,7 @@ using testing::HasSubstr;
 
 // Two motors on one MCU; `keys` are of m01.
 std::string lab_with(const std::string& keys) {
-  std::string toml = hall(1, 2, "fine");
-  const std::string motor = "output = 0\n";
-  return toml.insert(toml.find(motor) + motor.size(), keys);
+  return with_keys(hall(1, 2), "m01", keys);
 }
 
 constexpr const char* kBlade =
@@ -35,9 +33,8 @@ api::Request set(double user, bool dial = false) {
 }
 
 TEST(Units, MovesGoToTheNearestStepOnTheUsersScale) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
-  const Answer moved = lab.wait(lab.send(to(8.0014)));  // dial 1.9986: 799.44 steps
+  ReadyLab lab(lab_with(kBlade));
+  const Answer moved = lab.ask(to(8.0014));  // dial 1.9986: 799.44 steps
   EXPECT_EQ(moved.result, "reached") << moved.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 799);
   const api::MotorState state = lab.motor("m01");
@@ -46,35 +43,31 @@ TEST(Units, MovesGoToTheNearestStepOnTheUsersScale) {
   EXPECT_EQ(state.user, 8.0025);
   EXPECT_EQ(state.user_target, 8.0025);
   // Forward on the user's scale is backward on the dial.
-  EXPECT_EQ(lab.wait(lab.send(by(1))).result, "reached");
+  EXPECT_EQ(lab.ask(by(1)).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 399);
   // In steps, and of a motor without a unit.
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {400})).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {400}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 400);
-  EXPECT_EQ(lab.wait(lab.send(api::Move{.motors = {{"m02", api::UserUnits{-7}}}})).result,
-            "reached");
+  EXPECT_EQ(lab.ask(api::Move{.motors = {{"m02", api::UserUnits{-7}}}}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m02"), -7);
   EXPECT_EQ(lab.motor("m02").user, -7);
 }
 
 TEST(Units, WhatIsNoNumberIsRefused) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
+  ReadyLab lab(lab_with(kBlade));
   for (const double number : {std::nan(""), HUGE_VAL, 1e300}) {
-    EXPECT_EQ(lab.wait(lab.send(to(number))).result, "refused");
-    EXPECT_EQ(lab.wait(lab.send(by(number))).result, "refused");
-    EXPECT_EQ(lab.wait(lab.send(set(number))).result, "refused");
-    EXPECT_EQ(lab.wait(lab.send(set(number, true))).result, "refused");
+    EXPECT_EQ(lab.ask(to(number)).result, "refused");
+    EXPECT_EQ(lab.ask(by(number)).result, "refused");
+    EXPECT_EQ(lab.ask(set(number)).result, "refused");
+    EXPECT_EQ(lab.ask(set(number, true)).result, "refused");
   }
-  const Answer half = lab.wait(lab.send(api::Move{.motors = {{"m02", api::UserUnits{0.5}}}}));
-  EXPECT_EQ(half.result, "refused");
-  EXPECT_THAT(half.reason, HasSubstr("m02: 0.5 is no whole number of steps"));
+  EXPECT_THAT(lab.ask(api::Move{.motors = {{"m02", api::UserUnits{0.5}}}}),
+              Ends("refused", "m02: 0.5 is no whole number of steps"));
   EXPECT_EQ(lab.shaft_steps("m01"), 0);
 }
 
 TEST(Units, TheDescriptionTellsScaleAndLimits) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
+  ReadyLab lab(lab_with(kBlade));
   lab.run_for(4);
   const api::MotorDescription blade = lab.description("m01");
   EXPECT_EQ(blade.scale, (units::Scale{"mm", {400, 1}, true, 10, 4}));
@@ -84,17 +77,16 @@ TEST(Units, TheDescriptionTellsScaleAndLimits) {
 }
 
 TEST(Units, SetChangesTheOffsetAndSetDialThePosition) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
-  ASSERT_EQ(lab.wait(lab.send(to(9))).result, "reached");  // 400 steps
-  EXPECT_EQ(lab.wait(lab.send(set(100.5))).result, "done");
+  ReadyLab lab(lab_with(kBlade));
+  ASSERT_EQ(lab.ask(to(9)).result, "reached");  // 400 steps
+  EXPECT_EQ(lab.ask(set(100.5)).result, "done");
   lab.run_for(0.2);
   EXPECT_EQ(lab.motor("m01").user, 100.5);
   EXPECT_EQ(lab.motor("m01").position_steps, 400);
   EXPECT_THAT(lab.move_lines().back(), HasSubstr("\"event\":\"offset\""));
-  EXPECT_EQ(lab.wait(lab.send(to(100))).result, "reached");
+  EXPECT_EQ(lab.ask(to(100)).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 600);
-  EXPECT_EQ(lab.wait(lab.send(set(2, true))).result, "done");
+  EXPECT_EQ(lab.ask(set(2, true)).result, "done");
   lab.run_for(0.2);
   EXPECT_EQ(lab.motor("m01").position_steps, 800);
   EXPECT_EQ(lab.motor("m01").dial, 2);
@@ -102,53 +94,47 @@ TEST(Units, SetChangesTheOffsetAndSetDialThePosition) {
   // Whether it moves makes a difference.
   const auto move = lab.send(by(2));
   lab.run_for(0.05);
-  const Answer busy = lab.wait(lab.send(set(0)));
-  EXPECT_EQ(busy.result, "refused");
-  EXPECT_THAT(busy.reason, HasSubstr("at rest"));
+  EXPECT_THAT(lab.ask(set(0)), Ends("refused", "at rest"));
   lab.wait(move);
 }
 
 TEST(Units, AnOffsetSaysNothingOfAPositionThatIsUncertain) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
+  ReadyLab lab(lab_with(kBlade));
   lab.bus(0).reboot(0, 50'000'000);
   lab.run_until([&] { return lab.motor("m01").trust == api::Trust::kUncertain; });
   lab.connect();
-  const Answer refused = lab.wait(lab.send(set(3)));
-  EXPECT_EQ(refused.result, "refused");
-  EXPECT_THAT(refused.reason, HasSubstr("--dial"));
-  EXPECT_EQ(lab.wait(lab.send(set(3, true))).result, "done");
+  const Answer refused = lab.ask(set(3));
+  EXPECT_THAT(refused, Ends("refused", "--dial"));
+  EXPECT_EQ(lab.ask(set(3, true)).result, "done");
   lab.run_for(0.2);
   EXPECT_EQ(lab.motor("m01").trust, api::Trust::kKnown);
   EXPECT_EQ(lab.motor("m01").user, 7);
 }
 
 TEST(SoftLimits, ATargetBeyondIsRefusedWithFigures) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
-  const Answer refused = lab.wait(lab.send(to(4)));  // dial 6
+  ReadyLab lab(lab_with(kBlade));
+  const Answer refused = lab.ask(to(4));  // dial 6
   EXPECT_EQ(refused.result, "refused");
   EXPECT_EQ(refused.reason,
             "m01: target 4.0000 mm is beyond the soft limit at 4.5000 mm; allowed: 4.5000 mm to "
             "15.0000 mm");
-  EXPECT_EQ(lab.wait(lab.send(to(4.5))).result, "reached");
+  EXPECT_EQ(lab.ask(to(4.5)).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 2200);
-  EXPECT_EQ(lab.wait(lab.send(by(-0.0025))).result, "refused") << "one step";
-  EXPECT_EQ(lab.wait(lab.send(Ask::kMoveTo, {"m01"}, {2201})).result, "refused") << "in steps too";
-  EXPECT_EQ(lab.wait(lab.send(to(15.0025))).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(to(15))).result, "reached");
+  EXPECT_EQ(lab.ask(by(-0.0025)).result, "refused") << "one step";
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m01"}, {2201}).result, "refused") << "in steps too";
+  EXPECT_EQ(lab.ask(to(15.0025)).result, "refused");
+  EXPECT_EQ(lab.ask(to(15)).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), -2000);
 }
 
 TEST(SoftLimits, HoldForNewTargetsAndForDryRuns) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
+  ReadyLab lab(lab_with(kBlade));
   const auto move = lab.send(to(5));
   lab.run_for(0.1);
-  EXPECT_EQ(lab.wait(lab.send(to(4))).result, "refused");
-  EXPECT_EQ(lab.wait(lab.send(api::Move{.kind = api::Move::Kind::kAbsolute,
-                                        .motors = {{"m01", api::UserUnits{4}}, {"m02", 5}},
-                                        .dry_run = true}))
+  EXPECT_EQ(lab.ask(to(4)).result, "refused");
+  EXPECT_EQ(lab.ask(api::Move{.kind = api::Move::Kind::kAbsolute,
+                              .motors = {{"m01", api::UserUnits{4}}, {"m02", 5}},
+                              .dry_run = true})
                 .result,
             "refused");
   EXPECT_EQ(lab.wait(move).result, "reached");
@@ -156,14 +142,13 @@ TEST(SoftLimits, HoldForNewTargetsAndForDryRuns) {
 }
 
 TEST(SoftLimits, WhoStandsBeyondMayMoveTowardsThem) {
-  Lab lab(lab_with(kBlade));
-  lab.connect();
-  ASSERT_EQ(lab.wait(lab.send(set(8, true))).result, "done");  // dial 8, the limit is 5.5
-  EXPECT_EQ(lab.wait(lab.send(to(1.9))).result, "refused") << "farther out";
-  EXPECT_EQ(lab.wait(lab.send(to(3))).result, "reached") << "dial 7, still outside";
-  EXPECT_EQ(lab.wait(lab.send(to(2.5))).result, "refused") << "out again";
-  EXPECT_EQ(lab.wait(lab.send(to(15.1))).result, "refused") << "through to the other side";
-  EXPECT_EQ(lab.wait(lab.send(to(10))).result, "reached");
+  ReadyLab lab(lab_with(kBlade));
+  ASSERT_EQ(lab.ask(set(8, true)).result, "done");  // dial 8, the limit is 5.5
+  EXPECT_EQ(lab.ask(to(1.9)).result, "refused") << "farther out";
+  EXPECT_EQ(lab.ask(to(3)).result, "reached") << "dial 7, still outside";
+  EXPECT_EQ(lab.ask(to(2.5)).result, "refused") << "out again";
+  EXPECT_EQ(lab.ask(to(15.1)).result, "refused") << "through to the other side";
+  EXPECT_EQ(lab.ask(to(10)).result, "reached");
 }
 
 // The rules of the documents in integers alone: positions of a thousandth of a unit, 7 steps a
@@ -196,9 +181,8 @@ TEST(Units, RandomRequestsAgreeWithTheModel) {
     return std::uniform_int_distribution<std::int64_t>(low, high)(random);
   };
   for (const int sign : {1, -1}) {
-    Lab lab(lab_with("unit = \"deg\"\nsteps_per_unit = 7\nsoft_limits = [-100.05, 90]\n" +
-                     std::string(sign < 0 ? "direction = \"negative\"\n" : "")));
-    lab.connect();
+    ReadyLab lab(lab_with("unit = \"deg\"\nsteps_per_unit = 7\nsoft_limits = [-100.05, 90]\n" +
+                          std::string(sign < 0 ? "direction = \"negative\"\n" : "")));
     Model model{.sign = sign};
     std::int64_t turned = 0;  // what setting the dial has hidden from the shaft
     for (int i = 0; i < 150; ++i) {
@@ -208,12 +192,12 @@ TEST(Units, RandomRequestsAgreeWithTheModel) {
       switch (between(0, 9)) {
         case 0:  // Only offsets of whole thousandths: the model has no others.
           if (model.steps % 7 != 0) break;
-          ASSERT_EQ(lab.wait(lab.send(set(user))).result, "done");
+          ASSERT_EQ(lab.ask(set(user)).result, "done");
           model.offset = number - sign * model.steps / 7 * 1000;
           model.asked = model.steps * 1000;
           break;
         case 1:
-          ASSERT_EQ(lab.wait(lab.send(set(user, true))).result, "done");
+          ASSERT_EQ(lab.ask(set(user, true)).result, "done");
           model.steps = Model::nearest(number * 7, 1000);
           turned += model.steps - before;
           model.asked = model.steps * 1000;
@@ -224,7 +208,7 @@ TEST(Units, RandomRequestsAgreeWithTheModel) {
           if (std::abs(asked) % 1000 == 500) break;  // either way
           const std::int64_t target = Model::nearest(asked, 1000);
           const bool allowed = Model::allowed(target, before);
-          ASSERT_EQ(lab.wait(lab.send(by(user))).result, allowed ? "reached" : "refused") << i;
+          ASSERT_EQ(lab.ask(by(user)).result, allowed ? "reached" : "refused") << i;
           if (!allowed) break;
           model.steps = target;
           model.asked = asked;
@@ -233,7 +217,7 @@ TEST(Units, RandomRequestsAgreeWithTheModel) {
         default: {
           const std::int64_t target = model.steps_of_user(number);
           const bool allowed = Model::allowed(target, before);
-          ASSERT_EQ(lab.wait(lab.send(to(user))).result, allowed ? "reached" : "refused") << i;
+          ASSERT_EQ(lab.ask(to(user)).result, allowed ? "reached" : "refused") << i;
           if (!allowed) break;
           model.steps = target;
           model.asked = sign * (number - model.offset) * 7;

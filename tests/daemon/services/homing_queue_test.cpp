@@ -15,13 +15,9 @@ using testing::HasSubstr;
 
 // One MCU with two motors, each with a home switch.
 std::string homes() {
-  std::string toml = test::hall(1, 2);
-  const std::string group = "group = \"axes\"\n";
-  for (std::size_t at = toml.find(group); at != std::string::npos; at = toml.find(group, at + 1)) {
-    toml.insert(at + group.size(),
-                "home = { direction = \"negative\", position_steps = -50, most_steps = 6000 }\n");
-  }
-  return toml;
+  const std::string home =
+      "home = { direction = \"negative\", position_steps = -50, most_steps = 6000 }\n";
+  return test::with_keys(test::with_keys(test::hall(1, 2), "m01", home), "m02", home);
 }
 
 struct HomingBench : LiveBench {

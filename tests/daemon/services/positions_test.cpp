@@ -16,8 +16,8 @@ namespace {
 using test::LiveBench;
 using testing::HasSubstr;
 
-std::string with_unit(std::string toml) {
-  return toml.insert(toml.find("name = \"m01\""), "unit = \"mm\"\nsteps_per_unit = 400\n");
+std::string with_unit(const std::string& toml) {
+  return test::with_keys(toml, "m01", "unit = \"mm\"\nsteps_per_unit = 400\n");
 }
 
 struct PositionsBench : LiveBench {
@@ -73,18 +73,16 @@ TEST(Positions, AreSetAtRestOnlyAndWithinTheirRange) {
 
 // Some of those that are to be set may be set, and offsets are none of the MCU's.
 TEST(Positions, SetByHalvesAreSaidAndOffsetsStayThen) {
-  test::Lab lab(with_unit(test::hall(2, 2)));
-  lab.connect();
+  test::ReadyLab lab(with_unit(test::hall(2, 2)));
   lab.on_send = test::loses(2, BUSHD_MSG_SET_POSITION);
   const auto number = lab.send(api::SetPosition{
       {{"m01", api::UserUnits{5}}, {"m02", std::int64_t{77}}, {"m03", std::int64_t{-3}}}});
   lab.run_for(1);
   EXPECT_EQ(lab.motor("m01").user, 0) << "not before the MCUs have the others";
-  const test::Answer meanwhile = lab.wait(lab.send(test::Ask::kMoveBy, {"m01"}, {10}));
+  const test::Answer meanwhile = lab.ask(test::Ask::kMoveBy, {"m01"}, {10});
   EXPECT_THAT(meanwhile.reason, HasSubstr("its position is being set"));
   const test::Answer answer = lab.wait(number);
-  EXPECT_EQ(answer.result, "fault");
-  EXPECT_THAT(answer.reason, HasSubstr("MCU hall:2 did not confirm it in time"));
+  EXPECT_THAT(answer, test::Ends("fault", "MCU hall:2 did not confirm it in time"));
   EXPECT_THAT(answer.reason, HasSubstr("; set: m02; not set: m03, m01"));
   EXPECT_EQ(lab.motor("m01").user, 0);
   EXPECT_EQ(lab.motor("m02").position_steps, 77);
@@ -95,9 +93,9 @@ TEST(Positions, SetByHalvesAreSaidAndOffsetsStayThen) {
                                   }),
             1);
   lab.on_send = {};
-  EXPECT_EQ(lab.wait(lab.send(api::SetPosition{{{"m01", api::UserUnits{5}},
-                                                {"m02", std::int64_t{77}},
-                                                {"m03", std::int64_t{-3}}}}))
+  EXPECT_EQ(lab.ask(api::SetPosition{{{"m01", api::UserUnits{5}},
+                                      {"m02", std::int64_t{77}},
+                                      {"m03", std::int64_t{-3}}}})
                 .result,
             "done");
   EXPECT_EQ(lab.motor("m01").user, 5);

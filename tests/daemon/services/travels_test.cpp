@@ -16,15 +16,11 @@ constexpr std::uint32_t kWay = 40;
 
 // m01 and m02 have limit switches of their own at both ends, m03 has none.
 std::string shutters() {
-  std::string toml = test::hall(1, 3);
-  const std::string group = "group = \"axes\"\n";
-  std::size_t at = toml.find(group) + group.size();
-  toml.insert(at,
-              "inputs = { positive = 3, negative = 4 }\n"
-              "unit = \"mm\"\nsteps_per_unit = 10\nsoft_limits = [-1, 8]\n");
-  at = toml.find(group, at) + group.size();
-  toml.insert(at, "inputs = { positive = 5, negative = 6 }\n");
-  return toml;
+  const std::string first =
+      test::with_keys(test::hall(1, 3), "m01",
+                      "inputs = { positive = 3, negative = 4 }\n"
+                      "unit = \"mm\"\nsteps_per_unit = 10\nsoft_limits = [-1, 8]\n");
+  return test::with_keys(first, "m02", "inputs = { positive = 5, negative = 6 }\n");
 }
 
 struct TravelsBench : LiveBench {
