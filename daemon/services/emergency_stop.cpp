@@ -115,14 +115,7 @@ void EmergencyStop::request(std::int64_t now_us, const api::Asker& asker,
     stopping.done = "done; not online, so it is unknown whether they stand:" + unknown +
                     "; each is stopped as soon as it comes";
   }
-  if (open_.size() >= kMaxOpen) {
-    open_.front().asker.answer(api::Completed{
-        .outcome = api::Outcome::kStopped,
-        .reason = "carried out; so many stops are under way that its end is not waited for",
-        .detail = {}});
-    open_.pop_front();
-  }
-  open_.push_back(std::move(stopping));
+  open_.add(std::move(stopping), stopped_without_end());
 }
 
 Result<void> EmergencyStop::follow(std::int64_t now_us, Stopping& stopping) const {
@@ -145,7 +138,7 @@ Result<void> EmergencyStop::follow(std::int64_t now_us, Stopping& stopping) cons
 }
 
 void EmergencyStop::follow(std::int64_t now_us) {
-  std::erase_if(open_, [&](Stopping& stopping) {
+  open_.follow([&](Stopping& stopping) {
     const auto good = follow(now_us, stopping);
     if (good && !stopping.mcus.empty()) return false;
     installation_.changed = true;

@@ -6,11 +6,11 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "daemon/model/awaited.h"
 #include "daemon/model/interlocks.h"
 #include "daemon/model/outputs.h"
 #include "daemon/model/service.h"
@@ -21,10 +21,6 @@ namespace bushd::daemon {
 
 class EmergencyStop final : public Service {
  public:
-  // Whose end is waited for at a time: anybody may send them, as fast as can be. Beyond, they are
-  // carried out all the same.
-  static constexpr std::size_t kMaxOpen = 256;
-
   EmergencyStop(Installation& installation, Interlocks& interlocks, HomingQueue& homing,
                 OpenMoves& open_moves, KeptPositions& kept, Outputs& outputs);
 
@@ -60,7 +56,7 @@ class EmergencyStop final : public Service {
   OpenMoves& open_moves_;
   KeptPositions& kept_;
   Outputs& outputs_;
-  std::list<Stopping> open_;
+  Awaited<Stopping> open_;
   std::set<McuId> bound_;  // as was kept, or noticed, last
 };
 

@@ -94,7 +94,7 @@ void Holds::request(std::int64_t now_us, const api::Asker& asker, const api::Hol
   open_moves_.stopped_by(armed, text_of(asker));
   moves_.stop(now_us, armed);
   installation_.changed = true;
-  if (open_.size() >= kMaxOpen) {
+  if (open_.size() >= kMostAwaited) {
     const Holding& oldest = open_.front();
     const std::string not_known = oldest.unknown.empty() ? "" : "; " + oldest.unknown;
     kept_.answer_when_kept(

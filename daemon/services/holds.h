@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/model/awaited.h"
 #include "daemon/model/interlocks.h"
 #include "daemon/model/outputs.h"
 #include "daemon/model/service.h"
@@ -19,9 +20,6 @@ namespace bushd::daemon {
 
 class Holds final : public Service {
  public:
-  // For whose MCUs is waited at a time; beyond, motors are held all the same.
-  static constexpr std::size_t kMaxOpen = 256;
-
   // It adds a check to the interlocks.
   Holds(Installation& installation, Interlocks& interlocks, Moves& moves, LocalInputs& local_inputs,
         OpenMoves& open_moves, KeptPositions& kept, Outputs& outputs);

@@ -91,11 +91,7 @@ void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Pa
   }
   moves_.pause(now_us, to_pause);
   moves_.stop(now_us, jogs);
-  if (open_pauses_.size() >= kMaxOpen) {
-    open_pauses_.front().asker.answer(api::done("carried out; its end is not waited for"));
-    open_pauses_.pop_front();
-  }
-  open_pauses_.push_back(std::move(pausing));
+  open_pauses_.add(std::move(pausing), api::done("carried out; its end is not waited for"));
 }
 
 void Pauses::request(std::int64_t now_us, const api::Asker& asker, const api::Resume& request) {
@@ -173,7 +169,7 @@ std::string Pauses::text_of_left(const Pausing& pausing) const {
 }
 
 void Pauses::step(std::int64_t) {
-  std::erase_if(open_pauses_, [this](Pausing& pausing) {
+  open_pauses_.follow([this](Pausing& pausing) {
     std::erase_if(pausing.motors,
                   [&](const auto& motor) { return has_ended(pausing, motor.first, motor.second); });
     if (!pausing.motors.empty()) return false;

@@ -3,12 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
 #include <map>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "daemon/model/awaited.h"
 #include "daemon/model/interlocks.h"
 #include "daemon/model/service.h"
 #include "daemon/services/moves.h"
@@ -19,9 +19,6 @@ namespace bushd::daemon {
 
 class Pauses final : public Service {
  public:
-  // Whose standstill is waited for at a time; beyond, motors are paused all the same.
-  static constexpr std::size_t kMaxOpen = 256;
-
   Pauses(Installation& installation, const Interlocks& interlocks, Moves& moves, Programs& programs,
          OpenMoves& open_moves);
 
@@ -52,7 +49,7 @@ class Pauses final : public Service {
   Moves& moves_;
   Programs& programs_;
   OpenMoves& open_;
-  std::list<Pausing> open_pauses_;
+  Awaited<Pausing> open_pauses_;
 };
 
 }  // namespace bushd::daemon

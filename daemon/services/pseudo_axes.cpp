@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <utility>
 
 #include "base/overloaded.h"
@@ -93,6 +94,11 @@ api::MotorNames names_in(const auto& request) {
   if constexpr (requires { request.group; }) names.push_back(request.group);
   return names;
 }
+
+// What ends or holds motion, or lifts that, is meant for the motors of an axis.
+template <class R>
+concept MeantForMotors = std::same_as<decltype(R::motors), api::MotorNames> &&
+                         (api::ends(R::motion()) || requires { R::kNamesGroups; });
 
 // The state of all motors together, but for the position.
 void take_worst(api::MotorState& all, const api::MotorState& motor) {
@@ -209,7 +215,6 @@ api::MotorResult PseudoAxes::result_of(const Place& place, const api::Completed&
 Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& request) const {
   using Answer = Result<std::optional<api::Request>>;
   if (size() == 0) return std::nullopt;
-  // Stops and holds are those of its motors.
   const auto named = [this](auto copy) -> Answer {
     api::MotorNames names;
     bool any = false;
@@ -246,12 +251,7 @@ Result<std::optional<api::Request>> PseudoAxes::of_motors(const api::Request& re
                                  if (!asked) return fail(asked.error());
                                  return std::move(*asked);
                                },
-                               [&](const api::Stop& r) { return named(r); },
-                               [&](const api::Disarm& r) { return named(r); },
-                               [&](const api::Pause& r) { return named(r); },
-                               [&](const api::Resume& r) { return named(r); },
-                               [&](const api::Hold& r) { return named(r); },
-                               [&](const api::Release& r) { return named(r); },
+                               [&](const MeantForMotors auto& r) { return named(r); },
                                [&](const auto& r) -> Answer {
                                  for (const std::string& name : names_in(r)) {
                                    if (auto refused = refuse(name); !refused) return refused;

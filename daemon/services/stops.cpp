@@ -31,14 +31,7 @@ void Stops::request(std::int64_t now_us, const api::Asker& asker, const api::Sto
     return asker.answer(result_in_part(motors, stopping.not_done, any_moves));
   }
   stopping.motors = std::move(moving);
-  if (open_.size() >= kMaxOpen) {
-    open_.front().asker.answer(api::Completed{
-        .outcome = api::Outcome::kStopped,
-        .reason = "carried out; so many stops are under way that its end is not waited for",
-        .detail = {}});
-    open_.pop_front();
-  }
-  open_.push_back(std::move(stopping));
+  open_.add(std::move(stopping), stopped_without_end());
 }
 
 // Where all motors are meant, those count that were lost while they moved: racks may be without
@@ -116,7 +109,7 @@ bool Stops::can_be_stopped(MotorId motor) const {
 
 // However long a motor's ramp is, it ends: there is no deadline.
 void Stops::follow() {
-  std::erase_if(open_, [this](Stopping& stopping) {
+  open_.follow([this](Stopping& stopping) {
     std::erase_if(stopping.motors, [&](MotorId id) {
       const motion::Motor& motor = installation_[id];
       const Mcu& mcu = installation_.mcu_of(id);

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
 #include <string>
 #include <vector>
 
+#include "daemon/model/awaited.h"
 #include "daemon/model/service.h"
 #include "daemon/services/homing_queue.h"
 #include "daemon/services/local_inputs.h"
@@ -17,10 +17,6 @@ namespace bushd::daemon {
 
 class Stops final : public Service {
  public:
-  // Whose end is waited for at a time: anybody may send stops, as fast as can be. Beyond, they are
-  // carried out all the same.
-  static constexpr std::size_t kMaxOpen = 256;
-
   Stops(Installation& installation, Moves& moves, HomingQueue& homing, Travels& travels,
         Programs& programs, LocalInputs& local_inputs, OpenMoves& open_moves)
       : installation_(installation),
@@ -62,7 +58,7 @@ class Stops final : public Service {
   Programs& programs_;
   LocalInputs& local_inputs_;
   OpenMoves& open_moves_;
-  std::list<Stopping> open_;
+  Awaited<Stopping> open_;
 };
 
 }  // namespace bushd::daemon

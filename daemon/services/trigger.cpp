@@ -141,15 +141,12 @@ void Trigger::request(const api::Asker& asker, const api::Disarm& request) {
         .detail = {}});
   }
   asker.answer(api::Accepted{});
-  if (open_.size() >= kMaxOpen) {
-    open_.front().asker.answer(api::done("carried out; its end is not waited for"));
-    open_.pop_front();
-  }
-  open_.push_back({.asker = asker, .motors = std::move(motors), .done = "done" + away});
+  open_.add({.asker = asker, .motors = std::move(motors), .done = "done" + away},
+            api::done("carried out; its end is not waited for"));
 }
 
 void Trigger::follow() {
-  std::erase_if(open_, [this](Disarming& disarming) {
+  open_.follow([this](Disarming& disarming) {
     std::erase_if(disarming.motors, [&](MotorId id) {
       const motion::Motor& motor = installation_[id];
       if (motor.is<motion::Armed>()) return false;

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
 #include <string>
 #include <vector>
 
+#include "daemon/model/awaited.h"
 #include "daemon/model/service.h"
 #include "daemon/services/moves.h"
 
@@ -17,9 +17,6 @@ Result<void> check_trigger_delay(std::int64_t delay_us);
 
 class Trigger final : public Service {
  public:
-  // Disarmings whose end is waited for at a time; beyond, they are carried out all the same.
-  static constexpr std::size_t kMaxOpen = 256;
-
   Trigger(Installation& installation, const Interlocks& interlocks, const Moves& moves,
           OpenMoves& open_moves)
       : installation_(installation),
@@ -53,7 +50,7 @@ class Trigger final : public Service {
   const Interlocks& interlocks_;
   const Moves& moves_;
   OpenMoves& open_moves_;
-  std::list<Disarming> open_;
+  Awaited<Disarming> open_;
 };
 
 }  // namespace bushd::daemon

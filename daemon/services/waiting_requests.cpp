@@ -25,38 +25,34 @@ bool waits_for_trigger(const api::Request& request) {
 }  // namespace
 
 std::optional<std::vector<MotorId>> WaitingRequests::motors_of(const api::Request& request) const {
-  const auto found =
-      std::visit(Overloaded{[&](const api::Move& r) -> Result<std::vector<MotorId>> {
-                              if (r.dry_run) return std::vector<MotorId>();
-                              return installation_.find(r.motors);
-                            },
-                            [&](const api::MoveLine& r) -> Result<std::vector<MotorId>> {
-                              if (r.dry_run) return std::vector<MotorId>();
-                              return installation_.find(r.motors);
-                            },
-                            [&](const api::MovePath& r) -> Result<std::vector<MotorId>> {
-                              // When all of its points are here.
-                              const std::size_t rows =
-                                  r.positions.size() / std::max<std::size_t>(r.motors.size(), 1);
-                              const bool last = r.first_row >= 0 && r.rows >= 0 &&
-                                                static_cast<std::size_t>(r.first_row) + rows >=
-                                                    static_cast<std::size_t>(r.rows);
-                              if (r.dry_run || !last) return std::vector<MotorId>();
-                              return installation_.find(r.motors);
-                            },
-                            [&](const api::Follow& r) -> Result<std::vector<MotorId>> {
-                              if (r.part != api::Follow::Part::kRun) return std::vector<MotorId>();
-                              return installation_.find(r.motors);
-                            },
-                            [&](const api::Arm& r) { return installation_.find(r.motors); },
-                            [&](const api::ArmLine& r) { return installation_.find(r.motors); },
-                            [&](const api::Jog& r) -> Result<std::vector<MotorId>> {
-                              if (r.per_s == 0 || r.renew) return std::vector<MotorId>();
-                              return installation_.find(api::MotorNames{r.motor});
-                            },
-                            [&](const api::SetPosition& r) { return installation_.find(r.motors); },
-                            [](const auto&) -> Result<std::vector<MotorId>> { return {}; }},
-                 request);
+  using Motors = Result<std::vector<MotorId>>;
+  const auto found = std::visit(
+      Overloaded{
+          [&](const api::MovePath& r) -> Motors {
+            // When all of its points are here.
+            const std::size_t rows = r.positions.size() / std::max<std::size_t>(r.motors.size(), 1);
+            const bool last =
+                r.first_row >= 0 && r.rows >= 0 &&
+                static_cast<std::size_t>(r.first_row) + rows >= static_cast<std::size_t>(r.rows);
+            return r.dry_run || !last ? Motors() : installation_.find(r.motors);
+          },
+          [&](const api::Follow& r) -> Motors {
+            return r.part == api::Follow::Part::kRun ? installation_.find(r.motors) : Motors();
+          },
+          [&](const api::Jog& r) -> Motors {
+            const bool begins = r.per_s != 0 && !r.renew;
+            return begins ? installation_.find(api::MotorNames{r.motor}) : Motors();
+          },
+          [&](const auto& r) -> Motors {
+            if constexpr (requires { r.dry_run; }) {
+              if (r.dry_run) return {};
+            }
+            // It moves each by an amount, or to one, or says that it stands there.
+            if constexpr (requires { r.motors.front().amount; })
+              return installation_.find(r.motors);
+            return {};
+          }},
+      request);
   if (!found || found->empty() || !interlocks_.may_move()) return std::nullopt;
   const bool moves = !std::holds_alternative<api::SetPosition>(request);
   // What is refused anyway leaves the disk alone.

@@ -16,7 +16,7 @@ TEST(EmergencyStop, AFloodIsCarriedOutAndItsMemoryIsBounded) {
   LiveBench bench;  // not connected
   EmergencyStop& emergency_stop = bench.emergency_stop;
   constexpr std::size_t kMore = 10;
-  for (std::size_t i = 0; i < EmergencyStop::kMaxOpen + kMore; ++i) {
+  for (std::size_t i = 0; i < kMostAwaited + kMore; ++i) {
     emergency_stop.request(0, bench.asker(static_cast<std::int64_t>(i)), {});
   }
   EXPECT_TRUE(emergency_stop.under_way());

@@ -60,7 +60,7 @@ TEST(Stops, AFloodIsCarriedOutAndItsMemoryIsBounded) {
   bench.move(1, "m01", 5000);
   bench.run_for(0.4);
   constexpr std::int64_t kMore = 10;
-  const auto last = std::int64_t{Stops::kMaxOpen} + kMore + 1;
+  const auto last = std::int64_t{kMostAwaited} + kMore + 1;
   for (std::int64_t i = 2; i <= last; ++i) {
     bench.stops.request(bench.now_us(), bench.asker(i), {});
   }
