@@ -80,15 +80,25 @@ class AloneLab : private Edges, public CamacLab {
   bool begins() {
     return run_until([&] { return steps(0).size() >= 3; });
   }
+  void begin(int steps_to_make, std::uint32_t control) {
+    load(0, steps_to_make, falling());
+    permit(control);
+    ASSERT_TRUE(begins());
+  }
+};
+
+struct KeptAloneLab : AloneLab {
+  KeptAloneLab() {
+    keep_positions();
+    connect();
+  }
 };
 
 TEST(CamacAlone, Bushd2EndsWhereTheReportPutsItWithoutTheComputer) {
   for (const int steps : {475, 1001}) {
     SCOPED_TRACE(steps);
     AloneLab lab;
-    lab.load(0, steps, falling());
-    lab.permit(kEnabled | kLeft);
-    ASSERT_TRUE(lab.begins());
+    lab.begin(steps, kEnabled | kLeft);
     lab.restart_daemon([&] { lab.pass_without_daemon(40); });
     expect_steps(lab.steps(0), due_ns(falling(), steps));
     EXPECT_EQ(lab.shaft_steps("m01"), -steps);
@@ -105,8 +115,7 @@ TEST(CamacAlone, ADaemonThatLivesTellsAsEver) {
   EXPECT_EQ(lab.requests(), 0x10U | (300U % 4) << 8);
   expect_steps(lab.steps(0), due_ns(falling(), 300));
   lab.naf(kStation, 0, 10);
-  lab.permit(kEnabled | kLeft | 1);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled | kLeft | 1);
   EXPECT_EQ(lab.shaft_steps("m02"), -300);
   EXPECT_TRUE(lab.warnings().empty());
 }
@@ -119,8 +128,7 @@ TEST(CamacAlone, MotorsOfOneModuleMayBeAtSeveralMcus) {
                "without_computer = true\nmotors = [\"m01\", \"m02\"]\n");
   lab.load(0, 300, falling());
   for (const std::uint32_t motor : {0U, 1U, 0U}) {
-    lab.permit(kEnabled | motor);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled | motor);
     EXPECT_EQ(lab.requests() & 0xFF, 0x10U);
     lab.naf(kStation, 0, 10);
   }
@@ -130,9 +138,7 @@ TEST(CamacAlone, MotorsOfOneModuleMayBeAtSeveralMcus) {
 
 TEST(CamacAlone, F24AndStopsEndIt) {
   AloneLab lab;
-  lab.load(0, 20'000, falling());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.begins());
+  lab.begin(20'000, kEnabled);
   lab.naf(kStation, 0, 24);
   ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m01").moving; }));
   EXPECT_FALSE(lab.lam()) << "F24 raises no request";
@@ -153,12 +159,8 @@ TEST(CamacAlone, F24AndStopsEndIt) {
 TEST(CamacAlone, TheNextDaemonTellsWhatBecomesOfTheMotion) {
   for (const double away_s : {0.5, 40.0}) {
     SCOPED_TRACE(away_s);
-    AloneLab lab;
-    lab.keep_positions();
-    lab.connect();
-    lab.load(0, 1001, falling());
-    lab.permit(kEnabled | kLeft);
-    ASSERT_TRUE(lab.begins());
+    KeptAloneLab lab;
+    lab.begin(1001, kEnabled | kLeft);
     lab.run_for(0.2);
     lab.restart_daemon([&] { lab.pass_without_daemon(away_s); });
     EXPECT_EQ(lab.naf(kStation, 2, 0).data, kEnabled | kLeft) << "the control register";
@@ -173,8 +175,7 @@ TEST(CamacAlone, TheNextDaemonTellsWhatBecomesOfTheMotion) {
     const unsigned low = lab.naf(kStation, 0, 0).data;
     EXPECT_EQ(low | lab.naf(kStation, 0, 0).data << 8, 0x10000U - 1001) << "U28";
     ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
-    lab.permit(kEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled);
     EXPECT_EQ(lab.shaft_steps("m01"), 0) << "it is the module's again";
     lab.run_for(0.2);
     lab.restart_daemon();
@@ -184,12 +185,8 @@ TEST(CamacAlone, TheNextDaemonTellsWhatBecomesOfTheMotion) {
 }
 
 TEST(CamacAlone, F24OfTheNextDaemonEndsIt) {
-  AloneLab lab;
-  lab.keep_positions();
-  lab.connect();
-  lab.load(0, 20'000, falling());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.begins());
+  KeptAloneLab lab;
+  lab.begin(20'000, kEnabled);
   lab.run_for(0.2);
   lab.restart_daemon();
   lab.naf(kStation, 0, 24);
@@ -202,12 +199,8 @@ TEST(CamacAlone, F24OfTheNextDaemonEndsIt) {
 }
 
 TEST(CamacAlone, AMotionWhoseMcuWasResetIsAFault) {
-  AloneLab lab;
-  lab.keep_positions();
-  lab.connect();
-  lab.load(0, 20'000, falling());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.begins());
+  KeptAloneLab lab;
+  lab.begin(20'000, kEnabled);
   lab.run_for(0.2);
   lab.restart_daemon([&] { lab.bus(0).reboot(0, 50'000'000); });
   lab.naf(kStation, 2, 16, kEnabled);
@@ -217,12 +210,8 @@ TEST(CamacAlone, AMotionWhoseMcuWasResetIsAFault) {
 }
 
 TEST(CamacAlone, ADaemonThatEndsLeavesTheMotionToTheNextOne) {
-  AloneLab lab;
-  lab.keep_positions();
-  lab.connect();
-  lab.load(0, 1001, falling());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.begins());
+  KeptAloneLab lab;
+  lab.begin(1001, kEnabled);
   lab.run_for(0.2);
   lab.core().shut_down(lab.now_us());
   ASSERT_TRUE(lab.run_until([&] { return lab.core().at_rest(); }));
@@ -250,8 +239,7 @@ TEST(CamacAnyLaw, EveryStepComesAfterItsOwnCode) {
     codes[0] = 30;
     codes[1] = 90;
     lab.load(0, steps, codes);
-    lab.permit(kEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled);
     EXPECT_EQ(lab.requests(), 0x10U | static_cast<unsigned>(steps % 4) << 8);
     expect_steps(lab.steps(0), due_ns(codes, steps));
     EXPECT_THAT(lab.warnings(), Contains(HasSubstr("made as they are written; a stop in them ramps "
@@ -328,44 +316,28 @@ TEST(CamacAnyLaw, WaitsUntilItsMcuTakesCodes) {
 const std::vector<int> kRiseAndFall{400, 250, 300, 60, 120, 50, 70, 50, 300};
 const std::vector<int> kShutterCodes{400, 250, 120, 60, 50, 50, 70, 150, 300};
 
-class AloneShutter : private WithShutter, public CamacLab {
+class AloneShutter : public MechanicsLab {
  public:
-  explicit AloneShutter(bool without_computer = true)
-      : CamacLab(toml(without_computer), &mechanics, kShutterStation) {
-    mechanics.bus = &bus(0);
-    mechanics.tell();
-    run_for(0.1);
-  }
+  explicit AloneShutter(bool without_computer = true) : MechanicsLab(toml(without_computer)) {}
   static std::string toml(bool without_computer) {
     const std::string plain =
         lab_with("fine", "", "inputs = { positive = 3, negative = 4, step = 5 }\n");
     return without_computer ? alone(plain) : plain;
   }
-  void load_codes(const std::vector<int>& codes, int delay) {
-    mechanics.right_limit = static_cast<int>(codes.size());
-    mechanics.tell();
-    std::vector<int> bytes{static_cast<int>(codes.size()), 0, delay % 256, delay / 256};
-    for (const int code : codes) {
-      bytes.push_back(code % 256);
-      bytes.push_back(code / 256);
-    }
-    load_bytes(0, bytes);
-  }
   // The run of these steps, which begins then.
   sim::TimeNs expect_run(std::size_t first, sim::TimeNs at_ns, const std::vector<int>& codes) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
       at_ns += codes[i] * 50'000;
-      if (first + i >= mechanics.steps.size()) {
+      if (first + i >= shutter().steps.size()) {
         ADD_FAILURE() << "no step " << first + i;
         break;
       }
-      EXPECT_NEAR(static_cast<double>(mechanics.steps[first + i].time_ns),
+      EXPECT_NEAR(static_cast<double>(shutter().steps[first + i].time_ns),
                   static_cast<double>(at_ns), kNear)
           << "step " << first + i;
     }
     return at_ns;
   }
-  Shutter& shutter() { return mechanics; }
 };
 
 TEST(CamacAlone, Bushd1TravelsThereAndBackWithoutTheComputer) {
@@ -448,8 +420,7 @@ TEST(CamacAlone, Bushd1TellsAsEverWhileTheDaemonLives) {
     AloneShutter lab(without_computer);
     const std::vector<int>& codes = without_computer ? kShutterCodes : kRiseAndFall;
     lab.load_codes(codes, 6000);
-    lab.permit(kAutomatic | kAllOfShutter);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kAutomatic | kAllOfShutter);
     EXPECT_EQ(lab.requests(), 0x41u) << "right limit";
     lab.naf(kShutterStation, 0, 10);
     ASSERT_TRUE(lab.wait_for_lam());

@@ -62,8 +62,7 @@ TEST(CamacBoards, EachNumberTurnsItsOwnMotor) {
       SCOPED_TRACE(number);
       edges.steps.clear();
       lab.naf(5, 0, 10);
-      lab.permit(static_cast<std::uint32_t>(number) | 1 << 5 | 1 << 6 | (left ? 1u << 7 : 0u));
-      ASSERT_TRUE(lab.wait_for_lam());
+      lab.run_to_lam(static_cast<std::uint32_t>(number) | 1 << 5 | 1 << 6 | (left ? 1u << 7 : 0u));
       EXPECT_EQ(edges.steps, std::vector<StepEdges::Step>(3, {number, !left}));
     }
   }
@@ -95,8 +94,7 @@ TEST(CamacBoards, ProgramOfABushd2MovesAMotorBehindABoard) {
   // The board misses the supply, and the module tells its program.
   lab.naf(5, 0, 10);
   lab.board(0).supply = false;
-  lab.permit(1 | 1 << 5 | 1 << 6);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(1 | 1 << 5 | 1 << 6);
   EXPECT_EQ(lab.shaft_steps("m5"), -300);
   EXPECT_EQ(lab.requests() & 0x1Fu, 1u << 2);
 
@@ -106,8 +104,7 @@ TEST(CamacBoards, ProgramOfABushd2MovesAMotorBehindABoard) {
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
   lab.ask(Ask::kSetPosition, {"m5"}, {lab.shaft_steps("m5")});
   lab.naf(5, 0, 10);
-  lab.permit(1 | 1 << 5 | 1 << 6);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(1 | 1 << 5 | 1 << 6);
   EXPECT_EQ(lab.requests() & 0x1Fu, 1u << 3);
 }
 

@@ -72,6 +72,11 @@ class CamacLab : public Lab {
     const std::size_t before = lams().size();
     return run_until([&] { return lams().size() > before; }, limit_s);
   }
+  // A motion begins, and ends with a request.
+  void run_to_lam(std::uint32_t control) {
+    permit(control);
+    ASSERT_TRUE(wait_for_lam());
+  }
 
  private:
   int station_;
@@ -126,16 +131,10 @@ struct WithShutter {
   Shutter mechanics;
 };
 
-class ShutterLab : private WithShutter, public CamacLab {
+// A BUSHD-1 with its shutter.
+class MechanicsLab : private WithShutter, public CamacLab {
  public:
-  static constexpr sim::TimeNs kSlotNs = 2'560'000 / 128;
-  static constexpr sim::TimeNs kUnitNs = 50'000;
-
-  explicit ShutterLab(
-      const std::string& keys = "inputs = { positive = 3, negative = 4, step = 5 }\n",
-      const std::string& keys_of_m01 = "", const std::string& keys_of_module = "")
-      : CamacLab(lab_with("fine", keys_of_m01, keys) + keys_of_module, &mechanics,
-                 kShutterStation) {
+  explicit MechanicsLab(const std::string& toml) : CamacLab(toml, &mechanics, kShutterStation) {
     shutter().bus = &bus(0);
     shutter().tell();
     run_for(0.1);
@@ -152,6 +151,17 @@ class ShutterLab : private WithShutter, public CamacLab {
     }
     load_bytes(0, bytes);
   }
+};
+
+class ShutterLab : public MechanicsLab {
+ public:
+  static constexpr sim::TimeNs kSlotNs = 2'560'000 / 128;
+  static constexpr sim::TimeNs kUnitNs = 50'000;
+
+  explicit ShutterLab(
+      const std::string& keys = "inputs = { positive = 3, negative = 4, step = 5 }\n",
+      const std::string& keys_of_m01 = "", const std::string& keys_of_module = "")
+      : MechanicsLab(lab_with("fine", keys_of_m01, keys) + keys_of_module) {}
   std::uint32_t cleared_requests() {
     const std::uint32_t before = requests();
     naf(kShutterStation, 0, 10);

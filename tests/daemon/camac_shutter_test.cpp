@@ -50,8 +50,7 @@ TEST(CamacShutter, AnMcuThatCannotTravelMakesSingleStepsWithoutASensor) {
             "camac-1-7: m03: the firmware of its MCU does not watch a step sensor; use mode 00");
   lab.naf(kShutterStation, 0, 10);
   EXPECT_TRUE(mechanics.steps.empty());
-  lab.permit(kAllEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kAllEnabled);
   EXPECT_EQ(lab.requests() & 0x3FU, kStepDone);
   EXPECT_EQ(mechanics.steps.size(), 1u);
 }
@@ -60,8 +59,7 @@ TEST(CamacShutter, TravelsToTheLimitAndBack) {
   ShutterLab lab;
   EXPECT_EQ(lab.requests(), kLeftLevel);
   lab.load_codes(kCodes, 6000);
-  lab.permit(kAutomatic | kAllEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kAutomatic | kAllEnabled);
   EXPECT_EQ(lab.cleared_requests(), kRightLimit | kRightLevel);
   EXPECT_EQ(lab.shutter().position, 9);
   EXPECT_TRUE(lab.motor("m03").moving) << "it is to return";
@@ -172,8 +170,7 @@ TEST(CamacShutter, ErrorsOfATravelStopIt) {
     lab.shutter().right_limit = bad.right_limit;
     lab.shutter().left_limit = bad.left_limit;
     lab.shutter().tell();
-    lab.permit(kAutomatic | kAllEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kAutomatic | kAllEnabled);
     EXPECT_TRUE((lab.requests() & kTravelFailed) != 0);
     EXPECT_EQ(lab.requests() & (kRightLevel | kLeftLevel), bad.levels);
     EXPECT_THAT(lab.warnings().back(), HasSubstr(bad.log));
@@ -197,8 +194,7 @@ TEST(CamacShutter, AReturnThatMeetsItsLimitEarlyFails) {
     lab.shutter().left_limit = early;
     lab.shutter().tell();
     lab.run_for(0.1);
-    lab.permit(kAutomatic | kAllEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kAutomatic | kAllEnabled);
     ASSERT_TRUE(lab.run_until([&] { return !lab.motor("m03").moving; }));
     lab.run_for(0.5);
     EXPECT_THAT(lab.warnings().back(), HasSubstr("was active before its last step"));
@@ -218,8 +214,7 @@ TEST(CamacShutter, StepsAreSeenByTheSensorInTime) {
   ASSERT_TRUE(lab.wait_for_lam());
   EXPECT_EQ(lab.cleared_requests(), kStepDone);
   const std::int64_t began_us = lab.now_us();
-  lab.permit(kSecondMode | kAllEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kSecondMode | kAllEnabled);
   EXPECT_EQ(lab.cleared_requests(), kStepNotDone);
   EXPECT_GE(lab.now_us() - began_us, 1'500'000);
   EXPECT_LE(lab.now_us() - began_us, 1'800'000);

@@ -92,8 +92,7 @@ TEST_P(CamacStream, EveryEdgeIsWhereTheReportPutsIt) {
     const std::int64_t from = lab.shaft_steps("m02");
     lab.naf(kStation, 0, 10);
     lab.load(0, steps, codes);
-    lab.permit(kEnabled | 1 | (steps % 2 == 0 ? kLeft : 0));
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled | 1 | (steps % 2 == 0 ? kLeft : 0));
     EXPECT_EQ(lab.requests(), 0x10U | static_cast<std::uint32_t>(steps % 4) << 8);
     EXPECT_EQ(lab.shaft_steps("m02") - from, steps % 2 == 0 ? -steps : steps);
   }
@@ -104,8 +103,7 @@ TEST_P(CamacStream, EveryEdgeIsWhereTheReportPutsIt) {
   lab.run_for(0.2);
   // The MCU rests: the table is uploaded.
   lab.naf(kStation, 0, 10);
-  lab.permit(kEnabled | 1);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled | 1);
   EXPECT_THAT(lab.description("m01").table.name, HasSubstr("camac-1-5-0-"));
   EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0);
   EXPECT_EQ(lab.mcu_health("hall:1").ramp_downs, 0u);
@@ -218,8 +216,7 @@ TEST(CamacStreaming, FasterProgramsWaitForTheTable) {
   const auto again = lab.send(Ask::kMoveBy, {"m03"}, {-20'000});
   lab.run_until([&] { return lab.shaft_steps("m03") < 2800; });
   lab.load(0, 398, fast_codes());
-  lab.permit(kEnabled | kLeft);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled | kLeft);
   EXPECT_FALSE(lab.has_result(again));
   EXPECT_EQ(lab.shaft_steps("m01"), 102);
 }
@@ -266,8 +263,7 @@ TEST(CamacStreaming, IsKeptLikeOtherMoves) {
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   move_another(lab, 30'000);
   lab.load(0, 300, program_codes());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   lab.run_for(0.5);
   const auto history = lab.send(api::GetHistory{.motor = "m01"});
   lab.wait(history);

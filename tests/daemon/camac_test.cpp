@@ -45,8 +45,7 @@ TEST(CamacMotion, AProgramMovesAMotorAndRaisesLam) {
     SCOPED_TRACE(manner);
     CamacLab lab(lab_with(manner));
     lab.load(0, 300, falling_codes());
-    lab.permit(kEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled);
     EXPECT_EQ(lab.lams().back(), (api::CamacLam{.crate = 1, .raised = 16, .requests = 16}));
     EXPECT_EQ(lab.shaft_steps("m01"), 300);
     EXPECT_TRUE(lab.lam());
@@ -54,8 +53,7 @@ TEST(CamacMotion, AProgramMovesAMotorAndRaisesLam) {
     EXPECT_THAT(lab.description("m01").table.name, HasSubstr("camac-1-5-0-"));
     lab.naf(kStation, 0, 10);
     EXPECT_FALSE(lab.lam());
-    lab.permit(kEnabled | kLeft | 1);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled | kLeft | 1);
     EXPECT_EQ(lab.shaft_steps("m02"), -300);
     EXPECT_EQ(lab.shaft_steps("m01"), 300);
     EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0);
@@ -72,8 +70,7 @@ TEST(CamacMotion, StepsAreWhereTheReportPutsThem) {
     StepTimes edges;
     CamacLab lab(lab_with("fine_table"), &edges);
     lab.load(0, steps, falling_codes());
-    lab.permit(kEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled);
     ASSERT_EQ(edges.times_ns.size(), static_cast<std::size_t>(steps));
     camac::Program program{.steps = static_cast<std::uint32_t>(steps)};
     for (const int code : falling_codes()) {
@@ -101,12 +98,10 @@ TEST(CamacMotion, FrequenciesGoFromStartTo25Times) {
     StepTimes edges;
     CamacLab lab(toml, &edges);
     lab.load(0, 4, {250, 11, 10});
-    lab.permit(kEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled);
     lab.naf(kStation, 0, 10);
     lab.load(0, 5, {250, 11, 10});
-    lab.permit(kEnabled);
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled);
     ASSERT_EQ(edges.times_ns.size(), 9u);
     const auto delay_ns = [&](std::size_t step) {
       return static_cast<double>(edges.times_ns[step] - edges.times_ns[step - 1]);
@@ -132,25 +127,21 @@ TEST(CamacMotion, ForbidRampsDownWithoutARequest) {
   EXPECT_TRUE(lab.lams().empty());
   EXPECT_EQ(lab.requests() >> 8, static_cast<std::uint32_t>(stands) % 4);
   lab.load(0, 40, falling_codes());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   EXPECT_EQ(lab.shaft_steps("m01"), stands + 40);
 }
 
 TEST(CamacMotion, AnotherProgramIsAnotherTable) {
   CamacLab lab;
   lab.load(0, 20, falling_codes());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   const std::string first = lab.description("m01").table.name;
   lab.naf(kStation, 0, 10);
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   EXPECT_EQ(lab.description("m01").table.name, first);
   lab.naf(kStation, 0, 10);
   lab.load(0, 20, std::vector<int>(238, 100));
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   EXPECT_NE(lab.description("m01").table.name, first);
   EXPECT_EQ(lab.shaft_steps("m01"), 60);
   EXPECT_THAT(lab.kept(), testing::IsEmpty()) << "the next daemon has the tables of bushd.toml";
@@ -161,8 +152,7 @@ TEST(CamacMotion, CodesThatAMotionDoesNotComeToMayRise) {
   std::vector<int> codes = falling_codes();
   codes[3] = 255;
   lab.load(0, 6, codes);
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   EXPECT_EQ(lab.shaft_steps("m01"), 6);
   EXPECT_THAT(lab.description("m01").table.name, HasSubstr("camac-1-5-0-")) << "by a table";
 }
@@ -179,8 +169,7 @@ TEST(CamacMotion, WhatTheMotorCannotDoIsInItsStatus) {
   EXPECT_THAT(lab.warnings().back(), HasSubstr("drivers of MCU hall:1 are disabled"));
   lab.ask(Ask::kEnable, {"m01"});
   lab.naf(kStation, 0, 10);
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   lab.naf(kStation, 0, 10);
   lab.unplug(0);
   lab.run_for(2);
@@ -218,8 +207,7 @@ TEST(CamacMotion, ALimitSwitchIsInTheStatus) {
     EXPECT_EQ(lab.requests(), left ? 0x102U : 0x101U) << "no motion into it";
     lab.naf(kStation, 0, 10);
     lab.load(0, 30, falling_codes());
-    lab.permit(kEnabled | (left ? 0 : kLeft));
-    ASSERT_TRUE(lab.wait_for_lam());
+    lab.run_to_lam(kEnabled | (left ? 0 : kLeft));
     EXPECT_EQ(lab.shaft_steps("m01"), stands + (left ? 30 : -30));
   }
 }
@@ -270,8 +258,7 @@ TEST(CamacMotion, ALamThatFallsAndRisesBetweenTwoStepsIsToldAgain) {
   CamacLab lab(lab_with(
       "fine", "unit = \"mm\"\nsteps_per_unit = 100\nsoft_limits = [-1, 1]\nbacklash = 0.1\n"));
   lab.load(0, 100, falling_codes());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   lab.naf(kStation, 1, 16, 0);
   lab.naf(kStation, 0, 16, 200);  // steps
   const std::size_t before = lab.lams().size();
@@ -324,8 +311,7 @@ TEST(CamacMotion, ThePositionOfTheMotorIsInTheMemory) {
     return std::int64_t{static_cast<std::int16_t>(low + 256 * lab.naf(kStation, 0, 0).data)};
   };
   lab.load(0, 300, falling_codes());
-  lab.permit(kEnabled | kLeft | 1);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled | kLeft | 1);
   lab.naf(kStation, 0, 10);
   EXPECT_EQ(position(1), -300);
   EXPECT_EQ(position(0), 0);
@@ -355,15 +341,13 @@ TEST(CamacMotion, MemorySurvivesRestartsAndPowerCuts) {
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   lab.load(1, 40, falling_codes());
   lab.load(0, 30, falling_codes());
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   lab.restart_daemon();
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
   EXPECT_FALSE(lab.lam()) << "registers begin anew";
   lab.naf(kStation, 1, 16, 256);
   EXPECT_EQ(lab.naf(kStation, 0, 0).data, 40U);
-  lab.permit(kEnabled);
-  ASSERT_TRUE(lab.wait_for_lam());
+  lab.run_to_lam(kEnabled);
   EXPECT_EQ(lab.shaft_steps("m01"), 60);
   lab.run_for(2);
   lab.cut_pc_power();
