@@ -19,8 +19,7 @@ constexpr double kToldWithinS = 0.05 + 0.00256;
 class Acceleration : public Traced<const char*> {
  protected:
   int judge(Lab& lab) {
-    lab.run_for(0.1);
-    EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+    close_trace(lab);
     return Traced::check(lab, "");
   }
   static Answer change(Lab& lab, const std::string& motor, const std::string& value) {

@@ -108,8 +108,7 @@ TEST_P(CamacStream, EveryEdgeIsWhereTheReportPutsIt) {
   EXPECT_EQ(lab.mcu_health("hall:1").rejected_frames, 0);
   EXPECT_EQ(lab.mcu_health("hall:1").ramp_downs, 0u);
   EXPECT_TRUE(lab.errors().empty());
-  lab.run_for(0.1);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   EXPECT_EQ(judge(lab, codes), 0) << said();
   // It would say so if the program had been another one.
   auto others = codes;
@@ -147,8 +146,7 @@ TEST_P(CamacStream, StopsAndPausesAreThoseOfTheProgram) {
   EXPECT_TRUE(goes_on(lab));
   lab.send(Ask::kStop, {"m03"});
   lab.wait(other_);
-  lab.run_for(0.2);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab, 0.2);
   EXPECT_EQ(judge(lab, codes), 0) << said();
 }
 

@@ -41,9 +41,8 @@ TEST_P(ElementaryLine, IsMadeByItsMcuExactToASlot) {
   reaches({"m04", "m02", "m03", "m01"}, {200, 199, 50, 198});
   reaches({"m03"}, {-40});
   EXPECT_EQ(sent.frames, 4) << "one LINE_RUN each";
-  lab.run_for(0.1);
   expect_clean(lab);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   EXPECT_EQ(check(lab, ""), 0) << said();
   EXPECT_THAT(said(), HasSubstr("farthest from the exact slot 0.0 us"));
   // It would say so if the order of steps had been another one.
@@ -78,9 +77,8 @@ TEST_P(ElementaryLine, StaysOnTheLineWhereItIsStoppedPausedAndChanged) {
   EXPECT_THAT(lab.last_reply(second).reason, testing::Not(HasSubstr("off it")));
   EXPECT_LE(off_line(lab, kThree, steps), 1.0);
   EXPECT_EQ(lab.ask(elementary_to(kThree, steps)).result, "reached");
-  lab.run_for(0.1);
   expect_clean(lab, {"hall:1"});
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   EXPECT_EQ(check(lab, ""), 0) << said();
 }
 

@@ -85,8 +85,7 @@ class LateStarts : public Traced<const char*> {
   // as a table run: its steps are spread over their ticks, so `changed` ones are not judged.
   void expect_each_edge_is_explained(bool changed = false) {
     if (changed && std::string(GetParam()) == "fine_table") return;
-    lab.run_for(0.5);
-    ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+    close_trace(lab, 0.5);
     EXPECT_EQ(check(lab, ""), 0) << said();
     EXPECT_EQ(lab.mcu_health("hall:1").ramp_downs, 0u);
   }

@@ -76,8 +76,7 @@ TEST_P(UploadedLine, IsMadeByBothMcusExactToASlot) {
   EXPECT_EQ(moves_by(lab, "ticks"), 0);
   EXPECT_EQ(lab.shaft_steps("m02"), 333);
   expect_clean(lab);
-  lab.run_for(0.1);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   EXPECT_EQ(check(lab, ""), 0) << said();
   EXPECT_THAT(said(), HasSubstr("farthest from the exact slot 0.0 us"));
   // It would say so if the line had had another table.
@@ -103,8 +102,7 @@ TEST_P(UploadedLine, GoesOnAfterAPauseAndRampsDownAlongItself) {
   EXPECT_LT(lab.shaft_steps("m01"), 2900);
   EXPECT_EQ(moves_by(lab, "table"), 8);
   expect_clean(lab);
-  lab.run_for(0.1);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   EXPECT_EQ(check(lab, ""), 0) << said();
 }
 
@@ -131,8 +129,7 @@ TEST_P(UploadedLine, BeginsByATrigger) {
     EXPECT_EQ(lab.shaft_steps(kMotors[i]), kOwnTable[i]);
   }
   expect_clean(lab);
-  lab.run_for(0.1);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   EXPECT_EQ(check(lab, ""), 0) << said();
 }
 

@@ -48,8 +48,7 @@ class TriggeredLine : public Traced<const char*> {
     fire(lab, 1);
   }
   void expect_explained(Lab& lab) {
-    lab.run_for(0.1);
-    EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+    close_trace(lab);
     EXPECT_EQ(check(lab, ""), 0) << said();
   }
   // Also: each run begins where it says. Some of them, since the clocks of trace and log are not

@@ -47,8 +47,7 @@ TEST_P(PathTrace, EveryEdgeIsOnThePath) {
     lab.send(api::Resume{});
   }
   EXPECT_EQ(lab.wait(move).result, "reached");
-  lab.run_for(0.1);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   write_points(points());
   EXPECT_EQ(check(lab), 0) << said();
   // It would say so if the path had been another one.
@@ -66,8 +65,7 @@ TEST_P(PathTrace, OfALogOfSeveralPathsEachIsJudgedByItsPoints) {
   const auto back =
       lab.send(api::MovePath{.motors = {"m03", "m01"}, .rows = 2, .positions = {100, -50, 7, 9}});
   EXPECT_EQ(lab.wait(back).result, "reached");
-  lab.run_for(0.1);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   write_points(points());
   std::ofstream(path("back.csv")) << "m03,m01\n100,-50\n7,9\n";
   const std::string both = "--path " + path("path.csv") + " --path " + path("back.csv");
@@ -95,8 +93,7 @@ TEST_P(PathTrace, PathsAndOtherMotionsInAnyOrderAreJudgedTogether) {
   reaches(path_back);
   EXPECT_EQ(lab.wait(long_move).result, "reached");
   reaches(api::Move{.motors = {{"m01", -40}, {"m03", 33}}});
-  lab.run_for(0.1);
-  ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  close_trace(lab);
   write_points(points());
   std::ofstream(path("back.csv")) << "m04,m01\n100,-50\n7,9\n";
   const std::string both = "--path " + path("path.csv") + " --path " + path("back.csv");

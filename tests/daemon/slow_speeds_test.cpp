@@ -28,8 +28,7 @@ api::Move moved(const std::vector<std::string>& motors, const std::vector<std::i
 class SlowSpeeds : public Traced<const char*> {
  protected:
   int judge(Lab& lab, const std::string& options = "") {
-    lab.run_for(0.1);
-    EXPECT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+    close_trace(lab);
     return Traced::check(lab, options);
   }
   static void expect(Lab& lab, std::int64_t request, const std::string& result = "reached") {

@@ -34,6 +34,11 @@ class Traced : public testing::TestWithParam<Parameter> {
 
   std::string path(const char* file) const { return (directory_ / file).string(); }
 
+  // Ends the trace when it has what comes so soon.
+  void close_trace(Lab& lab, double within_s = 0.1) {
+    lab.run_for(within_s);
+    ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+  }
   // Exit code of check-trace with these options. `bend` changes an event of the log of moves, or
   // leaves it out by returning false.
   int check(
