@@ -22,6 +22,17 @@ bool turns(const PathShare& before, const PathShare& behind) {
   return before.moves() && behind.moves() && before.direction != behind.direction;
 }
 
+// The motors ask for squares, by what they have of the steps before and behind a corner: the root
+// of the greatest one.
+std::uint32_t root_of_greatest(const std::vector<PathShare>& before,
+                               const std::vector<PathShare>& behind, const auto& square_of) {
+  double most = 1;
+  for (std::size_t m = 0; m < behind.size(); ++m) {
+    most = std::max(most, square_of(m, before[m].ratio, behind[m].ratio));
+  }
+  return rounded_up(std::sqrt(most));
+}
+
 }  // namespace
 
 Path::Path(std::vector<Motor> motors, std::span<const std::int64_t> begin, Corners corners,
@@ -182,48 +193,36 @@ bool Path::rests_at(std::size_t segment) const {
 
 // The least delay on both sides of the corner.
 std::uint32_t Path::corner(const Shares& before, const Shares& behind) const {
-  double least = 1;
-  for (std::size_t m = 0; m < behind.size(); ++m) {
-    const double r1 = before[m].ratio;
-    const double r2 = behind[m].ratio;
+  return root_of_greatest(before, behind, [&](std::size_t m, double r1, double r2) {
     const double squares =
         turns(before[m], behind[m]) ? r1 * r1 + r2 * r2 : std::abs(r2 - r1) * (r1 + r2);
-    least = std::max(least, start_units_[m] * start_units_[m] * squares);
-  }
-  return rounded_up(std::sqrt(least));
+    return start_units_[m] * start_units_[m] * squares;
+  });
 }
 
 // The least delay of the first step behind a border, after one of this delay.
 std::uint32_t Path::least_behind(const Shares& before, const Shares& behind,
                                  std::uint32_t delay) const {
-  double least = 1;
-  for (std::size_t m = 0; m < behind.size(); ++m) {
-    const double r1 = before[m].ratio;
-    const double r2 = behind[m].ratio;
-    if (r2 == 0 || r2 == r1 || turns(before[m], behind[m])) continue;
+  return root_of_greatest(before, behind, [&](std::size_t m, double r1, double r2) {
+    if (r2 == 0 || r2 == r1 || turns(before[m], behind[m])) return 0.0;
     const double v1 = r1 * start_units_[m] / delay;
     const double alone = r2 * start_units_[m];
-    least = std::max(least, alone * alone / (1 + v1 * v1));
-  }
-  return rounded_up(std::sqrt(least));
+    return alone * alone / (1 + v1 * v1);
+  });
 }
 
 // The least delay of the last step before a border, with one of this delay behind it.
 std::uint32_t Path::least_before(const Shares& before, const Shares& behind,
                                  std::uint32_t delay) const {
-  double least = 1;
-  for (std::size_t m = 0; m < behind.size(); ++m) {
-    const double r1 = before[m].ratio;
-    const double r2 = behind[m].ratio;
+  return root_of_greatest(before, behind, [&](std::size_t m, double r1, double r2) {
     const bool turn = turns(before[m], behind[m]);
-    if (r1 == 0 || (r1 == r2 && !turn)) continue;
+    if (r1 == 0 || (r1 == r2 && !turn)) return 0.0;
     const double v2 = r2 * start_units_[m] / delay;
     const double left = turn ? 1 - v2 * v2 : 1 + v2 * v2;
-    if (left <= 0) return kRest - 1;  // the corner's own delay leaves more than nothing
+    if (left <= 0) return HUGE_VAL;  // the corner's own delay leaves more than nothing
     const double alone = r1 * start_units_[m];
-    least = std::max(least, alone * alone / left);
-  }
-  return rounded_up(std::sqrt(least));
+    return alone * alone / left;
+  });
 }
 
 // Steps of a motor's own in a segment, but for parts of steps.
