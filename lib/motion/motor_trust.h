@@ -36,7 +36,6 @@ class MotorTrust {
   bool lost_in_motion() const { return lost_ && lost_->in_motion; }
   // Since then its MCU has lost power, and it stood.
   const std::optional<std::string>& restored_reason() const { return restored_reason_; }
-  bool is_restoring() const { return restoring_; }
 
   void is_known();
   // What was kept from before the MCU, or the daemon, was started.

@@ -131,7 +131,6 @@ class BareWorld {
   TimeNs now_ns_ = 0;
   TimeNs next_fault_ns_ = 0;
   TimeNs next_ask_ns_ = 0;
-  TimeNs next_clear_ns_ = 0;
   bool trouble_ = false;
   bool clears_ = false;
   bool emergency_ = false;

@@ -36,7 +36,6 @@ void Overheard::frame(TimeNs now_ns, std::size_t mcu, const bushd_frame& frame) 
     bushd_emergency emergency;
     if (bushd_decode_emergency(frame.payload, frame.payload_size, &emergency) != BUSHD_OK) return;
     plant_.halt(mcu, now_ns, emergency.mode != BUSHD_STOP_RAMP);
-    ++emergencies_;
   } else if (frame.type == BUSHD_MSG_CONTROL) {
     bushd_control control;
     if (bushd_decode_control(frame.payload, frame.payload_size, &control) != BUSHD_OK) return;

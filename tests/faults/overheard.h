@@ -23,7 +23,6 @@ class Overheard {
 
   // What it was hearing is lost.
   void mcu_reset(std::size_t mcu) { receiver_[mcu] = {}; }
-  std::uint64_t emergencies() const { return emergencies_; }  // heard, by any MCU
 
  private:
   using TimeNs = bushd::sim::TimeNs;
@@ -34,7 +33,6 @@ class Overheard {
   Skew& skew_;
   Witness& witness_;
   std::vector<bushd_receiver> receiver_;  // by MCU
-  std::uint64_t emergencies_ = 0;
 };
 
 }  // namespace bushfaults

@@ -155,11 +155,6 @@ std::int64_t place_at(const Line& line, std::int64_t run_256, std::int64_t rest_
   return line.format == BUSHD_FORMAT_FINE ? place : place / 256 * 256;
 }
 
-struct Expected {
-  std::vector<std::int64_t> place;  // at the end of each tick, 1/256 step; the change goes back
-  Tick own_end = 0;
-};
-
 std::int64_t signed_256(const Line& line, std::int16_t out) {
   if (line.format == BUSHD_FORMAT_FINE) return out;
   return bushd_coarse_to_fine(static_cast<std::uint8_t>(out));
