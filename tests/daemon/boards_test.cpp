@@ -61,8 +61,7 @@ TEST(Boards, AnotherTargetInMotionIsReached) {
   DelayLab lab;
   const auto first = lab.send(Ask::kMoveTo, {"m0"}, {5000});
   lab.moves(300);
-  const auto second = lab.send(Ask::kMoveTo, {"m0"}, {-100});
-  EXPECT_EQ(lab.wait(second).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m0"}, {-100}).result, "reached");
   EXPECT_EQ(lab.last_reply(first).result, "stopped");
   EXPECT_EQ(lab.shaft_steps("m0"), -100);
   EXPECT_TRUE(lab.errors().empty());
@@ -131,8 +130,7 @@ TEST(Boards, PauseAtSpeedIsSaidAndFollowedByTheRampUp) {
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {3000});
   lab.moves(1000);
   lab.pause_daemon(0.03);
-  const Answer answer = lab.wait(move);
-  EXPECT_EQ(answer.result, "reached");
+  EXPECT_EQ(lab.wait(move).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m0"), 3000);
   EXPECT_THAT(lab.motor("m0").uncertain_reason, HasSubstr("a pause of 30 ms between two steps"));
   const auto& steps = lab.board(0).steps();
@@ -188,8 +186,8 @@ TEST(Boards, SupplyAndConnectionAreWatched) {
     const auto move = lab.send(Ask::kMoveBy, {"m0"}, {20'000});
     lab.moves(500);
     (supply ? lab.board(0).supply : lab.board(0).motor(0).connected) = false;
-    const Answer answer = lab.wait(move);
-    EXPECT_THAT(answer.reason, HasSubstr(supply ? "supply is missing" : "is not connected"));
+    EXPECT_THAT(lab.wait(move).reason,
+                HasSubstr(supply ? "supply is missing" : "is not connected"));
     lab.board(0).supply = lab.board(0).motor(0).connected = true;
     ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
     EXPECT_EQ(lab.shaft_steps("m0"), lab.motor("m0").position_steps);

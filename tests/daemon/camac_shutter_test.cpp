@@ -77,8 +77,7 @@ TEST(CamacShutter, TravelsToTheLimitAndBack) {
   EXPECT_THAT(lab.description("m03").table.name, HasSubstr("camac-1-7-"));
   EXPECT_TRUE(lab.warnings().empty());
   EXPECT_TRUE(lab.errors().empty());
-  const Answer moved = lab.ask(Ask::kMoveBy, {"m03"}, {3});
-  EXPECT_EQ(moved.result, "reached") << "it is anybody's again";
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m03"}, {3}).result, "reached") << "it is anybody's again";
 }
 
 TEST(CamacShutter, FollowsReactorStarts) {

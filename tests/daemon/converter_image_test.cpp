@@ -42,8 +42,7 @@ TEST(ConverterImage, AConverterWithoutPulsesEndsTheMotion) {
   const auto move = lab.send(Ask::kMoveBy, {"m0"}, {1000});
   ASSERT_TRUE(lab.run_until([&] { return lab.shaft_steps("m0") >= 100; }));
   lab.image.set_converter({.hz_per_code = kHzPerCode, .gives_pulses = false});
-  const Answer answer = lab.wait(move);
-  EXPECT_THAT(answer.reason, HasSubstr("the board's converter gave no pulse within 1 s"));
+  EXPECT_THAT(lab.wait(move).reason, HasSubstr("the board's converter gave no pulse within 1 s"));
   ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }, 10));
   EXPECT_EQ(lab.motor("m0").position_steps, lab.shaft_steps("m0"));
   EXPECT_FALSE(lab.trusted("m0"));

@@ -26,8 +26,7 @@ TEST_P(Faults, SomeLostWritesAreRepairedInTime) {
     if (!keep) ++lost;
     return keep;
   };
-  const auto move = lab.send(Ask::kMoveBy, {"m01", "m02", "m05"}, {15000, -9000, 12000});
-  const Answer result = lab.wait(move);
+  const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m02", "m05"}, {15000, -9000, 12000});
   EXPECT_EQ(result.result, "reached") << result.reason;
   EXPECT_EQ(lab.shaft_steps("m01"), 15000);
   EXPECT_EQ(lab.shaft_steps("m02"), -9000);

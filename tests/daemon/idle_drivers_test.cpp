@@ -89,8 +89,7 @@ TEST_P(IdleDrivers, AreDisabledAtOnceAfterTheLastMotionIfAskedFor) {
               with_mcu_keys(hall(1, 2), "idle_disable_s = 0\nenable_settle_ms = 250\n"));
   lab.fall_asleep();
   const auto first = lab.send(Ask::kMoveBy, {"m01"}, {400});
-  const auto second = lab.send(Ask::kMoveBy, {"m02"}, {-40});
-  EXPECT_EQ(lab.wait(second).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {-40}).result, "reached");
   EXPECT_TRUE(lab.pins.enabled) << "the other one moves";
   EXPECT_THAT(lab.wait(first), Ends("reached"));
   lab.fall_asleep();

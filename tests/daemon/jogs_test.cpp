@@ -119,8 +119,7 @@ TEST(Jogs, OfAClientThatIsGoneRampDownAtOnce) {
   lab.run_for(0.3);
   const std::int64_t there = lab.shaft_steps("m01");
   lab.leave("remote");
-  const Answer ended = lab.wait(first);
-  EXPECT_THAT(ended.reason, HasSubstr("its client has gone"));
+  EXPECT_THAT(lab.wait(first).reason, HasSubstr("its client has gone"));
   EXPECT_LT(lab.shaft_steps("m01"), there + 150);
 }
 
@@ -158,8 +157,7 @@ TEST(Jogs, TakenUpAgainAreStoppedByOthersAsEver) {
     lab.run_for(0.02);
     EXPECT_EQ(lab.wait(lab.send_as("remote", jog(2000))).reason, "m01: changed");
     lab.run_for(0.2);
-    const auto stop = lab.send(Ask::kStop, {"m01"});
-    EXPECT_EQ(lab.wait(stop).result, "done");
+    EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
     EXPECT_THAT(lab.last_reply(first),
                 Ends("stopped", "m01: stopped on request, asked for by command"));
     EXPECT_THAT(lab.wait(lab.send_as("remote", jog(2000))).reason, HasSubstr("let go first"));

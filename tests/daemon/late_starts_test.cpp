@@ -195,8 +195,8 @@ TEST_P(LateStarts, OneOfAGroupThatIsLateEndsWhereItStands) {
 TEST(LateStartsOfLegs, OneThatIsLateEndsThough) {
   ReadyLab lab(with_keys(hall(2, 2), "m01", "backlash = 3\n"));
   lose_motion(lab, 0.2, 2);
-  const Answer result = lab.ask(Ask::kMoveTo, {"m01", "m03"}, {-1, 700});
-  EXPECT_THAT(result.motor_results, ElementsAre("reached", "link"));
+  EXPECT_THAT(lab.ask(Ask::kMoveTo, {"m01", "m03"}, {-1, 700}).motor_results,
+              ElementsAre("reached", "link"));
   EXPECT_EQ(lab.shaft_steps("m01"), -1);
   EXPECT_EQ(lab.shaft_steps("m03"), 0);
 }

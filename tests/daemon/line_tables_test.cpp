@@ -254,8 +254,7 @@ TEST_F(WaitingLine, IsStoppedBeforeItBegins) {
 // Nobody waits for a line: another motor of its MCUs moves at once, and the line is streamed.
 TEST_F(WaitingLine, IsStreamedAsSoonAsTheMcuDoesNotRest) {
   const auto line = begin();
-  const auto other = lab.send(Ask::kMoveTo, {"m03"}, {400});
-  EXPECT_EQ(lab.wait(other).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m03"}, {400}).result, "reached");
   EXPECT_EQ(lab.wait(line).result, "reached");
   EXPECT_EQ(sent[BUSHD_MSG_LINE_RUN], 0);
   EXPECT_GT(sent[BUSHD_MSG_TICKS] + sent[BUSHD_MSG_TABLE_TICKS], 8);

@@ -272,8 +272,7 @@ TEST_F(ArmedLine, IsRefusedWhereItCannotWait) {
   EXPECT_THAT(refusal(lab, {"m01", "m02"}, {5, 5}), HasSubstr("m01 waits for the trigger"));
   EXPECT_THAT(refusal(lab, {"m02"}, {5}),
               HasSubstr("m01 waits for the trigger of MCU hall:1 already"));
-  const auto line = lab.send(line_to({"m01", "m03"}, {5, 5}));
-  EXPECT_THAT(lab.wait(line).reason,
+  EXPECT_THAT(lab.ask(line_to({"m01", "m03"}, {5, 5})).reason,
               HasSubstr("m01 waits for the trigger; run 'bushctl disarm m01' first"));
   EXPECT_FALSE(lab.has_result(waits));
   lab.send(Ask::kMoveTo, {"m04"}, {900});

@@ -185,8 +185,7 @@ TEST(Lines, AnEndThatComesTooLateIsReachedFromBeyond) {
     StreamedLab lab(hall(2, 2));
     const auto move = lab.send(line_to(kMotors, {4000, 10 * steps, 0, 4000}));
     lab.run_until([&] { return lab.shaft_steps("m01") >= 2000; });
-    const auto back = lab.send(line_to(kMotors, {400, steps, 0, 400}));
-    EXPECT_EQ(lab.wait(back).result, "reached");
+    EXPECT_EQ(lab.ask(line_to(kMotors, {400, steps, 0, 400})).result, "reached");
     EXPECT_EQ(lab.last_reply(move).result, "stopped");
     EXPECT_EQ(lab.shaft_steps("m01"), 400);
     EXPECT_EQ(lab.shaft_steps("m02"), steps);

@@ -49,8 +49,7 @@ TEST(MotorSettings, CountAtOnceForRequestsAndForWhatClientsSee) {
 TEST(MotorSettings, SayWhereAMotorStandsThatIsOutside) {
   SettingsLab lab;
   lab.move_to("m01", 400);
-  const Answer answer = lab.change("m01", "soft_limits", "[2, 3]");
-  EXPECT_THAT(answer,
+  EXPECT_THAT(lab.change("m01", "soft_limits", "[2, 3]"),
               Ends("done",
                    "m01: soft_limits = [2, 3]; it stands at 11.0000 mm, beyond its soft limits "
                    "of 12.0000 mm to 13.0000 mm; it may be moved towards them"));

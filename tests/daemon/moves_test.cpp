@@ -51,11 +51,9 @@ TEST(Moves, MotorsStartAndEndIndependently) {
   ReadyLab lab(hall(1, 3));
   const auto long_move = lab.send(Ask::kMoveBy, {"m01"}, {5000});
   lab.run_for(0.7);
-  const auto short_move = lab.send(Ask::kMoveBy, {"m02"}, {-30});
-  EXPECT_EQ(lab.wait(short_move).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {-30}).result, "reached");
   EXPECT_TRUE(lab.motor("m01").moving);
-  const auto next = lab.send(Ask::kMoveTo, {"m02"}, {100});
-  EXPECT_EQ(lab.wait(next).result, "reached");
+  EXPECT_EQ(lab.ask(Ask::kMoveTo, {"m02"}, {100}).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m02"), 100);
   EXPECT_EQ(lab.wait(long_move).result, "reached");
   EXPECT_EQ(lab.shaft_steps("m01"), 5000);
@@ -66,8 +64,7 @@ TEST(Moves, StopInFlightRampsDownAndKnowsWhereItStands) {
   const auto move = lab.send(Ask::kMoveBy, {"m01"}, {20000});
   const auto other = lab.send(Ask::kMoveBy, {"m02"}, {3000});
   lab.run_for(1.5);
-  const auto stop = lab.send(Ask::kStop, {"m01"});
-  EXPECT_EQ(lab.wait(stop).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "done");
   const Answer result = lab.last_reply(move);
   EXPECT_EQ(result.result, "stopped");
   EXPECT_GT(result.position_steps.at(0), 0);
@@ -140,8 +137,8 @@ TEST(Moves, AMoveOfManyYearsIsRefused) {
 TEST(Moves, DisabledDriversRefuseMovesUntilEnabled) {
   ReadyLab lab(hall(1, 1));
   EXPECT_EQ(lab.ask(Ask::kDisable, {}).result, "done");
-  const Answer reply = lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5}));
-  EXPECT_THAT(reply.reason, testing::HasSubstr("disabled"));
+  EXPECT_THAT(lab.last_reply(lab.send(Ask::kMoveBy, {"m01"}, {5})).reason,
+              testing::HasSubstr("disabled"));
   EXPECT_EQ(lab.ask(Ask::kEnable, {"m01"}).result, "done");
   EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m01"}, {5}).result, "reached");
 }

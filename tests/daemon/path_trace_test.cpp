@@ -59,8 +59,8 @@ TEST_P(PathTrace, EveryEdgeIsOnThePath) {
 
 TEST_P(PathTrace, OfALogOfSeveralPathsEachIsJudgedByItsPoints) {
   ReadyLab lab(hall(2, 2, GetParam()), {}, vcd_.get());
-  const auto move = lab.send(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()});
-  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.ask(api::MovePath{.motors = kTraced, .rows = 63, .positions = points()}).result,
+            "reached");
   // Back by another way, and without one of the motors.
   const auto back =
       lab.send(api::MovePath{.motors = {"m03", "m01"}, .rows = 2, .positions = {100, -50, 7, 9}});

@@ -87,8 +87,7 @@ TEST(ProgramsAlone, AStopThatDoesNotReachItsMcuIsTakenThere) {
   lab.unplug(0);
   ASSERT_TRUE(lab.run_until([&] { return !lab.all_ready(); }));
   lab.run_for(2);
-  const Answer stop = lab.ask(Ask::kStop, {"m01"});
-  EXPECT_EQ(stop.result, "link");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m01"}).result, "link");
   EXPECT_FALSE(lab.has_result(run));
   lab.plug(0);
   EXPECT_EQ(lab.wait(run, 120).result, "stopped");

@@ -149,9 +149,10 @@ TEST(RelativeMoves, AddUpOverRestartsAndPowerCuts) {
 TEST(RelativeMoves, AlongALineAddUpForEachOfItsMotors) {
   RelativeLab lab;
   for (int i = 0; i < 50; ++i) {
-    const auto line = lab.send(
-        api::MoveLine{.motors = {{"m01", api::UserUnits{0.04}}, {"m02", api::UserUnits{-0.13}}}});
-    EXPECT_EQ(lab.wait(line).result, "reached");
+    EXPECT_EQ(lab.ask(api::MoveLine{.motors = {{"m01", api::UserUnits{0.04}},
+                                               {"m02", api::UserUnits{-0.13}}}})
+                  .result,
+              "reached");
   }
   EXPECT_EQ(lab.shaft_steps("m01"), 20);
   EXPECT_EQ(lab.shaft_steps("m02"), -65);

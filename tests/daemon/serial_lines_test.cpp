@@ -163,10 +163,9 @@ TEST(SerialLines, PauseSpeedAndAnotherEnd) {
   lab.run_for(0.4);
   // a at 3000: b where the line leads then.
   const std::int64_t b = (2999 * (2 * 3000 - 1) + 4000) / (2 * 4000);
-  const auto second = lab.send(api::MoveLine{.kind = api::Move::Kind::kAbsolute,
-                                             .motors = motor_steps({"a", "b"}, {3000, b}),
-                                             .speed = api::Speed{.per_s = 700, .in_steps = true}});
-  const Answer answer = lab.wait(second);
+  const Answer answer = lab.ask(api::MoveLine{.kind = api::Move::Kind::kAbsolute,
+                                              .motors = motor_steps({"a", "b"}, {3000, b}),
+                                              .speed = api::Speed{.per_s = 700, .in_steps = true}});
   EXPECT_EQ(answer.result, "reached") << answer.reason;
   EXPECT_EQ(lab.last_reply(first).result, "stopped");
   EXPECT_EQ(lab.drive(0).position_steps(), 3000);

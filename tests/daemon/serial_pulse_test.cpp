@@ -106,8 +106,7 @@ TEST(SerialPulse, StopsAlongItsRamp) {
   const auto move = lab.send(Ask::kMoveBy, {"m"}, {5000});
   lab.run_for(1.0);
   const std::uint64_t before = lab.it().steps();
-  const auto stop = lab.send(Ask::kStop, {"m"});
-  EXPECT_EQ(lab.wait(stop).result, "done");
+  EXPECT_EQ(lab.ask(Ask::kStop, {"m"}).result, "done");
   EXPECT_EQ(lab.last_reply(move).result, "stopped");
   const std::int64_t position = lab.it().position_steps();
   lab.expect_settled(position);
@@ -310,10 +309,11 @@ TEST(SerialPulse, ServesDriversThatCanLess) {
 
 TEST(SerialPulse, SlowSpeedsWaitBetweenBytes) {
   ReadyDesk lab;
-  const auto move = lab.send(api::Move{.kind = api::Move::Kind::kRelative,
-                                       .motors = motor_steps({"m"}, {4}),
-                                       .speed = api::Speed{.per_s = 2, .in_steps = true}});
-  EXPECT_EQ(lab.wait(move).result, "reached");
+  EXPECT_EQ(lab.ask(api::Move{.kind = api::Move::Kind::kRelative,
+                              .motors = motor_steps({"m"}, {4}),
+                              .speed = api::Speed{.per_s = 2, .in_steps = true}})
+                .result,
+            "reached");
   lab.expect_settled(4);
   for (const std::int64_t ns : lab.intervals()) {
     EXPECT_GE(ns, 500'000'000);

@@ -103,8 +103,7 @@ TEST(PauseAnswers, AMotorThatIsBeingStoppedIsNotPaused) {
   StopLab lab;
   lab.move_to("m01", 20'000, 2000);
   lab.send(api::Stop{{"m01"}});
-  const Answer answer = lab.ask(api::Pause{});
-  EXPECT_EQ(answer.reason, "paused: 0 motors; not paused, being stopped: m01");
+  EXPECT_EQ(lab.ask(api::Pause{}).reason, "paused: 0 motors; not paused, being stopped: m01");
   EXPECT_EQ(lab.wait(lab.move).result, "stopped");
 }
 

@@ -50,8 +50,7 @@ TEST(TableInService, IsToldByDescriptionAndResultWithRevisionAndHash) {
   ReadyLab lab(hall(1, 2, "fine", "glacier"), kGlacier);
   const api::TableRef glacier{.name = "glacier", .revision = 3, .hash = kGlacierHash};
   EXPECT_EQ(lab.description("m01").table, glacier);
-  const Answer result = lab.ask(Ask::kMoveBy, {"m01", "m02"}, {5, 0});
-  EXPECT_THAT(result.tables, ElementsAre(glacier, glacier));
+  EXPECT_THAT(lab.ask(Ask::kMoveBy, {"m01", "m02"}, {5, 0}).tables, ElementsAre(glacier, glacier));
 }
 
 TEST(UseTable, ServesTheNextMoveAndIsKept) {
@@ -231,8 +230,7 @@ TEST(ReloadTables, BadTableKeepsItsGroupOnTheOldOneAndNoOther) {
   EXPECT_THAT(reloaded.reason, HasSubstr("bushd2-constant.toml:2:"));
   EXPECT_EQ(table_of(lab, "end"), "glacier@9");
   EXPECT_LT(milliseconds_of_move(lab, 1000), 2000);
-  const Answer again = lab.wait(lab.reload());
-  EXPECT_EQ(again.phase, Answer::kRefused);
+  EXPECT_EQ(lab.wait(lab.reload()).phase, Answer::kRefused);
 }
 
 TEST(ReloadTables, GroupsWithTheSameTableShareItInTheMcus) {

@@ -162,8 +162,7 @@ TEST(Trajectory, AStopOfOneStopsAll) {
   EXPECT_THAT(lab.ask(api::Pause{}).reason, HasSubstr("follows a trajectory"));
   EXPECT_THAT(lab.ask(Ask::kMoveBy, {"m01"}, {10}).reason, HasSubstr("follows a trajectory"));
   lab.send(Ask::kStop, {"m03"});
-  const Answer end = lab.wait(trajectory.run);
-  EXPECT_EQ(end.result, "stopped");
+  EXPECT_EQ(lab.wait(trajectory.run).result, "stopped");
   EXPECT_LT(lab.shaft_steps("m01"), 119);
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
   EXPECT_EQ(lab.shaft_steps("m03"), lab.motor("m03").position_steps);
@@ -174,8 +173,7 @@ TEST(Trajectory, ALostMcuRampsDownTheOthers) {
   UnderWay trajectory;
   Lab& lab = trajectory.lab;
   lab.bus(0).reboot(1, 2'000'000'000);
-  const Answer end = lab.wait(trajectory.run);
-  EXPECT_THAT(end.motor_results, ElementsAre("stopped", "link"));
+  EXPECT_THAT(lab.wait(trajectory.run).motor_results, ElementsAre("stopped", "link"));
   EXPECT_EQ(lab.shaft_steps("m01"), lab.motor("m01").position_steps);
   EXPECT_LT(lab.shaft_steps("m01"), 119);
 }

@@ -197,8 +197,7 @@ TEST_P(Triggered, WhereOneMcuIsDisarmedOrLostTheOthersAreToo) {
 TEST_P(Triggered, TooLateToDisarmStopRampsThemDown) {
   auto move = arm({"m01"}, {3000});
   fire();
-  const auto disarm = lab.send(Ask::kDisarm, {"m01"});
-  EXPECT_THAT(lab.wait(disarm), Ends("done", "the trigger came before"));
+  EXPECT_THAT(lab.ask(Ask::kDisarm, {"m01"}), Ends("done", "the trigger came before"));
   EXPECT_TRUE(lab.motor("m01").moving);
   EXPECT_EQ(lab.wait(move).result, "reached");
   // A long delay: stopped before it has begun.
