@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/camac_lab.h"
+#include "daemon/step_times.h"
 #include "daemon/traced.h"
 #include "tables/table_file.h"
 
@@ -152,20 +153,8 @@ TEST_P(CamacStream, StopsAndPausesAreThoseOfTheProgram) {
 
 // The MCU knows the table of the group, and ramps the motor down by that.
 TEST_P(CamacStream, ALostLinkRampsItDownByTheTableOfTheGroup) {
-  std::vector<sim::TimeNs> times_ns;
-  class Sink final : public sim::EdgeSink {
-   public:
-    explicit Sink(std::vector<sim::TimeNs>& times_ns) : times_ns_(times_ns) {}
-    void edge(const sim::Edge& edge) override {
-      const bool step = edge.signal == sim::Signal::kStep && edge.level && edge.index == 0;
-      if (step) times_ns_.push_back(edge.time_ns);
-    }
-    void settled(sim::TimeNs) override {}
-
-   private:
-    std::vector<sim::TimeNs>& times_ns_;
-  } sink(times_ns);
-  CamacLab lab(lab_with(GetParam()), &sink);
+  StepTimes edges;
+  CamacLab lab(lab_with(GetParam()), &edges);
   begin(lab);
   lab.load(0, 20'000, program_codes());
   lab.permit(kEnabled);
@@ -184,6 +173,7 @@ TEST_P(CamacStream, ALostLinkRampsItDownByTheTableOfTheGroup) {
   const bushd_ramp& decel = (*table)->view().decel;
   std::size_t fewest = 0;  // to rest, from the last code of the program
   while (decel.code[fewest] * (*table)->view().time_unit_ns > 12u * kUnitNs) ++fewest;
+  const std::vector<sim::TimeNs>& times_ns = edges.of(0, 0);
   ASSERT_GT(times_ns.size(), fewest + 1);
   // Each edge is in the tick of its step; by the program's codes it would take half a second more.
   constexpr sim::TimeNs kTickNs = 2'560'000;

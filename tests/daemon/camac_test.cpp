@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/camac_lab.h"
+#include "daemon/step_times.h"
 #include "heritage/camac/bushd2.h"
 
 namespace bushd::test::camac_test {
@@ -17,18 +18,6 @@ using testing::HasSubstr;
 
 constexpr int kStartHz = 100;
 constexpr std::int64_t kUnitNs = 1'000'000'000 / (250 * kStartHz);
-
-// When the STEP outputs of an MCU have risen.
-class StepTimes final : public sim::EdgeSink {
- public:
-  void edge(const sim::Edge& edge) override {
-    if (edge.signal == sim::Signal::kStep && edge.level && edge.index == 0) {
-      times_ns.push_back(edge.time_ns);
-    }
-  }
-  void settled(sim::TimeNs) override {}
-  std::vector<sim::TimeNs> times_ns;
-};
 
 constexpr std::uint32_t kEnabled = 0x60;  // fault and end of motion
 constexpr std::uint32_t kLeft = 0x80;
@@ -71,16 +60,16 @@ TEST(CamacMotion, StepsAreWhereTheReportPutsThem) {
     CamacLab lab(lab_with("fine_table"), &edges);
     lab.load(0, steps, falling_codes());
     lab.run_to_lam(kEnabled);
-    ASSERT_EQ(edges.times_ns.size(), static_cast<std::size_t>(steps));
+    ASSERT_EQ(edges.of(0, 0).size(), static_cast<std::size_t>(steps));
     camac::Program program{.steps = static_cast<std::uint32_t>(steps)};
     for (const int code : falling_codes()) {
       program.codes.push_back(static_cast<std::uint8_t>(code));
     }
     // A code stands before its step, so all times follow from the first step.
-    std::int64_t due_ns = edges.times_ns.front();
+    std::int64_t due_ns = edges.of(0, 0).front();
     for (std::uint32_t step = 1; step < program.steps; ++step) {
       due_ns += code_of_step(program, step) * kUnitNs;
-      EXPECT_NEAR(static_cast<double>(edges.times_ns[step]), static_cast<double>(due_ns),
+      EXPECT_NEAR(static_cast<double>(edges.of(0, 0)[step]), static_cast<double>(due_ns),
                   static_cast<double>(kSlotNs))
           << "step " << step;
     }
@@ -102,9 +91,9 @@ TEST(CamacMotion, FrequenciesGoFromStartTo25Times) {
     lab.naf(kStation, 0, 10);
     lab.load(0, 5, {250, 11, 10});
     lab.run_to_lam(kEnabled);
-    ASSERT_EQ(edges.times_ns.size(), 9u);
+    ASSERT_EQ(edges.of(0, 0).size(), 9u);
     const auto delay_ns = [&](std::size_t step) {
-      return static_cast<double>(edges.times_ns[step] - edges.times_ns[step - 1]);
+      return static_cast<double>(edges.of(0, 0)[step] - edges.of(0, 0)[step - 1]);
     };
     // An edge is in the slot of its time, so a delay is off by less than one.
     EXPECT_NEAR(delay_ns(3), 1e9 / start_hz, kSlotNs) << "code 250";

@@ -1,33 +1,13 @@
 // A lab with programs in its MCUs.
 #pragma once
 
-#include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "daemon/lab.h"
-#include "sim/edge.h"
+#include "daemon/step_times.h"
 
 namespace bushd::test {
-
-// When each motor made its steps, by MCU and output.
-class StepTimes final : public sim::EdgeSink {
- public:
-  void edge(const sim::Edge& edge) override {
-    if (edge.signal != sim::Signal::kStep || !edge.level) return;
-    at_ns_[{edge.mcu, edge.index}].push_back(edge.time_ns);
-  }
-  void settled(sim::TimeNs) override {}
-
-  const std::vector<sim::TimeNs>& of(std::size_t mcu, unsigned output) {
-    return at_ns_[{mcu, output}];
-  }
-  bool none() const { return at_ns_.empty(); }
-
- private:
-  std::map<std::pair<std::size_t, unsigned>, std::vector<sim::TimeNs>> at_ns_;
-};
 
 // With these keys in each [[mcu]].
 inline std::string hall_with(int mcus, int motors, const std::string& keys) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/lab.h"
+#include "daemon/step_times.h"
 
 namespace bushd::test {
 namespace {
@@ -29,27 +30,11 @@ api::Follow fly_scan_part(Part part) {
   return follow;
 }
 
-// Edges of the first MCU: steps of m01, and pulses of position compare.
-class Pins final : public sim::EdgeSink {
- public:
-  void edge(const sim::Edge& edge) override {
-    if (edge.mcu != 0) return;
-    if (edge.signal == sim::Signal::kPositionCompare) pulses.push_back(edge);
-    if (edge.signal == sim::Signal::kStep && edge.level && edge.index == 0) {
-      steps_ns.push_back(edge.time_ns);
-    }
-  }
-  void settled(sim::TimeNs) override {}
-
-  std::vector<sim::Edge> pulses;
-  std::vector<sim::TimeNs> steps_ns;
-};
-
 class TrajectoryInputs : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Format, TrajectoryInputs, testing::Values("fine", "coarse"));
 
 TEST_P(TrajectoryInputs, APulseComesWhereTheMotorPasses) {
-  Pins pins;
+  StepTimes pins;
   ReadyLab lab(hall(2, 2, GetParam()), "", &pins);
   const api::PositionCompare compare{.motor = "m01",
                                      .position = 100,
@@ -59,13 +44,13 @@ TEST_P(TrajectoryInputs, APulseComesWhereTheMotorPasses) {
   ASSERT_EQ(lab.ask(compare).result, "done");
   ASSERT_EQ(lab.ask(fly_scan_part(Part::kLastRows)).result, "done");
   EXPECT_THAT(lab.ask(fly_scan_part(Part::kRun)), Ends("reached"));
-  ASSERT_EQ(pins.steps_ns.size(), 300u);
+  ASSERT_EQ(pins.of(0, 0).size(), 300u);
   ASSERT_EQ(pins.pulses.size(), 2u) << "one pulse, none on the way back";
   EXPECT_TRUE(pins.pulses[0].level);
   EXPECT_FALSE(pins.pulses[1].level);
   // The MCU counts in slots of 20 us.
   constexpr double kSlotNs = 2'560'000.0 / 128;
-  EXPECT_NEAR(static_cast<double>(pins.pulses[0].time_ns - pins.steps_ns[99]), 3e6, kSlotNs);
+  EXPECT_NEAR(static_cast<double>(pins.pulses[0].time_ns - pins.of(0, 0)[99]), 3e6, kSlotNs);
   EXPECT_NEAR(static_cast<double>(pins.pulses[1].time_ns - pins.pulses[0].time_ns), 500e3, kSlotNs);
   EXPECT_THAT(lab.errors(), IsEmpty());
 }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/lab.h"
+#include "daemon/step_times.h"
 #include "sim/shipped_motors.h"
 
 namespace bushd::test {
@@ -15,29 +16,9 @@ using testing::HasSubstr;
 
 constexpr std::int64_t kBusTickNs = 2'560'000;
 
-// Rising edges of STEP and of the position compare output.
-class Pins : public sim::EdgeSink {
- public:
-  void edge(const sim::Edge& edge) override {
-    if (edge.signal == sim::Signal::kStep && edge.level) {
-      steps_[{edge.mcu, edge.index}].push_back(edge.time_ns);
-    }
-    if (edge.signal == sim::Signal::kPositionCompare) compare.push_back(edge);
-  }
-  void settled(sim::TimeNs) override {}
-
-  const std::vector<sim::TimeNs>& steps(std::size_t mcu, std::uint8_t output) {
-    return steps_[{mcu, output}];
-  }
-  std::vector<sim::Edge> compare;
-
- private:
-  std::map<std::pair<std::size_t, std::uint8_t>, std::vector<sim::TimeNs>> steps_;
-};
-
 class Triggered : public testing::TestWithParam<const char*> {
  protected:
-  Pins pins;
+  StepTimes pins;
   ReadyLab lab{hall(2, 3, GetParam()), {}, &pins};
 
   static api::Request armed(const std::vector<std::string>& motors,
@@ -85,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(Manners, Triggered,
 
 TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
   for (const std::int64_t steps : {1, 40, -700}) {
-    const auto before = pins.steps(0, 0).size();
+    const auto before = pins.of(0, 0).size();
     const auto from = lab.motor("m01").position_steps;
     const auto move = arm({"m01", "m03"}, {steps, steps}, 12'345);
     EXPECT_EQ(lab.motor("m01").activity, api::Activity::kArmed);
@@ -101,10 +82,10 @@ TEST_P(Triggered, MovesBeginThreeTicksAndTheirDelayAfterTheEdge) {
     EXPECT_EQ(lab.shaft_steps("m01"), from + steps);
     EXPECT_EQ(lab.shaft_steps("m03"), from + steps);
     EXPECT_NE(lab.motor("m01").activity, api::Activity::kArmed);
-    const auto& all = pins.steps(0, 0);
+    const auto& all = pins.of(0, 0);
     expect_table({all.begin() + static_cast<std::ptrdiff_t>(before), all.end()},
                  static_cast<std::size_t>(std::abs(steps)), edge_ns + 3 * kBusTickNs + 12'345'000);
-    EXPECT_EQ(pins.steps(0, 0), pins.steps(0, 2)) << "in the same slots";
+    EXPECT_EQ(pins.of(0, 0), pins.of(0, 2)) << "in the same slots";
     const auto line = nlohmann::json::parse(*std::find_if(
         lab.move_lines().rbegin(), lab.move_lines().rend(),
         [](const std::string& text) { return text.find("\"event\":\"move\"") != text.npos; }));
@@ -404,19 +385,18 @@ TEST_P(Triggered, PulseWhenTheMotorArrives) {
   EXPECT_EQ(lab.ask(compare).result, "done");
   EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {1000}).result, "reached");
   lab.run_for(0.1);
-  ASSERT_EQ(pins.compare.size(), 2u);
-  const std::int64_t arrived_ns = pins.steps(0, 1).at(299);
-  EXPECT_NEAR(static_cast<double>(pins.compare[0].time_ns - arrived_ns), 20e6, 10'000);
-  EXPECT_NEAR(static_cast<double>(pins.compare[1].time_ns - pins.compare[0].time_ns), 500e3,
-              10'000);
-  EXPECT_TRUE(pins.compare[0].level);
-  EXPECT_FALSE(pins.compare[1].level);
+  ASSERT_EQ(pins.pulses.size(), 2u);
+  const std::int64_t arrived_ns = pins.of(0, 1).at(299);
+  EXPECT_NEAR(static_cast<double>(pins.pulses[0].time_ns - arrived_ns), 20e6, 10'000);
+  EXPECT_NEAR(static_cast<double>(pins.pulses[1].time_ns - pins.pulses[0].time_ns), 500e3, 10'000);
+  EXPECT_TRUE(pins.pulses[0].level);
+  EXPECT_FALSE(pins.pulses[1].level);
   EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {-1000}).result, "reached");
-  EXPECT_EQ(pins.compare.size(), 2u) << "the other direction";
+  EXPECT_EQ(pins.pulses.size(), 2u) << "the other direction";
   compare.arrivals = {};
   EXPECT_EQ(lab.ask(compare).result, "done");
   EXPECT_EQ(lab.ask(Ask::kMoveBy, {"m02"}, {1000}).result, "reached");
-  EXPECT_EQ(pins.compare.size(), 2u) << "switched off";
+  EXPECT_EQ(pins.pulses.size(), 2u) << "switched off";
 }
 
 TEST_P(Triggered, PositionCompareIsRefusedWithAReason) {
