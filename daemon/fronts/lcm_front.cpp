@@ -93,8 +93,7 @@ void LcmFront::on_message(std::string_view channel, lcm::Payload payload, std::i
     if (const auto packet = lcm::encode(unix_us_(), welcome)) publish(*packet);
   } else if (std::holds_alternative<lcm::GetStatus>(message->content)) {
     publishing_.publish_newest();
-    answer(message->id, {},
-           api::Completed{.outcome = api::Outcome::kDone, .reason = "published", .detail = {}});
+    answer(message->id, {}, api::done("published"));
   }
 }
 

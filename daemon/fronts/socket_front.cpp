@@ -85,8 +85,7 @@ void SocketFront::on_packet(Connection connection, control::View packet,
     on_hello(connection, *hello);
   } else if (std::holds_alternative<lcm::GetStatus>(message->content)) {
     for (const lcm::Packet* newest : publishing_.newest()) send(connection, *newest);
-    answer(connection, id.client_id, id.number,
-           api::Completed{.outcome = api::Outcome::kDone, .reason = "told", .detail = {}});
+    answer(connection, id.client_id, id.number, api::done("told"));
   } else if (const auto& request = std::get<api::Request>(message->content);
              !client.why_stops_only.empty() && !api::ends_motion(request)) {
     answer(connection, id.client_id, id.number,

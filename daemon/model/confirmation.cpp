@@ -28,7 +28,7 @@ std::optional<Result<void>> Confirmation::follow(std::int64_t now_us, const Mcu*
 }
 
 api::Completed Confirmation::result_of(const Result<void>& ended, const std::string& done) {
-  if (ended) return {.outcome = api::Outcome::kDone, .reason = done, .detail = {}};
+  if (ended) return api::done(done);
   return {.outcome = api::Outcome::kFault, .reason = ended.error().text(), .detail = {}};
 }
 

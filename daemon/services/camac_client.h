@@ -67,7 +67,7 @@ class CamacClient {
     const GroupId group = installation_.config()[motor].group;
     const api::Asker by = asker(after_stops);
     if (installation_.tables()[group]->content_hash() == table->content_hash()) {
-      return by.answer(api::Completed{.outcome = api::Outcome::kDone, .reason = "", .detail = {}});
+      return by.answer(api::done(""));
     }
     tables_.use(now_us, by, group, table);
   }

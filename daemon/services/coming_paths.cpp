@@ -67,9 +67,7 @@ void ComingPaths::request(const api::Asker& asker, const api::MovePath& request)
   }
   if (!*last) {
     asker.answer(api::Accepted{});
-    return asker.answer(api::Completed{.outcome = api::Outcome::kDone,
-                                       .reason = "these points are taken; more are to come",
-                                       .detail = {}});
+    return asker.answer(api::done("these points are taken; more are to come"));
   }
   incoming->second.along.rest = incoming->second.along.path;
   coming_.push_back({asker, request.dry_run, std::move(incoming->second)});

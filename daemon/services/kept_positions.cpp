@@ -113,7 +113,7 @@ void KeptPositions::request(const api::Asker& asker, const api::Confirm& request
     keep_confirmed(id);
   }
   installation_.changed = true;
-  answer_when_kept(asker, {.outcome = api::Outcome::kDone, .reason = "done", .detail = {}});
+  answer_when_kept(asker, api::done("done"));
 }
 
 void KeptPositions::keep_confirmed(MotorId id) {

@@ -157,8 +157,7 @@ void Trigger::follow() {
     });
     if (!disarming.motors.empty()) return false;
     installation_.changed = true;
-    disarming.asker.answer(
-        api::Completed{.outcome = api::Outcome::kDone, .reason = disarming.done, .detail = {}});
+    disarming.asker.answer(api::done(disarming.done));
     return true;
   });
 }
