@@ -240,12 +240,9 @@ Result<std::uint64_t> Database::marks_id() {
 Result<std::vector<std::string>> Database::slots() {
   Statement select(sqlite_, "SELECT motor FROM slot ORDER BY slot");
   std::vector<std::string> slots;
-  while (true) {
-    const auto row = select.step();
-    if (!row) return fail(row.error());
-    if (!*row) return slots;
-    slots.push_back(select.text(0));
-  }
+  const auto read = select.each([&] { slots.push_back(select.text(0)); });
+  if (!read) return fail(read.error());
+  return slots;
 }
 
 Result<void> Database::add_slots(std::uint64_t marks_id, const std::vector<std::string>& motors,
@@ -259,13 +256,7 @@ Result<void> Database::add_slots(std::uint64_t marks_id, const std::vector<std::
     for (const std::string& motor : motors) {
       if (auto added = insert.bind(motor).run(); !added) return added;
     }
-    for (const auto& [motor, record] : of_motors.records) {
-      if (auto done = put(motor, record); !done) return done;
-    }
-    for (const auto& [motor, settings] : of_motors.settings) {
-      if (auto done = put(motor, settings); !done) return done;
-    }
-    return {};
+    return put(of_motors);
   });
 }
 
@@ -290,10 +281,7 @@ Result<std::map<std::string, Record>> Database::records() {
                    " boot_number, output, at_rest, motion, target_steps, target_parts"
                    " FROM position");
   std::map<std::string, Record> records;
-  while (true) {
-    const auto row = select.step();
-    if (!row) return fail(row.error());
-    if (!*row) return records;
+  const auto read = select.each([&] {
     records[select.text(0)] = {.steps = select.number(1),
                                .steps_per_unit = select.text(2),
                                .trust = trust_of(select.text(3)),
@@ -306,19 +294,20 @@ Result<std::map<std::string, Record>> Database::records() {
                                .output = static_cast<std::uint8_t>(select.number(8)),
                                .at_rest = select.number(9) != 0,
                                .motion = static_cast<std::uint64_t>(select.number(10))};
-  }
+  });
+  if (!read) return fail(read.error());
+  return records;
 }
 
 Result<std::map<std::string, Settings>> Database::settings() {
   Statement select(sqlite_, "SELECT motor, key, value, replaces FROM setting");
   std::map<std::string, Settings> settings;
-  while (true) {
-    const auto row = select.step();
-    if (!row) return fail(row.error());
-    if (!*row) return settings;
+  const auto read = select.each([&] {
     settings[select.text(0)][select.text(1)] = {.value = select.text(2),
                                                 .replaces = select.text(3)};
-  }
+  });
+  if (!read) return fail(read.error());
+  return settings;
 }
 
 Result<std::vector<PastMove>> Database::history(const std::string& motor, int most) {
@@ -327,10 +316,7 @@ Result<std::vector<PastMove>> Database::history(const std::string& motor, int mo
                    " from_text, to_text FROM move WHERE motor = ? ORDER BY id DESC LIMIT ?");
   select.bind(motor).bind(std::int64_t{most});
   std::vector<PastMove> moves;
-  while (true) {
-    const auto row = select.step();
-    if (!row) return fail(row.error());
-    if (!*row) return moves;
+  const auto read = select.each([&] {
     moves.push_back({.motor = select.text(0),
                      .utime_us = select.number(1),
                      .what = select.text(2),
@@ -341,22 +327,26 @@ Result<std::vector<PastMove>> Database::history(const std::string& motor, int mo
                      .reason = select.text(7),
                      .from_text = select.text(8),
                      .to_text = select.text(9)});
-  }
+  });
+  if (!read) return fail(read.error());
+  return moves;
 }
 
 Result<void> Database::write(const Batch& batch) {
-  return transact([&]() -> Result<void> {
-    for (const auto& [motor, record] : batch.records) {
-      if (auto done = put(motor, record); !done) return done;
-    }
-    for (const auto& [motor, settings] : batch.settings) {
-      if (auto done = put(motor, settings); !done) return done;
-    }
-    for (const PastMove& move : batch.moves) {
-      if (auto done = add(move); !done) return done;
-    }
-    return {};
-  });
+  return transact([&] { return put(batch); });
+}
+
+Result<void> Database::put(const Batch& batch) {
+  for (const auto& [motor, record] : batch.records) {
+    if (auto done = put(motor, record); !done) return done;
+  }
+  for (const auto& [motor, settings] : batch.settings) {
+    if (auto done = put(motor, settings); !done) return done;
+  }
+  for (const PastMove& move : batch.moves) {
+    if (auto done = add(move); !done) return done;
+  }
+  return {};
 }
 
 Result<void> Database::put(const std::string& motor, const Record& record) {

@@ -74,6 +74,7 @@ class Database {
   // All of it, or nothing.
   template <class Work>
   Result<void> transact(const Work& work);
+  Result<void> put(const Batch& batch);
   Result<void> put(const std::string& motor, const Record& record);
   Result<void> put(const std::string& motor, const Settings& settings);
   Result<void> add(const PastMove& move);

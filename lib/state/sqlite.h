@@ -52,6 +52,15 @@ class Statement {
   Statement& bind(std::int64_t number);
   // Whether there is a row.
   Result<bool> step();
+  // Hands each row to `take`, to the end.
+  Result<void> each(const auto& take) {
+    while (true) {
+      const auto row = step();
+      if (!row) return fail(row.error());
+      if (!*row) return {};
+      take();
+    }
+  }
   // To the end, without rows.
   Result<void> run();
   // Ready for other values.
