@@ -42,10 +42,14 @@ class MotorTest : public testing::Test {
       set(mcu.moving, tick >= ahead.start_tick() && tick < ahead.end_tick());
     }
     if (position) mcu.motor[3].position_steps = static_cast<std::int32_t>(*position);
+    return as_it_is(tick);
+  }
+  // What it says as it is.
+  std::vector<Event> as_it_is(Tick tick, bool emergency_stop_open = false) {
     return motor.report({.of_mcu = mcu,
                          .tick = tick,
                          .requests_open = requests_open,
-                         .emergency_stop_open = false});
+                         .emergency_stop_open = emergency_stop_open});
   }
   static void set(std::uint16_t& mask, bool on) {
     mask = static_cast<std::uint16_t>(on ? mask | 1u << 3 : mask & ~(1u << 3));
@@ -115,8 +119,7 @@ TEST_F(MotorTest, RunDownByAFaultThatAnotherMasterHasClearedIsNoMismatch) {
   mcu.moving = 0;
   mcu.tick = kStart + 60;
   mcu.motor[3].position_steps -= 1;
-  const auto events = motor.report(
-      {.of_mcu = mcu, .tick = kStart + 60, .requests_open = false, .emergency_stop_open = false});
+  const auto events = as_it_is(kStart + 60);
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLink);
   EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
@@ -166,19 +169,13 @@ TEST_F(MotorTest, ACountThatDiffersStopsItAndMakesItsPositionUncertain) {
 TEST_F(MotorTest, AStartThatNeverCameIsNoMismatch) {
   motor.start(kSteps, kStart);
   mcu.motor[3].position_steps = 0;
-  const auto events = motor.report(
-      {.of_mcu = mcu, .tick = kStart + 30, .requests_open = false, .emergency_stop_open = false});
+  const auto events = as_it_is(kStart + 30);
   EXPECT_NE(find<event::MissedStart>(events), nullptr);
   EXPECT_EQ(motor.trust().uncertain_reason(), std::nullopt);
   EXPECT_TRUE(motor.start_of_run().awaits_new());
   EXPECT_TRUE(motor.stands());
   EXPECT_EQ(motor.target_steps(), kSteps);
-  EXPECT_TRUE(motor
-                  .report({.of_mcu = mcu,
-                           .tick = kStart + 60,
-                           .requests_open = false,
-                           .emergency_stop_open = false})
-                  .empty());
+  EXPECT_TRUE(as_it_is(kStart + 60).empty());
   const Leg leg = motor.take_leg();
   EXPECT_EQ(leg.target, kSteps);
   motor.start(leg.target, kStart + 100);
@@ -257,8 +254,7 @@ TEST_F(MotorTest, ALimitSwitchInFlightEndsTheMoveWhereItStands) {
   EXPECT_NE(find<event::Drop>(met), nullptr);
   EXPECT_THAT(refusal(kSteps), HasSubstr("is stopping it"));
   set(mcu.moving, false);
-  const auto events = motor.report(
-      {.of_mcu = mcu, .tick = kStart + 40, .requests_open = false, .emergency_stop_open = false});
+  const auto events = as_it_is(kStart + 40);
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
   EXPECT_THAT(refusal(-10), HasSubstr("stopped immediately at its limit switch"));
@@ -280,8 +276,7 @@ TEST_F(MotorTest, OneThatAnotherMasterMayMoveIsLeftToIt) {
   EXPECT_FALSE(motor.axis().stopping());
   EXPECT_TRUE(report(kStart + 31, 0).empty()) << "it moves";
   set(mcu.moving, false);
-  const auto events = motor.report(
-      {.of_mcu = mcu, .tick = kStart + 40, .requests_open = false, .emergency_stop_open = false});
+  const auto events = as_it_is(kStart + 40);
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kFault);
   EXPECT_THAT(*motor.trust().uncertain_reason(), HasSubstr("where the table leads to"));
@@ -293,8 +288,7 @@ TEST_F(MotorTest, AnEmergencyStopThatCutsMakesItsPositionUncertainIfItMoved) {
   mcu.faults = BUSHD_FAULT_EMERGENCY;
   EXPECT_TRUE(report(kStart + 21).empty()) << "it may still move";
   set(mcu.moving, false);
-  const auto events = motor.report(
-      {.of_mcu = mcu, .tick = kStart + 22, .requests_open = false, .emergency_stop_open = true});
+  const auto events = as_it_is(kStart + 22, true);
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kStopped);
   EXPECT_THAT(*motor.trust().uncertain_reason(),
@@ -339,13 +333,9 @@ TEST_F(MotorTest, ALimitSwitchThatEndsAPauseIsNoStopOnRequest) {
   // By a ramp of its MCU's own, which is a step longer and ends in the same place.
   const Tick end = motor.axis().end_tick();
   mcu.motor[3].position_steps = static_cast<std::int32_t>(motor.axis().planned_end_steps());
-  const auto told = [&](Tick tick) {
-    return motor.report(
-        {.of_mcu = mcu, .tick = tick, .requests_open = false, .emergency_stop_open = false});
-  };
-  EXPECT_NE(find<event::Drop>(told(end)), nullptr);
+  EXPECT_NE(find<event::Drop>(as_it_is(end)), nullptr);
   set(mcu.moving, false);
-  const auto events = told(end + 1);
+  const auto events = as_it_is(end + 1);
   ASSERT_NE(find<event::Ended>(events), nullptr);
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
 }
