@@ -10,6 +10,9 @@
 namespace bushd::daemon {
 namespace {
 
+// Each waits for its MCUs to confirm it, and a flood of them keeps these busy.
+constexpr std::size_t kMaxOpen = 256;
+
 // What the report of an MCU shows against an action being done there.
 Result<void> check(std::uint8_t action, const bushd_report& report) {
   const bool enabled = (report.flags & BUSHD_FLAG_ENABLED) != 0;
@@ -63,8 +66,7 @@ void Drivers::begin(std::int64_t now_us, const api::Asker& asker, const api::Mot
   if (const auto may_do = may(action, targets->mcus); !may_do) {
     return asker.answer(api::Refused{may_do.error().text()});
   }
-  // Each keeps its MCUs busy.
-  if (open_.size() >= kMostAwaited) {
+  if (open_.size() >= kMaxOpen) {
     return asker.answer(api::Refused{std::to_string(open_.size()) +
                                      " requests about drivers and faults wait for their MCUs "
                                      "already; try again in a moment"});

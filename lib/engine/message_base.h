@@ -18,10 +18,9 @@ extern "C" {
 #define BUSHD_REPLY_UNIT_NS 10000u  // of times at which an answer shall begin
 
 // All messages that a master sends: MESSAGE(TYPE, number, kind, needs). Its type is
-// BUSHD_MSG_<TYPE>, its payload a bushd_<kind>. An MCU without one of the capabilities `needs`
-// (engine/message_setup.h) answers that it does not know the message. TRIGGER and OUTPUTS need
-// none here: the MCU refuses the one by itself, and each takes the other. The next free number is
-// 0x21.
+// BUSHD_MSG_<TYPE>, its payload a bushd_<kind>. To an MCU without one of the capabilities `needs`
+// (engine/message_setup.h) it is an unknown message. (TRIGGER needs none: the MCU refuses it
+// itself; and every MCU takes OUTPUTS.) The next free number is 0x21.
 //
 // One MCU does what these say, or refuses it, and acknowledges (bushd_acknowledgement); a list
 // for each purpose. How HOME and TRAVEL go on is told by reports.

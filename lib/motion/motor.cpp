@@ -102,15 +102,6 @@ void Motor::stop(std::optional<std::string> ended_by) {
   }
 }
 
-void Motor::give_to_mcu(Activity how) {
-  activity_ = std::move(how);
-  asked_for_.reset();
-}
-
-void Motor::take_from_mcu(const Activity& how) {
-  if (activity_.index() == how.index()) rest();
-}
-
 void Motor::rest() {
   if (autonomous_ || moved_by_other_) {
     activity_ = Local{};

@@ -7,6 +7,7 @@
 // start_of_run() what becomes of a start that comes too late.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -80,6 +81,10 @@ struct Local {};       // the inputs at its MCU move it, or another master does
 struct Travelling {};  // by its MCU, between its limits or for one step, or it is about to
 struct InProgram {};   // a program of its MCU controls it, also at rest, or is about to
 using Activity = std::variant<Resting, Moving, Armed, Homing, Local, OnLine, Travelling, InProgram>;
+// The MCU moves the motor by itself, as it was asked to.
+template <class How>
+concept OfMcu =
+    std::same_as<How, Homing> || std::same_as<How, Travelling> || std::same_as<How, InProgram>;
 
 // What an MCU reports, and what is known beside.
 struct Report {
@@ -219,9 +224,13 @@ class Motor {
   // Somebody has stopped it, or paused it.
   bool stops() const;
   // Its MCU moves it by itself from now on, or is about to: Homing, Travelling or InProgram.
-  void give_to_mcu(Activity how);
+  template <OfMcu How>
+  void give_to_mcu(How how);
   // It no longer does that. Nothing if it does something else.
-  void take_from_mcu(const Activity& how);
+  template <OfMcu How>
+  void take_from_mcu(How) {
+    if (is<How>()) rest();
+  }
 
   // Its MCU is configured and in step: for the first time, or again; `restarted` if positions do
   // not go on from before.
@@ -281,6 +290,12 @@ class Motor {
   bool forbidden_up_ = false;
   bool forbidden_down_ = false;
 };
+
+template <OfMcu How>
+void Motor::give_to_mcu(How how) {
+  activity_ = how;
+  asked_for_.reset();
+}
 
 std::string busy_text(const Motor& motor);  // "theta moves"
 

@@ -78,7 +78,7 @@ class Script : public testing::Test {
     const test::Request request = test::request_of(message);
     ASSERT_NO_FATAL_FAILURE(ask(request.type, request.payload, answer));
   }
-  void ask(bushd_type type, const Bytes& payload, bushd_status answer = BUSHD_OK) {
+  void ask(std::uint8_t type, const Bytes& payload, bushd_status answer = BUSHD_OK) {
     for (const std::uint8_t address : {kVirtual, kReal}) {
       ASSERT_EQ(master_.acknowledged(address, type, payload), answer);
     }
@@ -90,9 +90,9 @@ class Script : public testing::Test {
   }
 
   // The same request to both; it is no question.
-  void tell(bushd_type type, const Bytes& payload) {
-    master_.send(kVirtual, static_cast<std::uint8_t>(type), payload);
-    master_.send(kReal, static_cast<std::uint8_t>(type), payload);
+  void tell(std::uint8_t type, const Bytes& payload) {
+    master_.send(kVirtual, type, payload);
+    master_.send(kReal, type, payload);
   }
 
   // To both within one tick: from then on they go together.

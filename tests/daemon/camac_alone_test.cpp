@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -83,7 +84,7 @@ class AloneLab : private Edges, public CamacLab {
   void begin(int steps_to_make, std::uint32_t control) {
     load(0, steps_to_make, falling());
     permit(control);
-    ASSERT_TRUE(begins());
+    if (!begins()) throw std::runtime_error("it does not begin");
   }
 };
 

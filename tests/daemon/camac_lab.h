@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -75,7 +76,7 @@ class CamacLab : public Lab {
   // A motion begins, and ends with a request.
   void run_to_lam(std::uint32_t control) {
     permit(control);
-    ASSERT_TRUE(wait_for_lam());
+    if (!wait_for_lam()) throw std::runtime_error("no LAM has come");
   }
 
  private:

@@ -104,6 +104,15 @@ TEST_F(Homing, StopAndEmergencyStopEndIt) {
   }
 }
 
+TEST_F(Homing, LeavesAPositionUncertainIfTheSwitchIsNotFound) {
+  ReadyLab lab(with(homes()));
+  lab.bus(0).reboot(0, 50'000'000);
+  ASSERT_TRUE(lab.run_until([&] { return lab.motor("m01").trust == api::Trust::kUncertain; }));
+  ASSERT_TRUE(lab.run_until([&] { return lab.all_ready(); }));
+  EXPECT_THAT(lab.ask(Ask::kHome, {"m01"}), Ends("fault", "m01: its switch was not found"));
+  EXPECT_EQ(lab.motor("m01").trust, api::Trust::kUncertain);
+}
+
 TEST_F(Homing, ASwitchThatIsNotThereIsAFault) {
   ReadyLab lab(with(homes(", slow_most_steps = 60")));
   const Answer missing = lab.ask(Ask::kHome, {"m01"});

@@ -11,6 +11,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 
 #include "daemon/lab.h"
@@ -37,7 +38,8 @@ class Traced : public testing::TestWithParam<Parameter> {
   // Ends the trace when it has what comes so soon.
   void close_trace(Lab& lab, double within_s = 0.1) {
     lab.run_for(within_s);
-    ASSERT_TRUE(vcd_->close(lab.bus(0).now_ns()).has_value());
+    const auto closed = vcd_->close(lab.bus(0).now_ns());
+    if (!closed) throw std::runtime_error(closed.error().text());
   }
   // Exit code of check-trace with these options. `bend` changes an event of the log of moves, or
   // leaves it out by returning false.

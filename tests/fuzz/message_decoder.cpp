@@ -1,7 +1,10 @@
 // All decoders of messages, those of the MCU and those of the master, on one payload: what is
 // accepted keeps the ranges that engine/message.h promises, is what the encoder makes of it, and
 // can be used.
+#include <algorithm>
 #include <array>
+#include <span>
+#include <string>
 
 #include "engine/message.h"
 #include "engine/message_kinds.h"

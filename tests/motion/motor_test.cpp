@@ -340,7 +340,7 @@ TEST_F(MotorTest, ALimitSwitchThatEndsAPauseIsNoStopOnRequest) {
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
 }
 
-TEST_F(MotorTest, HomingKeepsOthersAwayAndMakesThePositionKnown) {
+TEST_F(MotorTest, HomingKeepsOthersAway) {
   motor.goes_online(mcu, false, true);
   EXPECT_THAT(refusal(1), HasSubstr("MCU hall:1 restarted"));
   motor.give_to_mcu(Homing{});

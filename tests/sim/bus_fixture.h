@@ -128,7 +128,7 @@ class FrameMaster {
   template <class Message>
   void broadcast(const Message& message) {
     const test::Request request = test::request_of(message);
-    send(BUSHD_ADDRESS_BROADCAST, static_cast<std::uint8_t>(request.type), request.payload);
+    send(BUSHD_ADDRESS_BROADCAST, request.type, request.payload);
   }
 
   void drain() {
@@ -175,9 +175,9 @@ class FrameMaster {
     const test::Request request = test::request_of(message);
     return acknowledged(address, request.type, request.payload);
   }
-  bushd_status acknowledged(std::uint8_t address, bushd_type type,
+  bushd_status acknowledged(std::uint8_t address, std::uint8_t type,
                             std::span<const std::uint8_t> payload) {
-    const auto reply = request(address, static_cast<std::uint8_t>(type), payload);
+    const auto reply = request(address, type, payload);
     bushd_acknowledgement ack{BUSHD_E_LENGTH};
     if (!reply || bushd_decode_acknowledgement(reply->payload.data(), reply->payload.size(),
                                                &ack) != BUSHD_OK) {

@@ -1,33 +1,24 @@
 // Requests by their messages: so that no test puts the type of one beside the fields of another.
 #pragma once
 
-#include <concepts>
-
+#include "bus/rs485/request.h"
 #include "engine/message.h"
 #include "engine/payload.h"
 
 namespace bushd::test {
 
-struct Request {
-  bushd_type type;
-  std::vector<std::uint8_t> payload;
-};
+using link::Request;
+using link::request_of;
 
-// request_of(bushd_home{...}), and so on; compiled only where it is called, since messages with
-// lists have encoders with other parameters.
-#define BUSHD_REQUEST_OF(type, number, kind, needs)                      \
-  template <class Message>                                               \
-    requires std::same_as<Message, bushd_##kind>                         \
-  Request request_of(const Message& message) {                           \
+// Those that are not acknowledged by the one MCU that is asked.
+#define BUSHD_REQUEST_OF(type, kind)                                     \
+  inline Request request_of(const bushd_##kind& message) {               \
     return {BUSHD_MSG_##type, payload_of(message, bushd_encode_##kind)}; \
   }
-BUSHD_SETUP_REQUESTS(BUSHD_REQUEST_OF)
-BUSHD_MOTION_REQUESTS(BUSHD_REQUEST_OF)
-BUSHD_PROGRAM_REQUESTS(BUSHD_REQUEST_OF)
-BUSHD_REQUEST_OF(SYNC, , sync, )
-BUSHD_REQUEST_OF(EMERGENCY, , emergency, )
-BUSHD_REQUEST_OF(IDENTIFY, , identify, )
-BUSHD_REQUEST_OF(SET_ADDRESS, , set_address, )
+BUSHD_REQUEST_OF(SYNC, sync)
+BUSHD_REQUEST_OF(EMERGENCY, emergency)
+BUSHD_REQUEST_OF(IDENTIFY, identify)
+BUSHD_REQUEST_OF(SET_ADDRESS, set_address)
 #undef BUSHD_REQUEST_OF
 
 // TICKS; BUSHD_TICKS_FINE among the flags says what displacements are.

@@ -388,7 +388,7 @@ std::uint8_t Rs485Master::arm_line(McuIndex mcu, bushd_edge edge, std::uint32_t 
 
 std::uint8_t Rs485Master::travel(McuIndex mcu, bushd_travel message) {
   message.number = next_trigger_number(mcus_[mcu]);
-  ask(mcu, message);
+  ask(mcu, request_of(message));
   return message.number;
 }
 
@@ -396,7 +396,7 @@ void Rs485Master::end_travel(McuIndex mcu, std::uint8_t motor) {
   bushd_travel message{};
   message.kind = BUSHD_TRAVEL_NONE;
   message.motor = motor;
-  ask(mcu, message);
+  ask(mcu, request_of(message));
 }
 
 // Time for each order, one of them said again, and its motors' rest.

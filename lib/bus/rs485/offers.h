@@ -146,13 +146,12 @@ class LocalInputs {
   virtual void inhibit_local(McuIndex mcu, std::uint16_t motors) = 0;
 };
 
-// Messages that an MCU only acknowledges, and of which the master keeps no account: so neither
-// TRIGGER nor TRAVEL, which have numbers. Preconditions: the MCU is online, and has the
-// capabilities that the message needs.
+// Messages that an MCU only acknowledges (request.h: Unnumbered). Preconditions: the MCU is online,
+// and has the capabilities that the message needs.
 class Requests {
  public:
   virtual ~Requests() = default;
-  template <OfMotion Message>
+  template <Unnumbered Message>
   void ask(McuIndex mcu, const Message& message) {
     ask(mcu, request_of(message));
   }

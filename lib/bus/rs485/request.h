@@ -43,12 +43,12 @@ BUSHD_MOTION_REQUESTS(BUSHD_REQUEST_OF)
 BUSHD_PROGRAM_REQUESTS(BUSHD_REQUEST_OF)
 #undef BUSHD_REQUEST_OF
 
-// One that no part of the master keeps account of: neither of the setup nor of a program.
+// Requests that nobody but the asker keeps account of. The setup and programs have owners, and what
+// waits for the trigger, or travels, has a number that the master gives.
 template <class Message>
-concept OfMotion = false
-#define BUSHD_OR_IS(type, number, kind, needs) || std::same_as<Message, bushd_##kind>
-    BUSHD_MOTION_REQUESTS(BUSHD_OR_IS);
-#undef BUSHD_OR_IS
+concept Unnumbered =
+    std::same_as<Message, bushd_set_position> || std::same_as<Message, bushd_home> ||
+    std::same_as<Message, bushd_position_compare>;
 
 // Cancels all runs that wait for the trigger.
 inline Request disarming() {

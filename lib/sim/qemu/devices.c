@@ -62,12 +62,10 @@ static uint32_t stuck;
 
 static uint32_t stuck_read(uint32_t address) {
   (void)address;
-  (void)address;
   return stuck | 1u;
 }
 
 static void stuck_write(uint32_t address, uint32_t data) {
-  (void)address;
   (void)address;
   stuck = data;
 }
@@ -101,12 +99,10 @@ static void adc_write(uint32_t address, uint32_t data) {
 
 static uint32_t cause_read(uint32_t address) {
   (void)address;
-  (void)address;
   return reset_cause;
 }
 
 static void cause_write(uint32_t address, uint32_t data) {
-  (void)address;
   (void)address;
   reset_cause = data;
 }
