@@ -3,6 +3,7 @@
 namespace bushd::test {
 
 Fields& Fields::add_list(const char* name, const uint8_t* data, size_t count, size_t width) {
+  if (!with_text_) return *this;
   std::string list;
   for (size_t i = 0; i < count; ++i) {
     append(&list, parts({width == 1 ? data[i] : bushd_get_u16(data + 2 * i)}));

@@ -24,11 +24,12 @@ constexpr int64_t kLastMotor = BUSHD_MOTORS_PER_MCU - 1;
 // whether they are in the ranges of engine/message.h.
 class Fields {
  public:
-  explicit Fields(std::span<const uint8_t> payload) : payload_(payload) {}
+  Fields(std::span<const uint8_t> payload, bool with_text)
+      : payload_(payload), with_text_(with_text) {}
 
   template <class T>
   Fields& add(const char* name, T value) {
-    return add_text(name, std::to_string(static_cast<int64_t>(value)));
+    return with_text_ ? add_text(name, std::to_string(static_cast<int64_t>(value))) : *this;
   }
   template <class T>
   Fields& add(const char* name, T value, int64_t least, int64_t most) {
@@ -60,6 +61,7 @@ class Fields {
 
  private:
   std::span<const uint8_t> payload_;
+  bool with_text_;  // fuzzers have no time for it
   std::string text_;
   std::string out_of_range_;
 };
@@ -72,14 +74,14 @@ void append(std::string* list, const std::string& element);
 struct Decoded {
   bushd_status status = BUSHD_OK;
   // If it is taken:
-  std::string text;          // " motor=3 ...": its fields
+  std::string text;          // " motor=3 ...": its fields, if they are wanted
   std::string out_of_range;  // the first field that is not as promised; "": none
   Bytes reencoded;           // by the encoder; empty if a field is out of range
 };
 
 struct Kind {
   std::function<Bytes()> valid;  // a payload
-  std::function<Decoded(std::span<const uint8_t>)> decode;
+  std::function<Decoded(std::span<const uint8_t>, bool with_text)> codec;
   struct Bad {
     std::string what;
     std::function<void(Bytes*)> spoil;
@@ -87,6 +89,10 @@ struct Kind {
   std::vector<Bad> out_of_range;
   // Its entries go on to the end of the frame, so what is cut between two is a message too.
   bool open_ended = false;
+
+  Decoded decode(std::span<const uint8_t> payload, bool with_text = true) const {
+    return codec(payload, with_text);
+  }
 };
 
 // By the name of the payload (bushd_<name>).
@@ -108,14 +114,14 @@ std::vector<uint8_t> some_motors();
 template <class Message, class Encode>
 auto codec(bushd_status (*decode)(const uint8_t*, size_t, Message*), Encode encode,
            void (*tell)(const Message&, Fields&), const Message* before = nullptr) {
-  return [=](std::span<const uint8_t> payload) {
+  return [=](std::span<const uint8_t> payload, bool with_text) {
     Message message;
     std::memset(static_cast<void*>(&message), 0xA5, sizeof message);
     if (before != nullptr) message = *before;
     Decoded decoded;
     decoded.status = decode(payload.data(), payload.size(), &message);
     if (decoded.status != BUSHD_OK) return decoded;
-    Fields fields(payload);
+    Fields fields(payload, with_text);
     tell(message, fields);
     decoded.text = fields.text();
     decoded.out_of_range = fields.out_of_range();

@@ -8,7 +8,7 @@ void tell(const bushd_home& m, Fields& f) {
   f.add("motor", m.motor, 0, kLastMotor).add("direction", m.direction, -1, 1);
   f.promise(m.direction != 0, "direction");
   f.add("most_steps", m.most_steps, 0, INT32_MAX).add("shortest_delay", m.shortest_delay);
-  f.add("slow_steps", m.slow_steps, 1, INT32_MAX).add("slow_delay", m.slow_delay, 1, UINT32_MAX);
+  f.add("slow_steps", m.slow_steps, 1, INT32_MAX).add("slow_delay", m.slow_delay, 1, INT64_MAX);
   f.add("position_steps", m.position_steps);
 }
 

@@ -18,7 +18,7 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 
 void decode(const std::string& name, const test::Kind& kind, Bytes payload) {
-  const test::Decoded message = kind.decode(payload);
+  const test::Decoded message = kind.decode(payload, false);
   if (message.status != BUSHD_OK) {
     BUSHD_REQUIRE(message.status == BUSHD_E_LENGTH || message.status == BUSHD_E_FORMAT);
     return;
