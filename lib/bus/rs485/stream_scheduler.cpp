@@ -127,6 +127,7 @@ std::optional<Tick> StreamScheduler::Mcu::next_tick() const {
 }
 
 void StreamScheduler::replace(McuIndex mcu, std::uint16_t motors, Tick first, std::int64_t now_us) {
+  if (motors == 0) return;
   Mcu& m = mcus_[mcu];
   const Tick arrival = clock_.tick_at(arrival_us(now_us, motors, ticks_of_replacement(m, motors)));
   std::uint16_t sent = 0;  // motors of which ticks from `first` on have been sent already
