@@ -95,7 +95,7 @@ struct SaneMcu {
   bool configured = false;
   bool synced = false;
   bool enabled = false;
-  bool stopped = false;
+  std::uint8_t stopped = 0;  // the faults of an emergency stop
   std::uint32_t sync_id = 0;
   bool marked = false;
   std::int64_t marked_at_us = 0;
@@ -236,7 +236,7 @@ class Bus {
       case BUSHD_MSG_EMERGENCY:
         for (std::uint8_t address = 1; address <= kMcus; ++address) {
           const bool to_it = frame.address == BUSHD_ADDRESS_BROADCAST || frame.address == address;
-          if (to_it) mcus_[address - 1u].stopped = true;
+          if (to_it) stop(frame, &mcus_[address - 1u]);
         }
         return;
       case BUSHD_MSG_POLL:
@@ -280,6 +280,14 @@ class Bus {
     }
   }
 
+  // By a stop that disables it is disabled, whatever its identity was: an answer may have said so.
+  static void stop(const bushd_frame& frame, SaneMcu* mcu) {
+    mcu->stopped |= BUSHD_FAULT_EMERGENCY;
+    if (frame.payload[0] != BUSHD_STOP_DISABLE) return;
+    mcu->stopped |= BUSHD_FAULT_DISABLED;
+    mcu->enabled = false;
+  }
+
   static void obey(const bushd_frame& frame, SaneMcu* mcu) {
     if (frame.type == BUSHD_MSG_CONFIGURE) mcu->configured = true;
     if (frame.type == BUSHD_MSG_CONTROL && (frame.payload[0] & BUSHD_CONTROL_ENABLE) != 0) {
@@ -287,7 +295,7 @@ class Bus {
     }
     if (frame.type == BUSHD_MSG_CONTROL && (frame.payload[0] & BUSHD_CONTROL_CLEAR_FAULTS) != 0) {
       const bool named = frame.payload_size > 1;
-      if (!named || (frame.payload[1] & BUSHD_FAULT_EMERGENCY) != 0) mcu->stopped = false;
+      if (!named || (frame.payload[1] & BUSHD_FAULT_EMERGENCY) != 0) mcu->stopped = 0;
     }
   }
 
@@ -326,8 +334,10 @@ class Bus {
     const auto tick_us = static_cast<std::int64_t>(kTickNs / 1000);
     bushd_report report{};
     const bool ready = mcu.configured && mcu.synced && mcu.enabled;
-    report.state = mcu.stopped ? BUSHD_STATE_FAULT : ready ? BUSHD_STATE_READY : BUSHD_STATE_BUSY;
-    report.faults = mcu.stopped ? BUSHD_FAULT_EMERGENCY : 0;
+    report.state = mcu.stopped != 0 ? BUSHD_STATE_FAULT
+                   : ready          ? BUSHD_STATE_READY
+                                    : BUSHD_STATE_BUSY;
+    report.faults = mcu.stopped;
     report.flags = static_cast<std::uint8_t>(
         (mcu.configured ? BUSHD_FLAG_CONFIGURED : 0) | (mcu.synced ? BUSHD_FLAG_SYNCED : 0) |
         (mcu.enabled ? BUSHD_FLAG_ENABLED : 0) | (mcu.marked ? BUSHD_FLAG_SYNC_HEARD : 0));
