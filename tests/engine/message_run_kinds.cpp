@@ -159,6 +159,12 @@ Bytes any_trigger() {
   return triggered(any_table_run(), BUSHD_TABLE_RUN_HEADER);
 }
 
+std::function<void(Bytes*)> followed_twice_by(Bytes entry) {
+  return [entry = std::move(entry)](Bytes* p) {
+    for (int n = 0; n < 2; ++n) p->insert(p->end(), entry.begin(), entry.end());
+  };
+}
+
 }  // namespace
 
 Kinds run_kinds() {
@@ -172,12 +178,7 @@ Kinds run_kinds() {
          {"a shortest delay of no time",
           entry_alone(BUSHD_TABLE_RUN_HEADER, {0, 5, 0, 0, 0x80, 0, 0})},
          {"no entry", cut_to(BUSHD_TABLE_RUN_HEADER)},
-         {"a motor twice",
-          [](Bytes* p) {
-            const Bytes entry{15, 5, 0, 0, 0};
-            p->insert(p->end(), entry.begin(), entry.end());
-            p->insert(p->end(), entry.begin(), entry.end());
-          }}},
+         {"a motor twice", followed_twice_by({15, 5, 0, 0, 0})}},
         true}},
       {"line_run",
        {any_line_run,
@@ -219,12 +220,7 @@ Kinds run_kinds() {
          {"longer than the longest", entry_alone(BUSHD_LINE_RUN_HEADER, {0, 0, 0, 0, 0x80})},
          {"unknown bits", [](Bytes* p) { (*p)[BUSHD_LINE_RUN_HEADER] |= 0x10; }},
          {"no entry", cut_to(BUSHD_LINE_RUN_HEADER)},
-         {"a motor twice",
-          [](Bytes* p) {
-            const Bytes entry{15, 1, 0, 0, 0};
-            p->insert(p->end(), entry.begin(), entry.end());
-            p->insert(p->end(), entry.begin(), entry.end());
-          }}},
+         {"a motor twice", followed_twice_by({15, 1, 0, 0, 0})}},
         true}},
       {"line_trigger",
        {any_line_trigger,
