@@ -3,6 +3,7 @@
 Fields are watched by pyepics, so what is asserted is what a client hears, in the order in which it hears it.
 """
 
+import faulthandler
 import os
 import pathlib
 import sys
@@ -21,6 +22,8 @@ os.environ.update(
     EPICS_PVAS_BEACON_ADDR_LIST=ADDRESS,
     EPICS_PVAS_AUTO_BEACON_ADDR_LIST="NO",
 )
+# A plan that hangs says where, before its test is ended (TIMEOUT in CMakeLists.txt, in seconds as well).
+faulthandler.dump_traceback_later(270)
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 
 from caproto.sync import client as caproto_client
@@ -53,6 +56,11 @@ def pyepics():
     return epics
 
 
+# ophyd 1.11 tells a plan that a move has ended, and then, in another thread, forgets who waits for an end: the plan's next move, if that
+# has begun by then, and the plan waits for ever. The thread comes to run within this time.
+SETTLE_S = 0.25
+
+
 class LabTest(EndToEndTest):
     def bring_up_lab(self, theta="", bridge=(), sim=(), known=True, more=""):
         """`known`: somebody has said that all motors stand at 0."""
@@ -72,6 +80,14 @@ class LabTest(EndToEndTest):
         return bridge
 
     # -- what clients see
+
+    def epics_motor(self, name):
+        """ophyd's."""
+        from ophyd import EpicsMotor
+
+        motor = EpicsMotor(f"LAB:{name}", name=name, settle_time=SETTLE_S)
+        motor.wait_for_connection(timeout=20)
+        return motor
 
     def get(self, name, **how):
         # Asked for each time: the answer to a first get may overwrite a newer value that pyepics has been told meanwhile.

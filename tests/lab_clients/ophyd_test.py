@@ -10,13 +10,6 @@ logging.getLogger("ophyd").setLevel(logging.CRITICAL)
 
 
 class Ophyd(LabTest):
-    def motor(self, name):
-        from ophyd import EpicsMotor
-
-        motor = EpicsMotor(f"LAB:{name}", name=name)
-        motor.wait_for_connection(timeout=20)
-        return motor
-
     def engine(self):
         from bluesky import RunEngine
 
@@ -27,7 +20,7 @@ class Ophyd(LabTest):
 
     def test_moves_succeed_and_stops_do_not(self):
         self.bring_up_lab()
-        theta = self.motor("theta")
+        theta = self.epics_motor("theta")
         self.assertEqual((theta.limits, theta.egu), ((-500.0, 500.0), "deg"))
         self.assertTrue(theta.move(2.0, wait=True, timeout=60).success)
         self.assertEqual(theta.position, 2.0)
@@ -48,7 +41,7 @@ class Ophyd(LabTest):
 
     def test_position_and_limits_are_set(self):
         self.bring_up_lab()
-        theta = self.motor("theta")
+        theta = self.epics_motor("theta")
         theta.set_current_position(10.0)
         self.wait_until("the position", lambda: theta.position == 10.0)
         self.assertEqual(self.get("theta.OFF"), 10.0)
@@ -66,7 +59,7 @@ class Ophyd(LabTest):
         import bluesky.plans as bp
 
         self.bring_up_lab()
-        theta, phi = self.motor("theta"), self.motor("phi")
+        theta, phi = self.epics_motor("theta"), self.epics_motor("phi")
         engine, documents = self.engine()
         engine(bp.grid_scan([], theta, 0, 1, 5, phi, -1, 1, 3, snake_axes=True))
         points = [(round(document["data"]["theta"], 6), round(document["data"]["phi"], 6)) for kind, document in documents if kind == "event"]

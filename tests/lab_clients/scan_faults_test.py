@@ -25,12 +25,9 @@ class ScanFaults(LabTest):
         """Runs the plan; `fail` is called, in a thread of its own, once phi is on its way to the second point. Whether the plan has ended well."""
         import bluesky.plans as bp
         from bluesky import RunEngine
-        from ophyd import EpicsMotor
 
         self.bring_up_lab()
-        motors = [EpicsMotor(f"LAB:{name}", name=name) for name in ("theta", "phi")]
-        for motor in motors:
-            motor.wait_for_connection(timeout=20)
+        motors = [self.epics_motor(name) for name in ("theta", "phi")]
         if speed is not None:
             self.put("phi.VELO", speed)
         engine = RunEngine({})
