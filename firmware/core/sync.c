@@ -86,9 +86,10 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
   if (error_ppb > MAX_RATE_PPB || error_ppb < -MAX_RATE_PPB) return 0;
   const int32_t old_ppb = clock->rate_ppb;
   const int32_t old_step = clock->rate_step;
-  // The first estimate is better than none, however short the time that it was made in.
+  // The first estimate is better than none, however short the time that it was made in. An error of
+  // nothing is no estimate: it is what the reference hears, which is told its own times.
   const bool drift = !clock->rate_known || error_ns > SYNC_NOISE_NS || error_ns < -SYNC_NOISE_NS;
-  clock->rate_known = true;
+  clock->rate_known = clock->rate_known || error_ns != 0;
   int32_t rate_ppb = old_ppb + (int32_t)(drift ? error_ppb : error_ppb / NOISE_GAIN_DIVISOR);
   if (rate_ppb > MAX_RATE_PPB) rate_ppb = MAX_RATE_PPB;
   if (rate_ppb < -MAX_RATE_PPB) rate_ppb = -MAX_RATE_PPB;

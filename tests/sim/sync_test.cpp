@@ -133,8 +133,9 @@ class Hour {
     }
   }
   // Half a second, with a SYNC at its end.
-  void half_second(bool loss) {
-    const TimeNs sync_ns = bus_.now_ns() + 500'000'000;
+  void half_second(bool loss) { until_sync(500'000'000, loss); }
+  void until_sync(TimeNs length_ns, bool loss) {
+    const TimeNs sync_ns = bus_.now_ns() + length_ns;
     while (bus_.now_ns() < sync_ns) {
       bus_.advance_to(std::min(sync_ns, bus_.now_ns() + 20'000'000));
       if (measured_) worst_ns_ = std::max(worst_ns_, std::abs(skew_ns(bus_, tick_ns_)));
@@ -197,7 +198,22 @@ TEST(Sync, ReferenceThatJoinedLaterIsFollowedWithinThreeSeconds) {
   }
 }
 
-// Also where ticks are short or long: a tick's share of the rate is no whole number of ns.
+// A reference is told its own times, without an error. That is no estimate of its rate: what it
+// hears first of another reference is, also where the SYNC frames lie close together.
+TEST(Sync, ReferenceThatFollowsAnotherTakesItsRateAtOnce) {
+  for (const std::int32_t ppm : {1, 8, -8, 20}) {
+    Hour hour(ppm, -ppm, kTickNs);
+    hour.refer_to(2);
+    for (int i = 0; i < 4; ++i) hour.half_second(false);
+    hour.reboot_first();
+    hour.refer_to(1);
+    for (int i = 0; i < 3; ++i) hour.until_sync(60'000'000, false);
+    hour.measure();
+    hour.silence(10'000'000'000);
+    EXPECT_LT(hour.worst_ns(), 20'000) << ppm;
+  }
+}
+
 // A daemon that stands still just after an MCU has come into step: its rate was estimated from
 // SYNC frames that lie close together.
 TEST(Sync, FirstEstimateOfTheRateHoldsThroughSilence) {
@@ -212,6 +228,7 @@ TEST(Sync, FirstEstimateOfTheRateHoldsThroughSilence) {
   }
 }
 
+// Also where ticks are short or long: a tick's share of the rate is no whole number of ns.
 TEST(Sync, RateHoldsForAllTickLengths) {
   for (const std::uint32_t tick_ns : {BUSHD_MIN_TICK_NS, 1'000'000u, BUSHD_MAX_TICK_NS}) {
     Hour hour(50, -50, tick_ns);
