@@ -6,6 +6,7 @@
 
 #include <errno.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <random>
@@ -34,7 +35,13 @@ class RandomStreams : public testing::Test {
  protected:
   static constexpr int kGroup = 50;
   static constexpr std::size_t kMotorsInUse = 4;
-  static constexpr std::uint8_t kLastType = 0x1F;
+  static constexpr std::uint8_t kLastType = [] {
+    std::uint8_t last = 0;
+#define BUSHD_OR_LATER(type, number, kind, needs) last = std::max<std::uint8_t>(last, number);
+    BUSHD_MESSAGES(BUSHD_OR_LATER)
+#undef BUSHD_OR_LATER
+    return last;
+  }();
   static constexpr std::uint32_t kBaud = 1'000'000;
   static constexpr std::uint32_t kTickNs = 2'560'000;
   static constexpr std::uint8_t kAddress = 2;
