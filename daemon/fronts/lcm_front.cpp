@@ -1,5 +1,7 @@
 #include "daemon/fronts/lcm_front.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "base/printable.h"
@@ -108,12 +110,19 @@ void LcmFront::on_description(lcm::Payload payload) {
   other_bus_ = printable(of->snapshot.bus);
 }
 
-// A repetition says the same time as the first one did. A client without a clock is taken at its
-// word each time: better a stop too many.
-LcmFront::Book LcmFront::book_without_session(const lcm::ClientMessage& message) {
+// A repetition says the same session and time as the first one did. A client without a clock is
+// taken at its word each time: better a stop too many.
+api::Sessions::Ruling LcmFront::rule_without_session(const lcm::ClientMessage& message,
+                                                     Book& book) {
   const auto& request = std::get<api::Request>(message.content);
-  if (message.utime_us == 0 || !api::ends_motion(request)) return {};
-  return {&without_session_, without_session_.open(message.id.client_id, message.utime_us)};
+  const std::uint64_t stops = reception_.stops();
+  if (message.utime_us == 0 || !api::ends_motion(request)) {
+    book = {};
+    return {.carry_out = true, .after_stops = stops};
+  }
+  const std::string sender = fmt::format("{} {}", message.id.session, message.id.client_id);
+  book = {&without_session_, without_session_.open(sender, message.utime_us)};
+  return without_session_.rule(book.session, sender, message.id.number, request, stops);
 }
 
 void LcmFront::on_request(const lcm::ClientMessage& message, std::size_t bytes,
@@ -124,13 +133,7 @@ void LcmFront::on_request(const lcm::ClientMessage& message, std::size_t bytes,
   auto ruling = sessions_.rule(id.session, id.client_id, id.number, request, reception_.stops());
   // One that its session does not know of is not ordered by its number.
   const std::int64_t stream = ruling.record ? id.session : 0;
-  if (ruling.carry_out && !ruling.record) {
-    book = book_without_session(message);
-    if (book.sessions != nullptr) {
-      ruling =
-          book.sessions->rule(book.session, id.client_id, id.number, request, reception_.stops());
-    }
-  }
+  if (ruling.carry_out && !ruling.record) ruling = rule_without_session(message, book);
   if (ruling.reply) answer(id, {}, *ruling.reply);
   if (!ruling.carry_out) return;
   constexpr std::int64_t kNsPerUs = 1000;

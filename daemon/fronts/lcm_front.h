@@ -56,7 +56,8 @@ class LcmFront : public Listener {
     api::Sessions* sessions = nullptr;
     std::int64_t session = 0;
   };
-  Book book_without_session(const lcm::ClientMessage& message);
+  // `book` is set.
+  api::Sessions::Ruling rule_without_session(const lcm::ClientMessage& message, Book& book);
   void answer(const lcm::RequestId& id, const Book& book, const api::Reply& reply);
   void publish(const lcm::Packet& packet);
 
@@ -65,8 +66,8 @@ class LcmFront : public Listener {
   Publishing& publishing_;
   std::function<std::int64_t()> unix_us_;
   api::Sessions sessions_;
-  // Requests that end motion and have no session: by who sent them and when, so that one that is
-  // repeated ends nothing that was asked for since.
+  // Requests that end motion and have no session, or one that is not known: by their session, who
+  // sent them and when, so that one that is repeated ends nothing that was asked for since.
   api::Sessions without_session_;
   std::uint64_t dropped_ = 0;
   std::string trouble_;

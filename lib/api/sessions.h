@@ -57,7 +57,7 @@ class Sessions {
   Sessions& operator=(const Sessions&) = delete;
 
   // A session, never 0. The same client with the same nonce gets the same one again, as long as it
-  // is known: the answer to its hello may have been lost. Precondition: is_client_id(client_id).
+  // is known: the answer to its hello may have been lost. `client_id`: of bounded length.
   std::int64_t open(const std::string& client_id, std::int64_t nonce);
 
   // What to do with a request.

@@ -123,6 +123,22 @@ TEST_F(LcmFrontTest, AStopWithoutASessionIsRepeatedWithoutEffect) {
   EXPECT_EQ(stop_at(0), "the 4.");
 }
 
+// Two programs of one name, or one with a clock that stands: what another session asked for is
+// another stop.
+TEST_F(LcmFrontTest, AStopOfAnotherUnknownSessionIsNoRepetition) {
+  const auto stop_in = [this](std::int64_t session) {
+    heard_.clear();
+    say(lcm::encode(1'000'000, {.session = session, .client_id = "scan", .number = 1},
+                    api::Stop{}));
+    return api::reason_of(std::get<lcm::ReplyMessage>(heard_.back()).reply);
+  };
+  EXPECT_EQ(stop_in(0), "the 1.");
+  EXPECT_EQ(stop_in(7), "the 2.");
+  EXPECT_EQ(stop_in(8), "the 3.");
+  EXPECT_EQ(stop_in(7), "the 2.") << "a repetition";
+  EXPECT_EQ(stop_in(0), "the 1.");
+}
+
 // Another front, with a transport of its own for what ends motion, which is read first.
 class UrgentFrontTest : public LcmFrontTest {
  protected:

@@ -133,7 +133,7 @@ Promise::Duty Promise::Numbers::duty_of(std::int64_t number, std::size_t kind, b
 
 // One that its session does not know of is told from its repetitions by when it was sent.
 Promise::Numbers& Promise::book_of(const Request& request) {
-  const BookKey key(request.client, request.sent_us);
+  const BookKey key(request.session, request.client, request.sent_us);
   const auto [book, first] = books_.try_emplace(key);
   if (!first) books_used_.remove(key);
   books_used_.push_back(key);

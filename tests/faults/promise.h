@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -72,7 +73,8 @@ class Promise {
     bool idle = true;
     Numbers numbers{};
   };
-  using BookKey = std::pair<std::string, std::int64_t>;  // the client, and when it was sent
+  // The session, the client, and when it was sent.
+  using BookKey = std::tuple<std::int64_t, std::string, std::int64_t>;
   struct Given {
     Request request;
     Duty duty;
