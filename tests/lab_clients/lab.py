@@ -82,7 +82,7 @@ class LabTest(EndToEndTest):
     # -- what clients see
 
     def epics_motor(self, name):
-        """ophyd's."""
+        """ophyd's EpicsMotor of this name, connected."""
         from ophyd import EpicsMotor
 
         motor = EpicsMotor(f"LAB:{name}", name=name, settle_time=SETTLE_S)
