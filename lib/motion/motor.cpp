@@ -218,7 +218,8 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     notice_limit(report, events);
   }
   if (now.limit != 0) {
-    if (!moving) events.emplace_back(end_at_limit());
+    if (moving) return;
+    if (auto ended = end_at_limit(report.tick)) events.emplace_back(std::move(*ended));
     return;
   }
   const std::int64_t planned = axis_.executed_steps();

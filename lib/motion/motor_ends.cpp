@@ -31,9 +31,14 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
   events.emplace_back(event::Drop{});
 }
 
-// It stands.
-event::Ended Motor::end_at_limit() {
-  if (!stops() && further_.empty() && position_ == axis_.target_steps()) {
+// It stands. At its target it settles first, as without a limit switch; a stop ends that.
+std::optional<event::Ended> Motor::end_at_limit(Tick tick) {
+  Moving& now = moving_now();
+  const bool there = further_.empty() && position_ == axis_.target_steps();
+  if (there && (now.stood_since || !stops())) {
+    if (!now.stood_since) now.stood_since = tick;
+    const bool settles = !stops() || is_paused();
+    if (settles && tick < *now.stood_since + setup_.settle_ticks) return std::nullopt;
     return reached();
   }
   if (stops() && !is_paused() && position_ == axis_.executed_steps()) {
