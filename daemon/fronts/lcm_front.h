@@ -56,7 +56,7 @@ class LcmFront : public Listener {
     api::Sessions* sessions = nullptr;
     std::int64_t session = 0;
   };
-  // `book` is set.
+  // Sets `book`: where its answers are recorded; none: nowhere.
   api::Sessions::Ruling rule_without_session(const lcm::ClientMessage& message, Book& book);
   void answer(const lcm::RequestId& id, const Book& book, const api::Reply& reply);
   void publish(const lcm::Packet& packet);

@@ -13,7 +13,7 @@
 //
 // The time is noted to some microseconds only. An error within these may be nothing else, so a
 // quarter of it is taken; all of a larger one: that is drift, of a rate not yet known or of another
-// reference.
+// reference. Of the first one all is taken too.
 //
 // The rate's share of each tick is added up in 1/4096 ns and given out in whole ns. With the rate
 // changes what the clock has drifted from the SYNC until now: that is made up at once too.
@@ -87,7 +87,7 @@ static int32_t correct_rate(bushd_mcu* mcu, const bushd_sync* sync, int32_t erro
   const int32_t old_ppb = clock->rate_ppb;
   const int32_t old_step = clock->rate_step;
   // The first estimate is better than none, however short the time that it was made in. An error of
-  // nothing is no estimate: it is what the reference hears, which is told its own times.
+  // 0 is no estimate: it is what the reference hears, which is told its own times.
   const bool drift = !clock->rate_known || error_ns > SYNC_NOISE_NS || error_ns < -SYNC_NOISE_NS;
   clock->rate_known = clock->rate_known || error_ns != 0;
   int32_t rate_ppb = old_ppb + (int32_t)(drift ? error_ppb : error_ppb / NOISE_GAIN_DIVISOR);

@@ -14,7 +14,7 @@ typedef struct bushd_mcu bushd_mcu;
 typedef struct bushd_mcu_clock {
   // Ticks until the tick timer has another length; times of SYNCs are void till then.
   uint8_t settling : 2;
-  bool rate_known : 1;   // estimated since the clock was adopted
+  bool rate_known : 1;   // estimated from an error other than 0 since the clock was adopted
   bool corrected : 1;    // the clock was right at corrected_tick of the bus
   bool other_heard : 1;  // a master that was not `master`
   bool heard : 1;        // a SYNC frame; of the last one:

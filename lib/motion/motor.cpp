@@ -218,9 +218,11 @@ void Motor::follow(const Report& report, std::vector<Event>& events) {
     notice_limit(report, events);
   }
   if (now.limit != 0) {
-    if (moving) return;
-    if (auto ended = end_at_limit(report.tick)) events.emplace_back(std::move(*ended));
-    return;
+    if (moving || awaits_plan_at_limit(report)) return;
+    if (!ends_by_plan_at_limit(report, events)) {
+      events.emplace_back(end_at_limit());
+      return;
+    }
   }
   const std::int64_t planned = axis_.executed_steps();
   if (!now.position_mismatch && position_ != planned) {
@@ -262,7 +264,7 @@ void Motor::follow_end_of_line(const Report& report, std::vector<Event>& events)
   const bool there = axis_.line_planned_end() == axis_.line_target();
   if (there && now.last_run && !now.stands) {
     const bool stops = axis_.stopping() && !is_paused() && !now.by_others;
-    const bool settles = !stops && report.tick < axis_.over_tick() + setup_.settle_ticks;
+    const bool settles = !stops && report.tick < settled_from(axis_.over_tick());
     if (!settles) events.emplace_back(reached());
   } else if (is_paused()) {
     const bool stood = std::exchange(now.stands, true);
@@ -280,6 +282,11 @@ void Motor::follow_end_of_line(const Report& report, std::vector<Event>& events)
   }
 }
 
+// When it has stood for long enough, if its plan ends at `end`.
+Tick Motor::settled_from(Tick end) const {
+  return std::max(end, moving()->stood_since) + setup_.settle_ticks;
+}
+
 // It stands where its plan has led.
 void Motor::follow_end_of_run(const Report& report, std::vector<Event>& events) {
   const bool there = position_ == axis_.target_steps();
@@ -287,7 +294,7 @@ void Motor::follow_end_of_run(const Report& report, std::vector<Event>& events) 
     events.emplace_back(ran_out());
   } else if (there && further_.empty()) {
     const bool stops = axis_.stopping() && !is_paused() && !moving_now().by_others;
-    const bool settles = !stops && report.tick < axis_.end_tick() + setup_.settle_ticks;
+    const bool settles = !stops && report.tick < settled_from(axis_.end_tick());
     if (!settles) events.emplace_back(reached());
   } else if (stands_paused()) {
     // Until it is resumed.

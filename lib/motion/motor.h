@@ -51,10 +51,10 @@ struct MotorSetup {
 // What a motor does. Any other than Resting keeps other motions away from it.
 struct Resting {};
 struct Moving {
-  bool position_mismatch = false;        // counted otherwise than planned; it is being stopped
-  int limit = 0;                         // +1, -1: its limit switch at this end stops it
-  std::optional<Tick> stood_since = {};  // stopped so at its target, where it settles
-  std::uint8_t faults = 0;               // with which its MCU runs it down
+  bool position_mismatch = false;  // counted otherwise than planned; it is being stopped
+  int limit = 0;                   // +1, -1: its limit switch at this end stops it
+  Tick stood_since = 0;            // seen to stand after a ramp of its MCU's own, which led there
+  std::uint8_t faults = 0;         // with which its MCU runs it down
   bool by_others = false;  // is stopped since others on its way have ended: nobody has asked for it
   bool late = false;       // has missed its start: it stands until it is started again, or ends
   bool withdrawn = false;  // is not to begin at its start, but later, together with others
@@ -255,6 +255,7 @@ class Motor {
   Moving& moving_now() { return const_cast<Moving&>(*moving()); }
   void follow_withdrawn();
   void follow_end_of_run(const Report& report, std::vector<Event>& events);
+  Tick settled_from(Tick end) const;
   void follow_end_of_line(const Report& report, std::vector<Event>& events);
   bool stops_immediately(const bushd_report& report) const;
   void uncertain_if_stopped_immediately(const bushd_report& report);
@@ -262,7 +263,10 @@ class Motor {
   void follow(const Report& report, std::vector<Event>& events);
   bool follow_armed(const Report& report, std::vector<Event>& events);
   void notice_limit(const Report& report, std::vector<Event>& events);
-  std::optional<event::Ended> end_at_limit(Tick tick);
+  bool stands_at_target() const;
+  bool awaits_plan_at_limit(const Report& report) const;
+  bool ends_by_plan_at_limit(const Report& report, std::vector<Event>& events);
+  event::Ended end_at_limit();
   event::Ended end_by_fault(const bushd_report& report);
   event::Ended reached();
   event::Ended stopped();

@@ -31,16 +31,32 @@ void Motor::notice_limit(const Report& report, std::vector<Event>& events) {
   events.emplace_back(event::Drop{});
 }
 
-// It stands. At its target it settles first, as without a limit switch; a stop ends that.
-std::optional<event::Ended> Motor::end_at_limit(Tick tick) {
-  Moving& now = moving_now();
-  const bool there = further_.empty() && position_ == axis_.target_steps();
-  if (there && (now.stood_since || !stops())) {
-    if (!now.stood_since) now.stood_since = tick;
-    const bool settles = !stops() || is_paused();
-    if (settles && tick < *now.stood_since + setup_.settle_ticks) return std::nullopt;
-    return reached();
+// It stands where it is to end, and nobody has stopped it: its limit switch ends nothing.
+bool Motor::stands_at_target() const {
+  return !stops() && further_.empty() && position_ == axis_.target_steps();
+}
+
+// Its MCU's own ramp was the shorter one. Who does not settle has ended.
+bool Motor::awaits_plan_at_limit(const Report& report) const {
+  const Tick over = axis_.over_tick();
+  return stands_at_target() && report.tick < over && over <= report.tick + setup_.settle_ticks;
+}
+
+// Its MCU's own ramp, which may take a step longer, has led where its plan leads: it settles.
+bool Motor::ends_by_plan_at_limit(const Report& report, std::vector<Event>& events) {
+  if (!stands_at_target() || report.tick < axis_.over_tick()) return false;
+  if (const auto change = axis_.executed(report.tick)) {
+    events.emplace_back(event::Executed{*change});
   }
+  if (axis_.executed_steps() != position_) return false;
+  moving_now().limit = 0;
+  moving_now().stood_since = report.tick;
+  return true;
+}
+
+// It stands.
+event::Ended Motor::end_at_limit() {
+  if (stands_at_target()) return reached();
   if (stops() && !is_paused() && position_ == axis_.executed_steps()) {
     return stopped();
   }

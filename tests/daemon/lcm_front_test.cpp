@@ -123,8 +123,8 @@ TEST_F(LcmFrontTest, AStopWithoutASessionIsRepeatedWithoutEffect) {
   EXPECT_EQ(stop_at(0), "the 4.");
 }
 
-// Two programs of one name, or one with a clock that stands: what another session asked for is
-// another stop.
+// Of two programs of one name in sessions of their own, or of one with a clock that stands: what
+// another session asked for is another stop.
 TEST_F(LcmFrontTest, AStopOfAnotherUnknownSessionIsNoRepetition) {
   const auto stop_in = [this](std::int64_t session) {
     heard_.clear();
@@ -137,6 +137,10 @@ TEST_F(LcmFrontTest, AStopOfAnotherUnknownSessionIsNoRepetition) {
   EXPECT_EQ(stop_in(8), "the 3.");
   EXPECT_EQ(stop_in(7), "the 2.") << "a repetition";
   EXPECT_EQ(stop_in(0), "the 1.");
+  // A session of another client is as unknown.
+  EXPECT_EQ(stop_in(session("other")), "the 4.");
+  EXPECT_THAT(carried_out_, ElementsAre("stop", "stop", "stop", "stop"));
+  EXPECT_THAT(after_, ElementsAre(1u, 2u, 3u, 4u)) << "each counts itself";
 }
 
 // Another front, with a transport of its own for what ends motion, which is read first.

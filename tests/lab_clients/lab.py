@@ -22,7 +22,7 @@ os.environ.update(
     EPICS_PVAS_BEACON_ADDR_LIST=ADDRESS,
     EPICS_PVAS_AUTO_BEACON_ADDR_LIST="NO",
 )
-# A plan that hangs says where, before its test is ended (TIMEOUT in CMakeLists.txt, in seconds as well).
+# A plan that hangs says where. In seconds: before its test is ended, by TIMEOUT in CMakeLists.txt.
 faulthandler.dump_traceback_later(270)
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
 
@@ -57,7 +57,7 @@ def pyepics():
 
 
 # ophyd 1.11 tells a plan that a move has ended, and then, in another thread, forgets who waits for an end: the plan's next move, if that
-# has begun by then, and the plan waits for ever. The thread comes to run within this time.
+# has begun by then, and the plan waits for ever. The thread is expected to run within this time.
 SETTLE_S = 0.25
 
 

@@ -340,36 +340,6 @@ TEST_F(MotorTest, ALimitSwitchThatEndsAPauseIsNoStopOnRequest) {
   EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kLimit);
 }
 
-// A ramp of its MCU's own, which is a step longer, has led it to its target.
-TEST_F(MotorTest, AtItsTargetItSettlesAlsoIfALimitSwitchHasBroughtItThere) {
-  constexpr Tick kSettle = 50;
-  for (const bool is_stopped : {false, true}) {
-    MotorSetup settling = setup();
-    settling.settle_ticks = kSettle;
-    Motor settles{settling, Axis(*table.view(), kTickNs, BUSHD_FORMAT_FINE)};
-    mcu = {};
-    mcu.motor_count = 16;
-    settles.goes_online(mcu, true, false);
-    const auto told = [&](Tick tick) {
-      mcu.tick = static_cast<std::uint32_t>(tick);
-      return settles.report({.of_mcu = mcu, .tick = tick});
-    };
-    settles.start(kSteps, kStart);
-    const Tick end = settles.axis().end_tick();
-    set(mcu.forbidden_positive, true);
-    set(mcu.moving, true);
-    mcu.motor[3].position_steps = kSteps;
-    EXPECT_NE(find<event::Drop>(told(end)), nullptr);
-    set(mcu.moving, false);
-    EXPECT_TRUE(told(end + 1).empty()) << "it has just come to rest";
-    EXPECT_TRUE(told(end + kSettle).empty());
-    if (is_stopped) settles.stop();
-    const auto events = told(end + kSettle + (is_stopped ? 0 : 1));
-    ASSERT_NE(find<event::Ended>(events), nullptr);
-    EXPECT_EQ(find<event::Ended>(events)->outcome, Outcome::kReached);
-  }
-}
-
 TEST_F(MotorTest, HomingKeepsOthersAway) {
   motor.goes_online(mcu, false, true);
   EXPECT_THAT(refusal(1), HasSubstr("MCU hall:1 restarted"));
