@@ -123,8 +123,8 @@ TEST_F(LcmFrontTest, AStopWithoutASessionIsRepeatedWithoutEffect) {
   EXPECT_EQ(stop_at(0), "the 4.");
 }
 
-// Of two programs of one name in sessions of their own, or of one with a clock that stands: what
-// another session asked for is another stop.
+// What another session asked for is another stop: so it is with two programs of one name, and with
+// one whose clock stands.
 TEST_F(LcmFrontTest, AStopOfAnotherUnknownSessionIsNoRepetition) {
   const auto stop_in = [this](std::int64_t session) {
     heard_.clear();
